@@ -1,9 +1,9 @@
 """The analysis of one map: what it preserves, how fast its iterates grow in complexity, and a verdict.
 
-The analysis uses the map only, and ignores what a file claims about its system. Every statement has a certainty: proved
-or supported (formulas, as identities in x and eps), derived (from the measured singularity patterns), or measured
-(modulo primes, or along orbits). The number of integrals and the growth are determined independently of each other: a
-map may have many integrals and grow exponentially.
+The analysis uses the map only, and ignores what a file claims about its system. Every statement has a certainty.
+Formulas are proved or supported, as identities in x and eps. Other statements are derived from the measured singularity
+patterns, or measured modulo primes or along orbits. The number of integrals and the growth are determined independently
+of each other: a map may have many integrals and grow exponentially.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Units of work at effort 1 by dimension, for the independent steps and again for the other steps.
-# Most maps use a small part of them.
+# Units of work at effort 1 by dimension. The independent steps together have this budget, and the other steps together
+# have a second budget of the same size.
 _UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
 _MAX_UNITS = 150e6
 
@@ -53,12 +53,12 @@ class Analysis(AnalysisResult, PrintableResult):
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """The state for `pickle`, which cannot store the functions of the table; the default of the class is used."""
+        """Return the state without the table, whose functions `pickle` cannot store; copies use the default table."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
 
     @property
     def work(self) -> str:
-        """The effort and the work done: effort 1, 12.3 million units."""
+        """The effort and the units of work done, as text such as "effort 1, 12.3 million units"."""
         return f"effort {self.effort}, {self.units / 1e6:.1f} million units"
 
     def interrupt(self, reason: str = "interrupted") -> None:
@@ -101,7 +101,7 @@ class Analysis(AnalysisResult, PrintableResult):
         return [(title, lines) for title, lines in (*sections, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
+        """One row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
         statements = ((title, line) for title, lines in self.sections for line in lines)
         return [{"section": title, "status": line.status, "text": line.text} for title, line in statements]
 
@@ -159,23 +159,23 @@ def analyze(
         system: the map; a differential equation stands for its Kahan map. Claims and facts of a file are ignored. With
             an algebraic parameter, steps that do not apply over a number field are named in `skipped`.
         symbols: names of parameters that stay symbols in integrals and densities; other results use their values.
-        eps: half the time step, an exact number: the analysis is then at this eps only. None: it is for every eps.
+        eps: half the time step, an exact number; the results then hold at this eps only. None: they hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
         effort: an integer; each increase by 1 doubles the work that searches may take.
         seed: the random seed.
-        progress: called with a message at the beginning of each step, and in steps that take longer.
+        progress: called with a message at the beginning of each step, and repeatedly during long steps.
         on_result: called with the results so far, at the beginning and after each step.
         analyses: the steps to run, in this order; the verdict rests on their results only.
         processes: with more than 1, a forked copy of this process runs the independent steps, if there is a second
-            processor (on Linux only; other threads must tolerate a fork). The results are the same.
+            processor (on Linux only; other threads must tolerate a fork). The results are those of one process.
 
     Returns:
-        An `Analysis`, the same on any machine at any load. Steps that were not completed are named in `skipped`. Ctrl-C
-        and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all completed
-        steps.
+        An `Analysis`, the same on any machine at any load. Its `skipped` names the steps that were not completed.
+        Ctrl-C and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all
+        completed steps.
 
     Raises:
-        InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.
+        InputError: for eps = 0, unknown symbols, or an effort that is not an integer from -20 to 40.
 
     >>> from kahanmaps.documents.catalog import load
     >>> analysis = analyze(load("nahm_tetrahedral"))
@@ -194,7 +194,7 @@ def analyze(
     can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
     forked = [step for step in steps if step.is_independent and can_fork]
     skipped: dict[str, str] = {}
-    # Independent steps have a budget of their own, so that it is the same with one process and with two.
+    # The independent steps have a separate budget, so that their results are the same with one process and with two.
     accounts = {
         is_independent: _Account(context, [step for step in steps if step.is_independent is is_independent], units)
         for is_independent in (False, True)
@@ -206,12 +206,12 @@ def analyze(
             step, outcome = (in_fork if has_arrived else own).pop(0), None
             progress(step.name)
             if has_arrived:
-                # The process was killed, or met an error, which this process meets again.
+                # The forked process was killed or raised an error; this process then runs the step and meets the error.
                 with suppress(EOFError, OSError):
                     outcome = outcomes.recv()
             account = accounts[step.is_independent]
             result, reason, spent = outcome or account.run(step)
-            account.book(step, spent)  # also the work of the other process, as this one may have to take over from it
+            account.book(step, spent)  # includes the forked process, whose remaining steps this one may have to run
             analysis.units += spent
             if reason:
                 skipped[step.name] = f"{step.name}: {reason}"
@@ -231,13 +231,13 @@ def analyze(
 
 
 class _Account:
-    """The units of work of several successive steps: units that one step does not use go to the later ones."""
+    """A budget shared by successive steps: later steps may use the units of work that earlier steps leave over."""
 
     def __init__(self, context: AnalysisContext, steps: Sequence[AnalysisStep], units: float) -> None:
         self.context, self.waiting, self.units = context, list(steps), units
 
     def run(self, step: AnalysisStep) -> tuple[Any, str, int]:
-        """Run a step; return its result or None, the reason if there is none, and the units that it took."""
+        """Run a step; return its result or None, the reason if there is no result, and the units that the step took."""
         if self.units <= 0:
             return None, SPENT, 0
         budget = Budget(self.units * self.context.weight(step) / sum(map(self.context.weight, self.waiting)))
@@ -248,17 +248,14 @@ class _Account:
         return result, reason, budget.spent
 
     def book(self, step: AnalysisStep, spent: int) -> None:
-        """Remove a step that has run, and subtract the units that it took."""
+        """Remove a completed step from the pending ones, and subtract the units that the step took."""
         self.waiting.remove(step)
         self.units -= spent
 
 
 @contextmanager
 def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
-    """Run steps in a forked process, if there are any, and yield the connection for their outcomes.
-
-    The fork inherits the map and all functions; results are returned as pickles. The process ends with the block.
-    """
+    """Run the steps, if any, in a forked process, and yield the connection on which their outcomes arrive."""
     parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
     if not steps:
         yield receiver
@@ -278,10 +275,10 @@ def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], acc
                 sender.send((result, reason, spent))
 
     process = get_context("fork").Process(target=work, daemon=True)
-    with suppress(OSError):  # too little memory, or too many processes: then the first process does all
+    with suppress(OSError):  # too little memory or too many processes: the first process then runs all steps
         process.start()
     try:
-        sender.close()  # so that the end of the process is the end of the pipe
+        sender.close()  # so that the receiver sees the end of the pipe when the forked process ends
         yield receiver
     finally:
         if process.pid is not None:

@@ -1,4 +1,4 @@
-"""The results of an analysis of one map, as far as its steps have run."""
+"""The results of those steps of an analysis of one map that have run so far."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ class Statement(ResultPart):
 
 @dataclass
 class AnalysisResult:
-    """The results of the steps, None for those that have not run; `further` has those that no other step uses."""
+    """The results of the steps, None for a step that has not run; `further` has the results that no other step uses."""
 
     file: SystemFile
     eps: fmpq | None
     effort: int | Budget
     seed: int
     symbols: tuple[str, ...] = ()
-    defect: str = ""  # why the Kahan map at this eps is not birational; empty where it is, and for other maps
+    defect: str = ""  # why the Kahan map at this eps is not birational; empty if it is, or if the map is no Kahan map
     fixed_points: FixedPointSearch | None = None
-    equivalent: Equivalence | None = None  # a system of the catalogue
+    equivalent: Equivalence | None = None  # to a system of the catalogue
     integrals: IntegralSearch | None = None
-    pencil: Pencil | None = None  # in the plane
+    pencil: Pencil | None = None  # of invariant curves, for maps of the plane
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
     flow: FlowAndMap | None = None
@@ -66,10 +66,10 @@ class AnalysisResult:
     further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)  # names of the steps that have not run yet
-    units: int = 0  # of counted work that the steps took
+    units: int = 0  # counted work of the steps
 
     def __getitem__(self, key: str) -> Any:
-        """The result of a step, None if it has not run."""
+        """The result of the step `key`, None if this step has not run."""
         return getattr(self, key, self.further.get(key))
 
     def __setitem__(self, key: str, value: Any) -> None:
@@ -85,14 +85,14 @@ class AnalysisResult:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates of `normal_form`; None if H has no centre, or before that step has run."""
+        """The origin of the coordinates of `normal_form`; None if H has no centre or there is no normal form yet."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
         return None if self.normal_form is None else (fmpq(0),) * self.dim
 
     @property
     def integral_count(self) -> int:
-        """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
+        """The number of independent integrals, from formulas, orbits or theorems; see `count_is_exact`."""
         codimension = self.integrals.codimension if self.integrals is not None else 0
         family = self.normal_form.form.m if isinstance(self.normal_form, SystemNormalForm) else 0
         return max(codimension, family)
@@ -104,6 +104,6 @@ class AnalysisResult:
 
     @property
     def integrals_were_counted(self) -> bool:
-        """Whether `integral_count` was determined: it is also 0 where no orbit was followed."""
+        """Whether `integral_count` was determined; if not, it is 0 because no orbit was followed."""
         measured = self.integrals is not None and bool(self.integrals.profile.nullities)
         return measured or self.integral_count > 0

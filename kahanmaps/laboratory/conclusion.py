@@ -1,7 +1,7 @@
-"""The verdict on a map: what the results say about its integrability, and on which evidence.
+"""The verdict on the integrability of a map, with its evidence.
 
-Degrees, singularities, integrals and heights are computed independently of each other, each within limits of its own.
-Proved results stand. Where two measurements contradict each other, the verdict relies on neither.
+Degrees, singularities, integrals and heights are computed independently of each other, each with a work limit of its
+own. The verdict uses all proved results. Where two measurements contradict each other, it relies on neither.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Conclusion(ResultPart):
     `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere defined) or "undecided".
     `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
     "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable", "confining
-    and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the measured
-    singularity patterns), "measured" or "estimated"; empty where there is no verdict. `integrals` is the number of
-    independent integrals, known or measured; `growth` is that of the degrees.
+    and not integrable", or the same as `kind`. `ground` is the kind of evidence: "proved", "derived" (from the measured
+    singularity patterns), "measured" or "estimated"; it is empty if the kind is "undecided". `integrals` is the number
+    of independent integrals, known or measured; `growth` is the growth of the degrees.
     """
 
     kind: str
@@ -62,7 +62,7 @@ class _Facts:
         self.growth_certainty = degrees.known if degrees is not None else Certainty.MEASURED
         self.growth_text = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis_text = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
-        # The number of integrals, or a lower bound.
+        # The phrase with the number of integrals, or with a lower bound of it.
         where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
         self.integrals_text = number + where if result.count_is_exact else f"at least {number}{where}"
@@ -74,7 +74,7 @@ class _Facts:
         period = result.integrals.profile.period if result.integrals is not None else None
         self.closing_text = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
-        self.liouville = ""  # why the map is Liouville integrable; only if proved
+        self.liouville = ""  # why the map is Liouville integrable; empty without a proof
         if result.dim > 2 and not self.is_linear:
             for tensor in reversed(result.poisson.tensors if result.poisson is not None else ()):
                 proved = (tensor.verdict, tensor.jacobi, tensor.involution)
@@ -85,7 +85,7 @@ class _Facts:
 
 
 def conclude(result: AnalysisResult) -> Conclusion:
-    """Return the verdict of the first rule in `_RULES` that applies, or that the growth is undecided."""
+    """Return the verdict of the first rule in `_RULES` that applies; without such a rule, return "undecided"."""
     facts = _Facts(result)
     undecided = f"The growth is undecided: {facts.growth_text}; {facts.integrals_text}."
     verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
@@ -103,7 +103,7 @@ def conclude(result: AnalysisResult) -> Conclusion:
         facts.growth,
     )
     if verdict.kind == "not integrable":
-        growth = Growth.EXPONENTIAL  # also where this is only estimated
+        growth = Growth.EXPONENTIAL  # also if the growth is only estimated to be exponential
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
@@ -136,7 +136,7 @@ def _contradictory(facts: _Facts) -> _Verdict | None:
 
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
-    """Return "undecided" for maps that are not birational: their degrees and closed orbits mean nothing."""
+    """Return "undecided" for maps that are not birational; their degrees and periodic orbits are no evidence."""
     if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
     return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.growth_text}.", ground=None)
@@ -177,14 +177,14 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
 
 def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
     """Return the verdict on a map whose orbits lie on curves; unproved integrals count only for unknown growth."""
-    result, proved_count = facts.result, 0  # of independent integrals
+    result, proved_count = facts.result, 0  # the number of independent integrals that are proved
     if result.integrals is not None:
         proved_count = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
         proved_count = max(proved_count, 0 if result.integrals.symbols else result.integrals.by_theorems)
     if result.dim > 1 and proved_count >= result.dim - 1:
         sense = "superintegrable" if result.dim > 2 else "integrable"
         genus = result.pencil.genus if result.pencil is not None else None
-        if genus is None and result.dim == 2:  # not computed, but determined by the growth
+        if genus is None and result.dim == 2:  # the genus was not computed, but the growth determines it
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = (
@@ -202,7 +202,7 @@ def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
 def _by_growth(facts: _Facts) -> _Verdict | None:
     """Return the verdict that follows from exponential or polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals_text
-    is_known = facts.growth is Growth.EXPONENTIAL  # else the text says that it is estimated
+    is_known = facts.growth is Growth.EXPONENTIAL  # if not, the text says that the growth is estimated
     if is_known or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
         growth = f"{facts.growth_text}{facts.basis_text if is_known else ''}"
@@ -231,7 +231,7 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
 
 
 def _sense_if_not_integrable(result: AnalysisResult) -> str:
-    """Return the sense in which a map is not integrable; a map may be confining and not integrable."""
+    """Return "confining and not integrable" or "not integrable"."""
     confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
 
@@ -243,7 +243,7 @@ def _capital(sentence: str) -> str:
 def orbits_lie_on_curves(result: AnalysisResult) -> bool:
     """Return whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
 
-    The reason: the map acts on each of the curves, and if it has infinite order on a curve, the genus is 0 or 1.
+    The map acts on the level curves of the integrals; a curve with an automorphism of infinite order has genus 0 or 1.
     """
     return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
@@ -271,7 +271,7 @@ def contradictions(result: AnalysisResult) -> list[str]:
 
 
 def doubt_of_heights(result: AnalysisResult) -> str:
-    """Return why the growth of heights contradicts that of the degrees; empty if the two agree."""
+    """Return why the growth of heights contradicts the growth of degrees; empty if the two agree."""
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth

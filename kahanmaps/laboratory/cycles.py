@@ -1,10 +1,10 @@
-"""Cycles of a map on projective space over GF(p): how many there are of each length.
+"""The number of cycles of each length of a map on projective space over GF(p).
 
-All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Counts are exact for one p and eps.
+All points of P^n(GF(p)) are followed if there are few enough, and else random points. The counts are exact.
 
-No bound for the lengths is applied. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an irreducible
-curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
-levels, so that integrable maps have longer cycles, too. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
+The lengths are not compared with a bound. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an
+irreducible curve of genus 1 that the map sends to itself. Integrable maps may have longer cycles, since level sets may
+have several components and be permuted. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 
-MAX_POINTS = 2_000_000  # of a space that is examined completely, up to dimension 6; halved with each further dimension
+MAX_POINTS = 2_000_000  # in a space that is examined completely, up to dimension 6; halved for each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
-MAX_DIMENSION = 12  # the minors of a point are 2^(n + 1) arrays
+MAX_DIMENSION = 12  # the minors at the points are up to 2^(n + 1) arrays
 MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
 DEFAULT_SAMPLES, MAX_SAMPLES, DEFAULT_STEPS = 500, 100_000, 10_000
 DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3", "5", "4", "6")
@@ -40,11 +40,11 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 class Census(PrintableResult):
     """The orbits of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
 
-    `lengths` is the number of cycles by length if all points were followed (`complete`), else the number of sampled
-    points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
+    `lengths` maps each length to the number of cycles if all points were followed (`complete`), and otherwise each
+    period to the number of sampled points with this period. A point is `indeterminate` where the map is not defined,
     `pre_indeterminate` if its orbit reaches such a point, `preperiodic` if its orbit reaches a cycle on which it does
-    not lie, and `open` if none of this happened within `steps` steps (samples only). If a time limit `stopped` the work
-    before the images of all points were known, `examined` is 0.
+    not lie, and `open` if its orbit was not decided within `steps` steps (samples only). If a time limit `stopped` the
+    work before the images of all points were known, `examined` is 0.
     """
 
     prime: int
@@ -81,7 +81,7 @@ class Census(PrintableResult):
         return all_fields(self)
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each length: the number of cycles, or of sampled points; for example for pandas.DataFrame."""
+        """One row for each length with the number of cycles or of sampled points, for example for pandas.DataFrame."""
         return [{"length": length, "count": count} for length, count in self.lengths.items()]
 
 
@@ -97,27 +97,27 @@ def cycle_census(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Census:
-    """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
+    """Count the cycles of a map on P^n over GF(p) by length, from all points or from random points.
 
-    The maps of a composition are applied one after the other: a point is indeterminate if one of them is not defined.
-    Above dimension 6 points at which a common factor of the forms vanishes are also indeterminate.
+    The maps of a composition are applied one after another; a point is indeterminate if one of them is undefined there.
+    Above dimension 6 a point at which a common factor of the forms of the map vanishes is also indeterminate.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
         eps: an exact number, half the time step for a Kahan map; a map without eps needs none.
         prime: a prime between 2 and 2^31.
         time_step, h: the time step 2 eps, instead of eps.
-        samples: the number of random points; by default all points if there are at most 2,000,000 (half as many with
-            each dimension above 6), otherwise 500.
+        samples: the number of random points; by default all points if there are at most 2,000,000 (halved for each
+            dimension above 6), otherwise 500.
         steps: the largest number of steps for a random point.
         seed: the random seed.
-        progress: called with a message.
+        progress: called with messages.
 
     Returns:
-        A `Census`, exact. A TimeLimit ends it early.
+        A `Census`, exact. A TimeLimit ends the count early: the result is then `stopped`.
 
     Raises:
-        InputError: for a wrong prime, number or dimension; BadPrime if eps or the map has no reduction.
+        InputError: for a prime, number or dimension out of range; BadPrime if eps or the map has no reduction modulo p.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
@@ -140,10 +140,10 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     import numpy as np
 
     p, count = census.prime, census.points
-    # The code of a point is its coordinates as digits. As the last one that is not 0 is 1, codes are p^m ... 2 p^m - 1.
+    # The code of a point has the coordinates as digits. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
     place_values = p ** np.arange(census.dim + 1)
-    image = np.full(count + 1, count)  # `count` stands for no point
+    image = np.full(count + 1, count)  # `count` stands for a point without image
     try:
         for low in range(0, count, space.portion):
             progress(f"p = {p}: the images of {low} of {count} points")
@@ -152,7 +152,7 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     except TimeLimit:
         return replace(census, stopped=True)
     final = image
-    for _ in range(count.bit_length()):  # doubles the number of steps, until all orbits are on their cycles
+    for _ in range(count.bit_length()):  # doubles the number of steps until all orbits have reached their cycles
         final = final[final]
     cyclic = np.setdiff1d(final, [count])
     lengths: Counter[int] = Counter()
@@ -198,15 +198,15 @@ def _of_samples(
 
 
 class _ProjectiveMap:
-    """A map at one eps on P^n over GF(p); points are columns of n + 1 residues, the last that is not 0 being 1."""
+    """A map at one eps on P^n over GF(p); points are columns of n + 1 residues whose last nonzero residue is 1."""
 
     def __init__(self, map_: MapFamily, eps: fmpq, prime: int) -> None:
         if not 2 < prime < MAX_PRIME or map_.dim > MAX_DIMENSION:  # modulo 2 every Kahan map is the identity
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
-        self.portion = 1 << max(8, 18 - map_.dim)  # points at a time: their minors should stay in the cache
-        # For each map of a composition the forms of its image, or a matrix with these minors, as lists of terms.
+        self.portion = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
+        # For each map of a composition: its forms, or a matrix whose maximal minors are its forms, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
             matrix, by_minors = factor.equation.polynomials(), False
@@ -220,7 +220,7 @@ class _ProjectiveMap:
             self.maps.append((by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """Return the images of at most `portion` points; a column of zeros for a point without image."""
+        """Return the images of at most `portion` points; a point without image has a column of zeros."""
         p = self.prime
         for by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}
@@ -239,7 +239,7 @@ class _ProjectiveMap:
         return X
 
     def normalized(self, X: Any) -> Any:
-        """The columns divided by their last coordinate that is not zero; columns of zeros stay."""
+        """Divide each column by its last nonzero entry; columns of zeros are unchanged."""
         last = X[0]
         for row in X[1:]:
             last = row + last * (row == 0)
@@ -249,10 +249,10 @@ class _ProjectiveMap:
 
 
 def default_eps(prime: int) -> list[fmpq]:
-    """Return the first two eps of a fixed list that modulo the prime are not 0 and not equal up to sign.
+    """Return the first two eps of a fixed list that are nonzero and not equal up to sign modulo the prime.
 
-    For p > 5 no eps has eps^4 = 1, since for such eps a map may be periodic that is not periodic otherwise. (The sign
-    of eps exchanges the map and its inverse.)
+    The sign is ignored, since -eps gives the inverse map. For p > 5 each of the two eps has eps^4 != 1, since at an eps
+    with eps^4 = 1 a map may be periodic that is not periodic at other eps.
 
     >>> default_eps(101)
     [1/7, 2/11]

@@ -1,9 +1,9 @@
 """The reductions of a map modulo primes that searches work with, and the reconstruction of formulas from them.
 
-Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is determined modulo a prime where g splits by its values at
-all roots of g, through interpolation. The c_j are functions over Q and are reconstructed as such.
+Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is interpolated, modulo a prime at which g splits, from its
+values at all roots of g. The c_j are functions over Q, which are then reconstructed from their residues.
 
-Formulas are certified as identities in x, eps and the symbols, without quotients: for I = P/Q as
+Formulas are certified as identities in x, eps and the symbols, without quotients. For I = P/Q the identity is
 P(x~) Q(x) = P(x) Q(x~), which is shorter to expand. Some identities are too long to expand in the given coordinates,
 but short in coordinates in which the planes of a normal form separate.
 """
@@ -71,15 +71,15 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIME_DEPENDENT = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
-MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one prime in 720
-_BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, so that both prove the same identities
+MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one in 720 primes
+_BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, which thus proves the same identities
 _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number in the search for invariant hyperplanes over Q
 Spaces = Sequence[DarbouxSpace]
 
 
 @dataclass(frozen=True)
 class ClosedForms:
-    """Bases of spaces as polynomials in the variables, the symbols and eps; None with a reason if none were found."""
+    """Bases of spaces as polynomials in the variables, the symbols and eps, or None with a reason."""
 
     bases: list[list[fmpq_mpoly]] | None
     reason: str = ""
@@ -88,8 +88,8 @@ class ClosedForms:
 class Laboratory:
     """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (half the time step, exact) all of them are at that eps. With `flow` they are flows instead of maps: for
-    an adjusted Kahan map the flow of the field at eps = 0; for a polarised map `map` is then x + eps f. If `algebraic`
+    With `eps` (half the time step, exact) both reductions are at that eps. With `flow` they are reductions of the flow:
+    for an adjusted Kahan map of the field at eps = 0, and for a polarised map `map` is then x + eps f. If `algebraic`
     and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
 
     `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
@@ -144,7 +144,7 @@ class Laboratory:
             self.map = euler_map(self.field)
         self.flow = flow
         # Caches of one search. Each search has a laboratory of its own, so that no answer depends on another search.
-        # The smallest number of terms that was too long to expand; the key says whether the function was a density.
+        # For integrals (False) and densities (True): the smallest number of terms that was too large to expand.
         self._too_long: dict[bool, int] = {}
         self._flow_polynomials: FlowPolynomials | None = None
         if flow and (self.field is None or self.eps is not None):
@@ -169,9 +169,9 @@ class Laboratory:
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
-        """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol.
+        """Return the map at values of the names in formulas: the symbols, followed by eps if eps enters as a symbol.
 
-        If eps is no symbol, it is 1 or the given number.
+        If eps does not enter as a symbol, it is 1 or the given number.
         """
         count = len(self.symbols)
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
@@ -237,7 +237,7 @@ class Laboratory:
                 format_polynomial(affine.function), 1, affine.function.compose(*full_ring.gens()[:n], ctx=full_ring)
             )
             for affine in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
-            # l must divide l' with the symbols free, not only at their values in the file or at the stand-in
+            # l must divide l' for all values of the symbols, not only for those of the file or for the stand-in
             if darboux_cofactor(self.system, affine.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 
@@ -249,7 +249,7 @@ class Laboratory:
         result, context = flow_polynomials(self.field, budget=budget, seed=self.seed), ring(self.map.names)
         gens = context.gens()[:-1]
         functions = [P.compose(*gens, ctx=context) for P in result.functions]
-        # With symbols that search ends at a low degree in all names.
+        # With symbols the search for flow polynomials ends at a low degree, so the affine ones are added here.
         affine = self.affine_cofactors() if self.symbols and self.system is not None else []
         polynomials = [cofactor.polynomial for cofactor in affine if cofactor.polynomial is not None]
         functions += [P for P in polynomials if P not in functions]
@@ -261,7 +261,7 @@ class Laboratory:
     ) -> tuple[Certainty, Evidence]:
         """Certify that the map preserves I or dx/phi, as the function `verdict_on` does; for a flow, by expansion.
 
-        A function is not expanded if one of at most its length was too long.
+        A function is not expanded if an earlier one with at most as many terms was too long to expand.
         """
         if self.field is not None and self.flow:
             is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
@@ -300,21 +300,22 @@ class Laboratory:
         """Reconstruct the polynomials that span spaces whose reduced echelon bases are known modulo primes.
 
         Args:
-            model: the spaces on the first map.
-            spaces_on: returns the spaces on another map in the same order, or None if that map is special.
+            model: the spaces for the first map.
+            spaces_on: returns the spaces for another map in the same order, or None if that map is special.
             budget: the work limit.
             variables: the variables of the polynomials, by default those of the map.
             eps_enters: "not" if the spaces are for the given eps, "symbol", or "by weight" if they are for eps = 1 and
                 x becomes eps x in the polynomials, as for homogeneous f; by default `self.eps_enters`.
 
         Returns:
-            Polynomials in (variables, symbols, eps), primitive: with integer coefficients, and without a common factor
-            that is an integer or a polynomial in the symbols.
+            Primitive polynomials in (variables, symbols, eps): the coefficients are integers, and no integer or
+            polynomial in the symbols is a common factor.
         """
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
         supports = [set(space.places) for space in model]
-        # Echelon forms end in a 1 at the largest monomial. The unknowns are the other entries that are not 0.
+        # In echelon forms the coefficient of the largest monomial is 1. The unknowns are all other nonzero
+        # coefficients.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
         unknowns = [
             [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != space_pivots[i]]
@@ -330,7 +331,7 @@ class Laboratory:
                 not set(space.places) <= support or len(space.basis) != len(space_pivots)
                 for space, support, space_pivots in zip(spaces, supports, pivots, strict=True)
             ):
-                return None  # the spaces have another shape
+                return None  # the spaces have other monomials or dimensions
             return tuple(
                 space.basis[i][k]
                 for space, space_unknowns in zip(spaces, unknowns, strict=True)
@@ -367,15 +368,15 @@ class Laboratory:
 
 
 def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
-    """Call `reconstruct`, where the first of the names stands for the root if there is one.
+    """Call `reconstruct`; if there is a root, the first of the names stands for it.
 
     The black box is evaluated at all roots modulo primes at which the minimal polynomial of the root splits. The
-    functions are polynomials in the first name, of degree less than that of the field. `options` are for `reconstruct`.
+    functions are polynomials in the root of lower degree than the field. `options` are passed to `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
     m = root.degree
-    assert m <= MAX_DEGREE  # or suitable primes are too rare; the constructor of Laboratory refuses larger degrees
+    assert m <= MAX_DEGREE  # suitable primes are too rare for larger degrees, which Laboratory refuses
 
     def draw_splitting_prime(rng: random.Random) -> int:
         while True:
@@ -408,8 +409,8 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
     """Divide a nonzero polynomial in n variables, the root and eps by its factors that contain no variable.
 
-    The result has integer coefficients without a common factor. Among the multiples of the polynomial in which some
-    coefficient is rational, it is the shortest.
+    The result has integer coefficients without a common factor. It is the shortest among those multiples of the
+    polynomial that have a rational coefficient.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
@@ -450,7 +451,7 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
 def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
     """Return quotient and remainder of polynomials over a field, given by coefficients in ascending order.
 
-    The last coefficient of each is not 0.
+    The last coefficient of each polynomial is not 0.
     """
     quotient, remainder = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
     while len(remainder) >= len(Q):
@@ -463,7 +464,7 @@ def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[
 
 
 def euler_map(field: PolynomialField) -> ImplicitMap:
-    """Return x -> x + eps f(x), a map with the variables and symbols of the field, which represents its flow."""
+    """Return the map x -> x + eps f(x), which represents the flow of f, with the variables and symbols of f."""
     context = ring((*field.variables, *field.symbols, "eps"))
     *gens, eps = context.gens()
     images = (x + eps * f.compose(*gens, ctx=context) for x, f in zip(gens, field.rhs, strict=False))
@@ -477,11 +478,10 @@ def is_kept_by_flow(
     is_density: bool = False,
     factor: RationalFunction | None = None,
 ) -> bool:
-    """Return whether f . grad I = 0; for a density phi, whether f . grad phi = phi div f: then dx/phi is invariant.
+    """Return whether f . grad I = 0, or for a density phi whether f . grad phi = phi div f (dx/phi is invariant).
 
-    With a factor c, a function of the symbols, return whether f . grad I = c I: then exp(-c t) I is a time-dependent
-    integral. The identity is expanded for all values of the symbols; exact. The function is in (variables, symbols,
-    eps).
+    With a factor c, a function of the symbols, return whether f . grad I = c I, so that exp(-c t) I is a time-dependent
+    integral. Exact: the identity is expanded. `function` is I or phi, in (variables, symbols, eps).
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -510,23 +510,23 @@ def verdict_on(
     factor: RationalFunction | None = None,
     expands: bool = True,
 ) -> tuple[Certainty, Evidence]:
-    """Certify that I(x~) = I(x); for a density phi, that phi(x~) = det dPhi(x) phi(x): then dx/phi is invariant.
+    """Certify that I(x~) = I(x), or for a density phi that phi(x~) = det dPhi(x) phi(x) (dx/phi is invariant).
 
-    The identity is for every value of the symbols of the map and, if `eps` is None, for every eps.
+    The identity is to hold for every value of the symbols of the map and, if `eps` is None, for every eps.
 
     Args:
         given: the map, some of its parameters symbols; a system stands for its Kahan map.
         function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
         eps: half the time step (exact), or None for every eps.
         seed: the random seed.
-        is_density: whether the function is a phi.
-        factor: c, a function of the same names, for I(x~) = c I(x) or c phi; None for 1.
-        expands: whether to try a proof where random points support it.
+        is_density: whether the function is a density phi.
+        factor: c, a function of the same names, for I(x~) = c I(x) or phi(x~) = c det dPhi(x) phi(x); None for 1.
+        expands: whether to try a proof by expansion after random points have supported the identity.
 
     Returns:
         The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
-        undecided where the two sides are undefined, as for a map that is singular everywhere; for a density also if
-        the map is not invertible.
+            undecided. It is undecided if the two sides are undefined, as for a map that is singular everywhere, and for
+            a density also if the map is not invertible.
 
     Source: celledoni-2019.
 
@@ -546,7 +546,7 @@ def verdict_on(
     n, root = map_.dim, map_.root
 
     def sides(field: Field, values: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        """P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times the determinants, in x, the symbols and eps."""
+        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q; for a density, multiplied by the sides of det dPhi(x)."""
         x, symbols = values[:n], values[n:]
         map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)
@@ -564,7 +564,7 @@ def verdict_on(
         if is_density:
             numerator, denominator = jacobian_determinant_fraction(map_at_eps, x, image)
             if field.is_zero(numerator):
-                return None  # the map is not invertible at x, and 0 = 0 says nothing
+                return None  # the map is not invertible at x, where both sides are 0
             left, right = left * denominator, right * numerator
         return [left], [right]
 
@@ -607,9 +607,9 @@ class Separated:
 
 
 def separated(system: QuadraticSystem) -> Separated | None:
-    """Write a system in coordinates in which its planes over Q separate.
+    """Write a system in coordinates in which the planes over Q of its normal form separate.
 
-    Returns None for a system without such planes, and if the result is no shorter.
+    Returns None for a system without such planes, and if the system written so is no shorter.
 
     >>> from kahanmaps.documents.catalog import load
     >>> system = load("paper_m2").system

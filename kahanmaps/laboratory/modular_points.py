@@ -1,4 +1,4 @@
-"""Points, steps and values of monomials modulo a prime: the data for the searches for integrals and densities."""
+"""Points, steps and values of monomials modulo a prime, from which integrals and densities are searched."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
-Values = Sequence[Any]  # nmod, whose products take half the time of those of Python's integers, or integers
+Values = Sequence[Any]  # Python integers, or nmod, whose products take half the time
 Exponent = tuple[int, ...]
 _TRIES = 60
 _UNDEFINED = "the map is not defined at random points modulo a prime"
@@ -72,7 +72,7 @@ class ModularMap:
             return None
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """Return the sides of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
+        """Return numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)), det(I - eps f'(x))."""
         count_work(25 + 8 * self.dim + self.dim**3 / 10)
         numerator, denominator = jacobian_determinant_fraction(self.map, x, self.map.point(image))
         return int(numerator), int(denominator)
@@ -94,7 +94,7 @@ class ModularMap:
     def orbit(self, count: int) -> list[Point]:
         """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
 
-        If the orbit meets an indeterminacy point, another orbit is tried. Raises NoPoint if all orbits do.
+        If an orbit meets an indeterminacy point, another one is tried. Raises NoPoint if all tried orbits meet one.
         """
         longest = 0
         for _ in range(_TRIES):
@@ -113,9 +113,9 @@ class ModularMap:
     ) -> tuple[Sequence[Values], Point, int | None]:
         """Evaluate all monomials up to a degree along an orbit of `count` points.
 
-        Returns the values, a row for each point, the first point, and the period if it is less than `count`. A
-        polynomial vanishes along the orbit if the rows annihilate its coefficients. With a `support`, the indices of
-        monomials and of all their divisors, there are columns for these only. Raises NoPoint.
+        Returns the values (one row for each point), the first point, and the period if it is less than `count`, else
+        None. A polynomial vanishes along the orbit if the rows annihilate its coefficients. A `support` is a list of
+        indices of monomials, closed under divisors; there are then columns for these monomials only. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
@@ -134,9 +134,9 @@ class ModularFlow(ModularMap):
     """The flow of a vector field modulo `prime`, at the residues `values` of its symbols; a step is x -> x + f(x).
 
     It has the interface of a map, so that the same searches find its integrals. A solution x(t) is a power series, and
-    the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough of
-    them are 0. Where a search for maps compares P(x) with P(x~), the flow has P + P' for P(x~), with P' = f . grad P.
-    Bilinear expressions such as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
+    the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough
+    coefficients are 0. For a flow P + P' with P' = f . grad P replaces P(x~) in the searches for maps. Bilinear
+    expressions such as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
 
     Raises BadPrime if the prime divides a denominator.
     """
@@ -148,7 +148,7 @@ class ModularFlow(ModularMap):
         self.degree = field.degree
         self._f = [self._terms(f) for f in field.rhs]
         self._divergence = self._terms(field.divergence)
-        # The products needed for values of f: each monomial is a variable times an earlier monomial.
+        # The products from which f is evaluated: each monomial is a variable times an earlier monomial.
         tables = monomial_tables(self.dim, self.degree)
         waiting = {place for terms in self._f for _, place in terms}
         products: dict[int, tuple[int, int]] = {}
@@ -161,7 +161,7 @@ class ModularFlow(ModularMap):
         self._products = sorted(products.items())
 
     def _terms(self, polynomial: fmpq_mpoly) -> list[tuple[int, int]]:
-        """Return the coefficients modulo the prime at the values of the symbols, with indices of monomials."""
+        """Return pairs (coefficient, index of its monomial), modulo the prime at the values of the symbols."""
         field, n = GF(self.prime), self.dim
         terms = []
         for monomial, coefficient in polynomial.terms():
@@ -178,7 +178,7 @@ class ModularFlow(ModularMap):
         return tuple((a + sum(c * values[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """Return 1 + div f(x) and 1, the ratio of P + P' to P for a density P."""
+        """Return 1 + div f(x) and 1, whose quotient is the ratio of P + P' to P for a density P."""
         values = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * values[k] for c, k in self._divergence), 1
 
@@ -206,13 +206,13 @@ class ModularFlow(ModularMap):
     def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[Values]:
         """Return the first `orders` Taylor coefficients of all monomials, or those in `support`, along a solution.
 
-        Each row has the coefficients of one order.
+        Each row of the result has the coefficients of one order in t.
         """
         p, factors = self.prime, monomial_tables(self.dim, degree)
         columns = len(factors) if support is None else len(support)
         in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
         count_work(orders * (in_rows + columns / 2) + 3 * columns)
-        # The keys are indices of monomials: 0 is that of 1, k + 1 that of the k-th variable.
+        # The keys are indices of monomials: the constant 1 has index 0, the k-th variable has index k + 1.
         coefficients = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
         coefficients |= {place: list[int]() for place, _ in self._products}
         for order in range(1, orders):
@@ -233,7 +233,7 @@ class ModularFlow(ModularMap):
             return table[place]
 
         series = [monomial(place).coeffs() for place in (range(len(factors)) if support is None else support)]
-        # Lists of coefficients end with the last nonzero one, so all of them may be shorter than `orders`.
+        # A list of coefficients ends with its last nonzero entry, so every list may be shorter than `orders`.
         rows: list[Values] = list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
         return rows + [[nmod(0, p)] * columns] * (orders - len(rows))
 
@@ -252,7 +252,7 @@ def places_of(dim: int, degree: int) -> dict[Exponent, int]:
 
 @cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
-    """Return for each monomial and each of its variables (variable, exponent, index of the monomial divided by it)."""
+    """Return, for each monomial, (variable, exponent, index of monomial/variable) for each of its variables."""
     places = places_of(dim, degree)
     return [
         [(k, e, places[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
@@ -261,7 +261,7 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
-    """Return, for each degree and each monomial of the support, a variable and the index of their quotient."""
+    """Return, by degree, for each monomial of the support one of its variables and the index of monomial/variable."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
     positions = {index: position for position, index in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
@@ -318,9 +318,9 @@ def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int
 
 
 def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime: int) -> list[int] | None:
-    """Return the coefficients of a product of polynomials up to `degree`; None if its degree is higher.
+    """Return the coefficients of the product P Q; None if its degree is higher than `degree`.
 
-    Coefficient lists may be shorter than that of all monomials; missing coefficients are 0.
+    Lists of coefficients may end before the last monomial; missing coefficients are 0.
     """
     exponents, places = exponents_up_to(dim, degree), places_of(dim, degree)
     row = [0] * len(exponents)
@@ -358,7 +358,7 @@ def scaled_gradient(function: RationalFunction, field: Any, place: Sequence[Any]
 
 
 class Independent:
-    """The gradients of independent functions at one random point modulo a prime, to test other functions against.
+    """The gradients of independent functions at one random point modulo a prime, for tests of independence.
 
     `rows` are multiples of the gradients of the functions added so far.
     """
@@ -368,17 +368,17 @@ class Independent:
         self.rows = [self.gradient(function) for function in functions]
 
     def gradient(self, function: RationalFunction) -> list[int]:
-        """Return a multiple of the gradient of a function of (variables, symbols, eps) in the variables."""
+        """Return a multiple of the gradient, in the variables, of a function of (variables, symbols, eps)."""
         field = GF(self.map.prime)
         place = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
         return [int(entry) for entry in scaled_gradient(function, field, place, self.map.dim)]
 
     def adds(self, row: list[int]) -> bool:
-        """Return whether a gradient is linearly independent of the others; nothing is added."""
+        """Return whether a gradient is linearly independent of the stored gradients, without adding it."""
         return rank([*self.rows, row], self.map.prime) > len(self.rows)
 
     def add(self, row: list[int]) -> bool:
-        """Add a gradient if it is linearly independent of the others, and return whether it is."""
+        """Add a gradient if it is linearly independent of the stored gradients, and return whether it is."""
         if not self.adds(row):
             return False
         self.rows.append(row)

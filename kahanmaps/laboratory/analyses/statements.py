@@ -1,4 +1,4 @@
-"""The statements of the report about each result: the lines of its sections, in the order of the report."""
+"""The statements of the report, which are the lines of its sections, in the order of the report."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 PROVED, MEASURED, UNDECIDED, NOTE = Certainty.PROVED, Certainty.MEASURED, Certainty.UNDECIDED, Certainty.NOTE
 
 MAX_POINTS = 8  # the number of fixed points that three quadratic equations have
-MAX_NAMES = 6  # listed one by one
-MAX_DEGREES = 12  # printed
-MAX_FIELDS = 6  # listed one by one
+MAX_NAMES = 6  # names that are listed one by one
+MAX_DEGREES = 12  # degrees that are printed
+MAX_FIELDS = 6  # vector fields that are listed one by one
 MAX_CHARACTERS = 300  # of a sentence with a formula
 
 
 def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield div f and the fixed points or, if there are many, the first ones."""
+    """Yield statements on div f and the fixed points or, if there are many, the first fixed points."""
     search = result.fixed_points
     if search is None:
         return
@@ -42,7 +42,7 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
     elif not search.found:
         yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
-        # A fixed point of the flow is one of the map if det(I - eps f'(x)) is not 0 there.
+        # A fixed point of the flow is a fixed point of the map if det(I - eps f'(x)) is not 0 there.
         are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
         undefined = [
             points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False
@@ -60,7 +60,7 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
-    """Formulas, measurements and relations along orbits, and the curves of a planar integral."""
+    """Yield formulas, measurements and relations along orbits, and the level curves of a planar integral."""
     if (search := result.integrals) is not None:
         for integral in search.integrals:
             yield Statement(integral.verdict, f"{integral.name} = {integral.short_text}  [{integral.origin}]")
@@ -72,7 +72,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         profile = search.profile
         if search.by_theorems:
             number = counted(search.by_theorems, "independent integral")
-            status = MEASURED if search.symbols else PROVED  # with symbols: at random values of them
+            status = MEASURED if search.symbols else PROVED  # symbols have random values here
             yield Statement(status, f"{number} by theorems: {search.theorems}")
         if not profile.nullities:
             yield Statement(UNDECIDED, f"the number of integrals was not measured: {search.reason}")
@@ -126,7 +126,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def of_densities(result: AnalysisResult) -> Iterator[Statement]:
-    """The densities, or the reason why none was found."""
+    """Yield the densities, or the reason why none was found."""
     search = result.densities
     if search is None:
         return
@@ -144,13 +144,13 @@ def of_densities(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_flow(result: AnalysisResult) -> Iterator[Statement]:
-    """A line for each structure of the flow that the map conserves, deforms or loses."""
+    """Yield a statement for each structure of the flow that the map conserves, deforms or loses."""
     if result.flow is not None:
         yield from (Statement(Certainty(certainty), text) for certainty, text in result.flow.lines())
 
 
 def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
-    """The tensor of a member of the commuting family, and the tensors of the search."""
+    """Yield the tensor of a member of the commuting family, and the tensors of the search."""
     search = result.poisson
     if isinstance(result.normal_form, SystemNormalForm) and result.normal_form.form.m > 1:
         text = f"with {result.normal_form.form.m} integrals in involution, as a member of the commuting family"
@@ -162,13 +162,13 @@ def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_growth(result: AnalysisResult) -> Iterator[Statement]:
-    """The degrees with their recurrence, then the heights."""
+    """Yield the degrees with their recurrence, then the heights."""
     degrees, heights = result.degrees, result.heights
     if degrees is not None:
         shown = ", ".join(map(str, degrees.degrees[1 : MAX_DEGREES + 1]))
         more = ", ..." if len(degrees.degrees) > MAX_DEGREES + 1 else ""
         if shown:
-            status = MEASURED if degrees.primes else PROVED  # by powers of a matrix
+            status = MEASURED if degrees.primes else PROVED  # without primes: degrees of powers of a matrix
             yield Statement(status, f"degrees of the iterates: {shown}{more}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
@@ -185,7 +185,7 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
-    """The outcome at all values of eps, if they agree."""
+    """Yield the verdict on the singularities, and the longest confined pattern, if all values of eps agree."""
     if not result.singularities:
         return
     verdicts = {run.verdict for run in result.singularities}
@@ -203,7 +203,7 @@ def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
-    """One-parameter groups, and the finite group by its generators."""
+    """Yield one-parameter groups, and the generators of the finite group."""
     search = result.symmetries
     if search is None:
         return
@@ -227,7 +227,7 @@ def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_structure(result: AnalysisResult) -> Iterator[Statement]:
-    """The Hamiltonian, invariant hyperplanes, the commuting family and the normal form."""
+    """Yield the Hamiltonian, invariant hyperplanes, the commuting family and the normal form."""
     structures = result.hamiltonian
     if structures is not None and structures.hamiltonian is not None:
         H = format_polynomial(structures.hamiltonian.H)
@@ -254,7 +254,7 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
-    """The hyperplanes that are invariant under the flow, grouped by their images under the map."""
+    """Yield the hyperplanes that are invariant under the flow, grouped by the action of the map on them."""
     system, eps = result.file.system, result.eps
     planes_by_image: dict[str, list[str]] = {}
     for darboux in affine_darboux(system).functions:
@@ -278,7 +278,7 @@ def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the systems g whose Kahan maps commute with that of f; g and -g share a statement."""
+    """Yield statements on the systems g whose Kahan maps commute with that of f, one statement for g and -g."""
     if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
         split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
@@ -289,7 +289,7 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     if search.every_g_commutes:
         yield Statement(PROVED, "the map is the identity and commutes with every other")
     listed: list[CommutingField] = []
-    for g in search.nontrivial:  # with g there is -g, whose map is the inverse
+    for g in search.nontrivial:  # -g is also a solution, since its map is the inverse
         if not any(g.system == other.system.scaled(-1) for other in listed):
             listed.append(g)
             text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(g.rhs)})"
@@ -300,7 +300,7 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
             # All fields g of the family, or the number of its parameters if the formula is long.
             base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
             moved = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
-            which = "g and -g, g" if base else "all g"  # the negatives of these are among them
+            which = "g and -g, g" if base else "all g"  # without a base the family contains -g
             letters = ", ".join(f"t{j}" for j in range(1, len(moved) + 1))
             text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
             if len(text) > MAX_CHARACTERS:

@@ -1,4 +1,4 @@
-"""One step of an analysis: what it computes and how the report states it; and the context in which it runs."""
+"""A step of an analysis, with its computation and its statements in the report, and the context in which it runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class MapKinds(Flag):
 
     VECTOR_FIELDS = auto()  # Kahan maps of vector fields over Q
     OTHER_MAPS = auto()  # other birational maps over Q
-    OVER_NUMBER_FIELDS = auto()  # both, over number fields
+    OVER_NUMBER_FIELDS = auto()  # Kahan maps and other birational maps over number fields
     OVER_Q = VECTOR_FIELDS | OTHER_MAPS
     ALL = OVER_Q | OVER_NUMBER_FIELDS
 
@@ -31,10 +31,10 @@ class MapKinds(Flag):
 class AnalysisStep:
     """One analysis, a row of `table.py`.
 
-    `run(context, effort=..., progress=...)` returns the result, or None where the step does not apply. The result is
-    stored as `result[key]`. In JSON it has this key, too, with the value of its `to_json`, unless `json` gives other
-    entries. `statements` yields the lines of the section `title`; that section is complete after this step and those in
-    `requires`.
+    `run(context, effort=..., progress=...)` returns the result, or None if the step does not apply. The result is
+    stored as `result[key]`. In JSON the key has the value of the `to_json` of the result, unless `json` gives other
+    entries. `statements` yields the lines of the section `title`; this section is complete after the step and the steps
+    in `requires`.
     """
 
     name: str
@@ -43,11 +43,11 @@ class AnalysisStep:
     statements: Callable[[Any], Iterable[Statement]] | None = None
     applies_to: MapKinds = MapKinds.VECTOR_FIELDS
     weight: float = 0.1  # its share of the budget, relative to the weights of the other steps
-    key: str = ""  # by default the name
+    key: str = ""  # of the result; by default the name of the step
     requires: tuple[str, ...] = ()
-    # Above this dimension the step is slow: it runs last, with a quarter of its weight, and no other step uses it.
+    # Above this dimension the step is slow: it runs last, with a quarter of its weight; no other step uses its result.
     slow_above: float = inf
-    # A second process may run it: it exchanges results with steps of this kind only, and its result can be pickled.
+    # A second process may run the step: it uses only results of independent steps, and its own result can be pickled.
     is_independent: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 
@@ -55,7 +55,7 @@ class AnalysisStep:
         object.__setattr__(self, "key", self.key or self.name)
 
     def to_json(self, result: AnalysisResult) -> dict[str, Any]:
-        """Its entries in JSON."""
+        """Return the entries of the step in JSON."""
         return {self.key: plain(result[self.key])} if self.json is None else self.json(result)
 
 
@@ -69,7 +69,7 @@ class AnalysisContext:
         self.result, self.seed = result, result.seed
         self.map, self.dim, self.root = file.map, file.dim, laboratory.root
         self.system = file.system if file.is_quadratic else None
-        # No step may read the claims of a file about its system. With symbols the file itself is needed.
+        # No step may read the claims of a file about its system. If there are symbols, the file itself is needed.
         self.file_without_claims = (
             file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
         )
@@ -78,26 +78,26 @@ class AnalysisContext:
 
     @property
     def field(self) -> QuadraticSystem:
-        """The vector field; it exists for every step that applies to `MapKinds.VECTOR_FIELDS` only."""
+        """The vector field; it exists for steps that apply only to `MapKinds.VECTOR_FIELDS`."""
         assert self.system is not None
         return self.system
 
     @property
     def integrals(self) -> tuple[FoundIntegral, ...]:
-        """The integrals that were found in closed form."""
+        """The integrals with a formula."""
         return () if self.result.integrals is None else self.result.integrals.integrals
 
     def applies(self, step: AnalysisStep) -> bool:
-        """Whether the step applies to a map of this kind over this field of numbers."""
+        """Return whether the step applies to this kind of map over this number field."""
         if self.root is not None:
             return MapKinds.OVER_NUMBER_FIELDS in step.applies_to
         kind = MapKinds.OTHER_MAPS if self.system is None else MapKinds.VECTOR_FIELDS
         return kind in step.applies_to
 
     def weight(self, step: AnalysisStep) -> float:
-        """The weight of the step in this dimension."""
+        """Return the weight of the step in the dimension of the map."""
         return step.weight / 4 if self.dim > step.slow_above else step.weight
 
     def run(self, step: AnalysisStep, budget: Budget) -> Any:
-        """The result of the step, within a budget."""
+        """Return the result of the step, within a budget."""
         return step.run(self, effort=budget, progress=lambda text: self.progress(f"{step.name}: {text}"))

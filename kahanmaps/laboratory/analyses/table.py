@@ -1,4 +1,4 @@
-"""The steps of an analysis, in the order in which they run: each may use the results of those before it."""
+"""The steps of an analysis in the order in which they run; a step may use results of earlier ones."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
-_POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities, and in more dimensions they take long
+_POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities; in higher dimensions the search is slow
 
 
 def _family(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
-    """The normal form of a member of the commuting family, in coordinates with the centre as origin."""
+    """Return the normal form of a member of the commuting family, in coordinates with the centre as origin."""
     structures = context.result.hamiltonian
     if structures is None or structures.hamiltonian is None:
         return system_normal_form(context.field)
@@ -52,7 +52,7 @@ def _family(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalFo
 
 
 def _family_json(result: AnalysisResult) -> dict[str, Any]:
-    """The structure of a member of the commuting family, with x = centre + T y and J = T [[0, I], [-I, 0]] T^T."""
+    """Return the structure of a member of the commuting family: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
     member = None
     if isinstance(result.normal_form, SystemNormalForm):
         form = result.normal_form.form
@@ -62,12 +62,12 @@ def _family_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _algebra(context: AnalysisContext, **_: Any) -> TensorStructure | None:
-    """An algebra larger than Q over which f is defined; None for members of the family, whose normal form says more."""
+    """Return an algebra larger than Q over which f is defined; None if f has a normal form, which says more."""
     return None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
 
 
 def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
-    """The singularities at the given eps or at two values of eps; none where formulas would be too large."""
+    """Return the singularities at the given eps or at two values of eps; none if formulas would be too large."""
     values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
     if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
@@ -79,16 +79,16 @@ def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[
 
 
 def _degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
-    """The degrees of the iterates, derived from the singularity patterns where these are known."""
+    """Return the degrees of the iterates, derived from the singularity patterns if these are known."""
     runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
-    # Used only if they are known for all steps, and agree with those that `degrees` would compute itself.
+    # Used only if known for all steps, and thus equal to the patterns that `degree_growth` would compute.
     patterns_of_runs = patterns_of(runs) if runs else None
     patterns = None if patterns_of_runs is None or patterns_of_runs.running else patterns_of_runs
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
 
 
 def _curves(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil | None:
-    """The pencil of invariant curves of a planar map with one integral."""
+    """Return the pencil of invariant curves of a planar map with one integral."""
     proved = [integral for integral in context.integrals if integral.verdict is Certainty.PROVED]
     if context.dim != 2 or len(proved) != 1 or context.has_symbols:
         return None
@@ -96,7 +96,7 @@ def _curves(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil | None
 
 
 def _curves_json(result: AnalysisResult) -> dict[str, Any]:
-    """The curves, and how the map acts on them; null where the degrees contradict this."""
+    """Return the curves and the action of the map on them; null if the degrees contradict the curves."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     if result.pencil is None or result.pencil.contradiction(growth):
         return {"invariant_curves": None}
@@ -104,7 +104,7 @@ def _curves_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
-    """Hirota-Kimura relations with few terms, in the lowest degrees that have any."""
+    """Return the Hirota-Kimura relations with few terms, in the lowest degrees in which there are any."""
     profile = None if context.result.integrals is None else context.result.integrals.profile
     if profile is None or profile.first_degree is None or profile.period is not None:
         return ()
@@ -118,7 +118,7 @@ def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]
 
 
 def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> PoissonSearch | None:
-    """Invariant tensors of low degree, with their Casimirs and the integrals in involution."""
+    """Return the invariant tensors of low degree, with their Casimirs and the integrals in involution."""
     if context.dim not in _POISSON_DIMENSIONS:
         return None
     search = find_poisson(context.file_without_claims, integrals=(), **context.settings, effort=effort, **options)
@@ -126,14 +126,14 @@ def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> Poisso
 
 
 def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
-    """A density in closed form, or a product of powers of factors of the integrals."""
+    """Search for densities: polynomials, or products of powers of factors of the integrals."""
     return with_factors(
         find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
     )
 
 
 def _flow(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
-    """The limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
+    """Return the limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
     if context.result.integrals is None:
         return None
     flow = flow_and_map(context.result.integrals, known=context.result.integral_count, **options)
@@ -185,7 +185,7 @@ ANALYSES = (
         lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
         key="equivalent",
     ),
-    # Degrees use the singularities. Above dimension 4 these are slow: they run last, and degrees do not wait for them.
+    # Degrees use the singularities. Above dimension 4 these are slow and run last, without degrees using them.
     AnalysisStep(
         "singularities",
         _singularities,
@@ -256,7 +256,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "commuting systems",
-        # All g of a kind, for every eps.
+        # All commuting g of one shape, for every eps.
         lambda context, **options: (
             find_commuting(context.system or context.map, seed=context.seed, **options)
             if context.result.eps is None

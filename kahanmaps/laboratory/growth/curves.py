@@ -1,17 +1,17 @@
 """The images t -> Phi^n(a + b t) of a random line under a birational map over GF(p), exactly.
 
-The curve is stored as dim + 1 polynomials without a common factor. A map is a composition of one or several factors.
-The image of the curve under a factor is the kernel of an n x (n + 1) matrix of forms in its polynomials, the equation
-of the factor (maps/equation.py). The kernel is computed in one of two ways:
+The curve is stored as n + 1 polynomials without a common factor, n = dim. A map is a composition of one or more
+factors. The equation of a factor (maps/equation.py) is an n x (n + 1) matrix of forms; its kernel, at the polynomials
+of the curve, is the image of the curve. The kernel is computed in one of two ways:
 
     minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
     series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as
-            many terms as the next curve needs. The shortest recurrence (massey-1969) of the series of a random quotient
-            of two affine functions gives the common denominator of the coordinates. All further terms of all
-            coordinates must agree with it.
+            many terms as the image needs. A random quotient of two affine functions on the image is a power series
+            whose shortest recurrence (massey-1969) gives the common denominator of the coordinates. All further
+            terms of all coordinates must satisfy this recurrence.
 
-For an explicit map its forms take the place of the minors, in any dimension. In the plane minors are five to ten times
-as fast as series; in dimension 6 both take the same time.
+An explicit map is evaluated by its forms, without a kernel, in any dimension. In the plane minors are five to ten times
+as fast as series; in dimension 6 the two ways take the same time.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map, MapFamily
 
 _MAX_MINORS_DIMENSION = 5  # the largest dimension in which minors are used
-_MARGIN = 8  # extra terms of a series beyond those that determine the curve; a wrong one agrees once in 2^60
+_MARGIN = 8  # terms of a series beyond those that determine the curve; a term of a wrong curve agrees once in 2^60
 
 
 class Ended(StrEnum):
     """The reason why a computation of degrees ended."""
 
-    RECURRENCE = "recurrence"  # a recurrence was found and confirmed by further terms
+    RECURRENCE = "recurrence"  # a recurrence of the first terms is confirmed by further terms
     DERIVED = "derived"  # the recurrence follows from the singularity patterns, and enough measured terms agree
-    PROVED = "proved"  # the degrees are those of powers of a matrix
+    PROVED = "proved"  # the map is monomial, and powers of its exponent matrix give the degrees
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, but not all singularity patterns have settled
     TERMS = "terms"  # the requested number of terms was computed
     BUDGET = "budget"  # the budget was spent
@@ -52,14 +52,14 @@ class Ended(StrEnum):
 
 
 class Stopped(Exception):
-    """No further curve or degree is computed; `ended` is the kind of reason, `message` a sentence."""
+    """Raised when no further curve or degree is computed; `ended` is the kind of reason, `message` a sentence."""
 
     def __init__(self, ended: Ended, message: str) -> None:
         self.ended, self.message = ended, message
 
 
 def reduced(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
-    """Return the map modulo a random prime of 61 bits, at a random eps if none is given. Raises BadPrime."""
+    """Return the map modulo a random prime of 61 bits, at a random residue if `eps` is None. Raises BadPrime."""
     field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
 
@@ -96,7 +96,7 @@ class Line:
     def step(self, guess: int) -> None:
         """Replace the curve by its image; `guess` is the expected degree of the image.
 
-        Raises ZeroDivisionError if the map is undefined at the points of the curve, Stopped at a limit.
+        Raises ZeroDivisionError if the map is undefined at all points of the curve, and Stopped at a limit.
         """
         for equation in self._equations:
             too_large = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
@@ -105,7 +105,7 @@ class Line:
                 curve = self._image_by_minors(equation)
             max_length = 2 * self._max_degree + _MARGIN + 1
             length = min(2 * guess + _MARGIN + 1, max_length)
-            # A guess that is too small only costs another round: the terms of the margin disagree then.
+            # With a guess that is too small the terms of the margin disagree, and the length is doubled.
             while curve is None:
                 self._require_budget()
                 curve = self._reconstruct_curve(self._image_series(equation, length), length)
@@ -134,7 +134,7 @@ class Line:
         for entry in (*numerators, denominator):
             count_work(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
             quotient = entry // common
-            # Once in about p the random combination has a factor that not all numerators have.
+            # With probability about 1/p the random combination has a factor that is not common to all numerators.
             if quotient(t) * common(t) != entry(t):
                 common = reduce(nmod_poly.gcd, numerators, denominator)
                 return [entry // common for entry in (*numerators, denominator)]
@@ -166,7 +166,7 @@ class Line:
         return [entry.mul_low(inverse, length) for entry in x]
 
     def _reconstruct_curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
-        """Return polynomials with these quotients as series, or None if there are not enough terms to be certain."""
+        """Return the polynomials (X : Z) with X/Z = x, or None if x has too few terms to be certain."""
         for _ in range(2):
             numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)
@@ -186,7 +186,7 @@ class Line:
             denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
             Z = denominator.mul_low(inverse, length)
             curve = [*(Z.mul_low(entry, length) for entry in x), Z]
-            # The denominator is that of all coordinates unless the random functions are in special position.
+            # Unless the random functions are in special position, this is the denominator of all coordinates.
             if all(entry.degree() <= degree for entry in curve):
                 return curve
         return None

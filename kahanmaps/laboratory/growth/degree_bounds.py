@@ -6,15 +6,15 @@ line, e . f^n e = deg f^n = D_n. The translation length is log lambda, where lam
 
     2 cosh(n log lambda) + 2 >= (D_2n - 1) / (D_n - 1),    and    lambda <= D_n^(1/n).
 
-For u = f^n e - e this says that (f^n u) . u is at most cosh(n log lambda) times u . u in absolute value. If
-lambda = 1, it says D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map modulo a prime p with eps a
-residue: deg f_p^n <= deg f^n for every n, so that lambda(f_p) <= lambda(f). For f_p
+The first inequality says, for u = f^n e - e, that |(f^n u) . u| <= cosh(n log lambda) |u . u|. For lambda = 1 it is
+D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map modulo a prime p at a residue eps. Since
+deg f_p^n <= deg f^n for every n, it follows that lambda(f_p) <= lambda(f). For f_p
 
 * the degree along one line, computed exactly, is a lower bound of deg f_p^2n;
-* the degrees along K tangents of a conic give an upper bound of D = deg f_p^n. On a line the degree is less than D by
-  the multiplicities m_i of the base points on it, including infinitely near ones. No point lies on more than two of
-  the tangents, and 3 (D - 1) is the sum of all m_i (Noether). So if no degree along them exceeds u, then
-  K (D - u) <= 6 (D - 1).
+* the degrees along K tangents of a conic give an upper bound of D = deg f_p^n. The degree along a line is D minus the
+  sum of the multiplicities m_i of the base points on the line, including infinitely near ones. No point lies on more
+  than two of the tangents, and the sum of all m_i is 3 (D - 1) (Noether). So if all degrees along the tangents are at
+  most u, then K (D - u) <= 6 (D - 1).
 
 Only p, eps and the conic are chosen at random. docs/mathematics.md has the proofs.
 """
@@ -50,18 +50,18 @@ _MAX_DEGREE = 8000  # along the first line
 _MAX_STEPS = 120
 _DIGITS = 6
 _TRIES = 4
-_MAX_FORMULAS = 12  # iterates whose formulas are computed
+_MAX_FORMULAS = 12  # the largest number of iterates whose formulas are computed
 _MAX_TERMS = 300  # in a coordinate of the last iterate but one
-_MAX_NEXT_TERMS = 4000  # in a coordinate of the last iterate, which has about degree^2 times as many
+_MAX_NEXT_TERMS = 4000  # in a coordinate of the last iterate
 
 
 @dataclass(frozen=True)
 class DynamicalDegreeBounds(ResultPart):
     """Proved bounds of the dynamical degree of a planar map, for the given eps or for all but finitely many eps.
 
-    `lower` and `upper` are decimal numbers, rounded down and up; the dynamical degree is more than `lower`. `lower` is
-    computed for the map modulo `prime` at the residue `eps`, and follows from deg f^(2 steps) >= `degree_below` and
-    deg f^steps <= `degree_above`.
+    `lower` and `upper` are decimal numbers, rounded down and up; the dynamical degree is more than `lower`. This bound
+    is computed for the map f modulo `prime` at the residue `eps`, and follows from deg f^(2 steps) >= `degree_below`
+    and deg f^steps <= `degree_above`.
     """
 
     lower: str
@@ -74,7 +74,7 @@ class DynamicalDegreeBounds(ResultPart):
 
     @property
     def text(self) -> str:
-        """The two bounds, and the degrees from which the lower one follows."""
+        """The two bounds, and the degrees from which the lower bound follows."""
         return (
             f"dynamical degree between {self.lower} and {self.upper}: degree of iterate {2 * self.steps} at least "
             f"{self.degree_below}, of iterate {self.steps} at most {self.degree_above}"
@@ -96,9 +96,9 @@ def bound_dynamical_degree(
 ) -> DynamicalDegreeBounds | None:
     """Search for proved bounds of the dynamical degree of a planar map, with a lower bound above 1 (positive entropy).
 
-    `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), and for all but finitely many eps.
-    Each increase of `effort` by 1 doubles the work limit. Returns None for algebraic coefficients, and if no lower
-    bound above 1 was found within the work limit; this proves nothing. An integrable map has no such bound.
+    `eps` (half the time step) is exact; with None the bounds hold over Q(eps), and for all but finitely many eps. Each
+    increase of `effort` by 1 doubles the work limit. Returns None for algebraic coefficients, and if no lower bound
+    above 1 was found within the work limit, which proves nothing. An integrable map has no such bound.
 
     Source: docs/mathematics.md.
 
@@ -132,8 +132,8 @@ def bound_dynamical_degree(
 def is_birational(map_: Map, rng: random.Random) -> bool:
     """Return whether a map over GF(p) is birational; True is a proof.
 
-    Also returns False if the inverse is not known. For every factor it is tested that a point solves the equation of
-    the inverse at its image (as an identity of forms), and that it is the only solution (at one random point).
+    Also returns False if the inverse is not known. For every factor x -> x~ two conditions are tested: x solves the
+    equation of the inverse at x~ (as an identity of forms), and is the only solution (at one random point).
     """
     for factor in map_.factors:
         try:
@@ -179,7 +179,7 @@ def lower_bound(lower: int, upper: int, steps: int) -> arb | None:
 def _search_lower_bound(
     map_: Map, rng: random.Random, budget: Budget, progress: Callable[[str], None]
 ) -> DynamicalDegreeBounds | None:
-    """Return the best lower bound above 1, rounded down, with an empty upper bound."""
+    """Return the best lower bound above 1, rounded down, with an empty `upper`; None if there is none."""
     line = Line(map_, rng, budget.part(0.5), _MAX_DEGREE)
     degrees = [1]
     try:
@@ -194,7 +194,7 @@ def _search_lower_bound(
     bounds = {n: float(bound) for n, bound in expected.items() if bound is not None}
     if not bounds:
         return None
-    # The tangents are expensive, so that they are computed only for the number of steps that promises the best bound.
+    # Degrees along tangents are expensive: they are computed only for the number of steps that promises the best bound.
     steps = max(bounds, key=bounds.__getitem__)
     # Tangents of a random conic: the lines with coordinates (1 : s : s^2), moved by a random matrix.
     p, largest = map_.field.characteristic, 0
@@ -221,14 +221,14 @@ def _search_lower_bound(
 
 
 def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> Iterator[int]:
-    """Yield the degrees of f, f^2, ... from formulas over Q or Q[eps], until these become too long."""
+    """Yield the degrees of f, f^2, ... from formulas over Q or Q[eps], until the formulas become too long."""
     try:
         forms = forms_over_eps(map_.rows, eps)
     except TooLarge:  # a composition: the product of the degrees of its factors
         equations = map_.at(fmpq(1) if eps is None else eps).equations
         yield prod(2 * equation.degree for equation in equations)
         return
-    # Minors of composed rows would give the same forms times a power of a common factor, of a far higher degree.
+    # The forms are composed. Minors of composed rows would have a common factor, and far higher degrees.
     ring = forms[0].context()
     *X, symbol = ring.gens()
     degree = max(degree_in(entry, 3) for entry in forms)
@@ -245,10 +245,10 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
 
 
 def round_up(number: arb, offset: int = 0) -> str:
-    """Round an exact number up to six decimals, and add `offset` units of the last one.
+    """Round an exact number up to six decimals, and add `offset` units of the last decimal.
 
-    With the offset -1 the result is strictly less than the number; then the dynamical degree is strictly larger than
-    the result for all but finitely many eps.
+    With the offset -1 the result is strictly less than the number, so that the dynamical degree is strictly larger
+    than the result for all but finitely many eps.
     """
     units = int((number.fmpq() * 10**_DIGITS).ceil()) + offset
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"

@@ -2,13 +2,13 @@
 
 It is measured as the degree of the rational curve t -> Phi^n(a + b t) for a random line over GF(p) (`curves`), with p
 and (where eps is not given) the residue of eps random. A line in special position, or a bad prime, can only make a
-degree too small. So two lines, each with a prime and an eps of its own, are compared, and the larger degree counts.
+degree too small. So d_n is the larger one of the degrees along two lines, each with its own prime and eps.
 
 A recurrence that fits the first degrees may fail later: an exceptional hypersurface (contracted by the map) lowers no
 degree before its image lies in the indeterminacy locus, perhaps a hundred steps later. So the singularity patterns of
-these hypersurfaces are computed (`singularities`). Where all of them are known, the degrees of all iterates are derived
-from them (`renewal`), and the measured degrees have to agree. Elsewhere a recurrence of the measured degrees is
-accepted only with enough terms beyond the last event of these patterns.
+these hypersurfaces are computed (`singularities`). If all patterns are known, the degrees of all iterates are derived
+from them (`renewal`), and the measured degrees have to agree. If not, a recurrence of the measured degrees is accepted
+only with enough terms beyond the last step at which a pattern lowers the degree.
 
 The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for all known integrable maps, and its
 logarithm is the algebraic entropy (bellon-viallet-1999).
@@ -58,10 +58,10 @@ MAX_TERMS = 10_000
 _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
 _ENOUGH_QUOTIENTS = 6
-_AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
+_AGREEING = 12  # measured terms, beyond twice the longest pattern, that must agree with the derived degrees
 _LARGE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
-_REPLACEMENTS = 6  # of lines in special position, of which one in 2^40 is expected
+_REPLACEMENTS = 6  # of lines in special position; about one line in 2^40 is in such a position
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class DegreeGrowth(PrintableResult):
 
     `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns, None if
     they were not computed. Degrees and patterns are measured, which is evidence and no proof. `enclosure` has proved
-    bounds of the dynamical degree of a planar map, if a lower bound above 1 was found, else None. `proof` is a proof of
-    the growth, or None. The degrees of monomial maps are exact, and need no primes.
+    bounds of the dynamical degree of a planar map, or is None without a lower bound above 1. `proof` is a proof of the
+    growth, or None. The degrees of monomial maps are exact, and need no primes.
     """
 
     _parts = "degrees"
@@ -102,7 +102,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def disagreement(self) -> int | None:
-        """The first n for which the measured d_n contradicts the singularity patterns; None if none does."""
+        """The first n for which the measured d_n contradicts the singularity patterns; None if there is no such n."""
         if self.patterns is None or not self.patterns.series:
             return None
         expected = coefficients(self.patterns.fraction, len(self.degrees))
@@ -110,7 +110,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def unconfirmed(self) -> str:
-        """Why the fitted recurrence may fail later; empty if there is none, or if it is confirmed."""
+        """Why the fitted recurrence may fail later; empty if there is no such recurrence, or if it is confirmed."""
         if self.disagreement is not None:
             return (
                 f"the measured degree of iterate {self.disagreement} contradicts the singularity patterns; "
@@ -133,9 +133,9 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def recurrence(self) -> Recurrence | None:
-        """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed.
+        """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed, or None.
 
-        A fitted recurrence is confirmed by terms beyond the last confinement. None if there is neither.
+        A fitted recurrence is confirmed by terms beyond the last confinement.
         """
         if self.proof is None or self.derived is not None:
             return self.derived or (None if self.unconfirmed else self.fitted)
@@ -150,7 +150,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth(self) -> Growth:
-        """The kind of growth, by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
+        """The kind of growth by a proof, the recurrence, or bounds of the dynamical degree; UNKNOWN without these."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
@@ -161,7 +161,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """The limit of d_n^(1/n) as an algebraic number, known by a proof or by the recurrence; else None."""
+        """The limit of d_n^(1/n) as an algebraic number, from a proof or the recurrence; None without these."""
         if self.proof is not None:
             return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
@@ -179,7 +179,7 @@ class DegreeGrowth(PrintableResult):
         """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
 
         For polynomial growth a quotient 1 + r decreases by about r/n in the next step; the answer is True if the last
-        two decreases are less than a quarter of that. It is an estimate, for sequences too short for a recurrence.
+        two decreases are less than r/(4 n). It is an estimate, for sequences too short for a recurrence.
         """
         d = self.degrees
         n = len(d) - 1
@@ -190,7 +190,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def kind_text(self) -> str:
-        """The kind of growth with its power or rate, or an estimate without a confirmed recurrence: one phrase."""
+        """The kind of growth with its power or rate, or an estimate if no recurrence is confirmed, in one phrase."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
         if (source := self.proof or self.recurrence) is not None:
@@ -215,7 +215,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def basis(self) -> str:
-        """The evidence for the growth in words: the proof, or the number of steps searched for confinement."""
+        """The evidence for the growth as a phrase: the proof, or the number of steps searched for confinement."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
@@ -233,7 +233,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth_text(self) -> str:
-        """The kind of growth with its power or rate, and the number of steps searched for confinement: one phrase."""
+        """The kind of growth with its power or rate and the number of steps searched for confinement, in one phrase."""
         is_limited = self.recurrence is not None and self.patterns is not None and self.patterns.limit
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
@@ -262,7 +262,7 @@ class DegreeGrowth(PrintableResult):
         return "\n".join(f"{label}\t{value}" for label, value in lines)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
+        """Plain data; primes are text, since many JSON readers do not represent such large integers exactly."""
         lines = zip(self.primes, self.residues, strict=True)
         names = ("growth", "growth_text", "basis", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
         return {
@@ -292,25 +292,25 @@ def degree_growth(
 ) -> DegreeGrowth:
     """Measure the degrees of the iterates of a map, for one exact eps or for generic eps.
 
-    The search stops when a recurrence is confirmed by at least 6 terms and by as many as its order, and either it is
-    derived from the singularity patterns or there are enough terms beyond the last confinement.
+    The search stops when a recurrence is confirmed, if also the singularity patterns give this recurrence or enough
+    terms lie beyond the last confinement. At least 6 terms, and as many as its order, must confirm a recurrence.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step, an exact number; None for generic eps.
         time_step, h: the time step 2 eps, instead of eps.
-        effort: each increase by 1 doubles the work limit. A Budget means that this is a stage of another computation.
+        effort: each increase by 1 doubles the work limit. With a Budget this is a stage of another computation.
         max_terms: if given, the degrees d_1, ..., d_max_terms are measured instead.
-        max_degree: the search stops before a degree above this one.
+        max_degree: the search stops before an iterate of a higher degree.
         seed: the random seed.
         steps: the number of steps for which singularities are followed.
         patterns: the singularity patterns, if known; by default they are computed.
-        enclosed: whether exponential growth in the plane is to be proved.
+        enclosed: whether to search, in the plane, for a proof of exponential growth.
         progress: called with a message at each stage.
 
     Returns:
         A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
-        are proved. A TimeLimit ends the search with the degrees so far; it is passed on if `effort` is a Budget.
+        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised again.
 
     Raises:
         InputError: for eps = 0, and for other values out of range.
@@ -348,7 +348,7 @@ def dynamical_degree(
 ) -> GrowthRate | DynamicalDegreeBounds | None:
     """Return the dynamical degree lim d_n^(1/n) of a map, with the arguments of `degree_growth`.
 
-    Returns an algebraic number, proved bounds, or None if undecided; `degree_growth(system).known` is its certainty.
+    Returns an algebraic number, proved bounds, or None if undecided; `degree_growth(system).known` is the certainty.
 
     >>> dynamical_degree("euler_top")
     <GrowthRate: 1>
@@ -360,7 +360,7 @@ def dynamical_degree(
 def algebraic_entropy(
     system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None, effort: int = 1, seed: int = 0
 ) -> float | None:
-    """Return the logarithm of the dynamical degree of a map, rounded; None where at most bounds are known.
+    """Return the logarithm of the dynamical degree of a map, rounded; None if the degree is not known exactly.
 
     >>> algebraic_entropy("euler_top")
     0.0
@@ -384,14 +384,14 @@ class _Search:
     notes: list[str] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     replaced: int = 0
-    measured: DegreeGrowth | None = None  # all but the bounds of the dynamical degree
+    measured: DegreeGrowth | None = None  # the result without the bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
-        """Measure degree after degree until there is a reason to stop."""
+        """Measure the degrees of successive iterates until there is a reason to stop."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
-            # The degrees of a monomial map are exact, those of powers of the matrix.
+            # The degrees of a monomial map are exact: powers of its exponent matrix give them.
             power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
             while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
                 recurrence = find_recurrence(self.degrees) if max_terms is None else None
@@ -431,7 +431,7 @@ class _Search:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as stop:
             ended, message = stop.ended, stop.message
-        if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
+        if ended is Ended.DEGREE:  # there may be too few degrees for a recurrence
             self._compute_patterns()
         result = self.result(ended, message)
         patterns = self.patterns
@@ -456,12 +456,12 @@ class _Search:
         return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
-        """Compute the singularity patterns early, and stop when a recurrence is confirmed."""
+        """Compute the singularity patterns once they are useful, and raise Stopped when a recurrence is confirmed."""
         term_count = len(self.degrees)
         if term_count < 2 or (term_count > _OFTEN and term_count % _SELDOM):
             return
         recurrence = find_recurrence(self.degrees)
-        # Above dimension 4 series of maps without short forms are slow and wait until the degrees suggest a recurrence.
+        # Above dimension 4 patterns of maps without short forms are slow: wait until the degrees suggest a recurrence.
         is_due = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
         if is_due:
             self._compute_patterns()
@@ -495,18 +495,18 @@ class _Search:
             self.patterns = patterns_of_map(self.map, self.eps, **options)
 
     def _step(self, new_line: Callable[[], Line]) -> None:
-        """Move all lines one step on, and replace those in special position."""
+        """Replace all curves by their images, and lines in special position by new lines."""
         n, earlier = len(self.degrees), self.degrees
 
         def degree_on(curve: Line) -> int:
-            """The degree of iterate n on a line; -1 where this line does not give it."""
+            """The degree of iterate n on a line; -1 if this line does not give the degree."""
             try:
                 while curve.steps < n:
                     k = curve.steps + 1
                     guess = earlier[k] if k < n else self.map.dim if k == 1 else earlier[1] * earlier[-1]
                     if k == n > 1 and earlier[-2]:
-                        # Degrees are almost log-concave: the last ratio bounds the next one. A guess that is too
-                        # low costs a second attempt.
+                        # Degrees are almost log-concave: the last ratio is nearly a bound of the next one. A guess that
+                        # is too low requires a second attempt.
                         guess = min(guess, earlier[-1] * earlier[-1] // earlier[-2] + 4)
                     curve.step(guess)
                     if k < n and curve.degree != earlier[k]:

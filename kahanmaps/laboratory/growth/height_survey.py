@@ -1,4 +1,4 @@
-"""The growth of heights along exact orbits from several initial points and for several eps, compared.
+"""A comparison of the growth of heights along exact orbits, from several initial points and for several eps.
 
 A single orbit is weak evidence: it may lie on a special curve, and its eps may be special (for q'' = -w^2 q + Q(q)
 with eps^2 w^2 = 1 the fourth iterate of the Kahan map is the identity). `kahanmaps.invariants.heights` decides the
@@ -44,7 +44,7 @@ _GROWTH_TEXTS = {
     Growth.QUADRATIC: "bit lengths grow quadratically",
     Growth.EXPONENTIAL: "bit lengths grow exponentially",
 }
-_MAX_DRAWS = 20  # random initial points tried until the orbit of one does not meet a singular point
+_MAX_DRAWS = 20  # the largest number of random initial points tried for one orbit without a singular point
 
 
 @dataclass(frozen=True)
@@ -83,18 +83,18 @@ class HeightSurvey(PrintableResult):
 
     @property
     def kind(self) -> Growth:
-        """The kind of all decided orbits, if each eps has a decided orbit and they agree; otherwise undecided."""
+        """The kind of growth on all decided orbits; UNDECIDED if they differ, or if an eps has no decided orbit."""
         all_eps = {orbit.eps for orbit in self.orbits}
         decided = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
         return self.kinds[0] if len(self.kinds) == 1 and decided == all_eps else Growth.UNDECIDED
 
     @property
     def text(self) -> str:
-        """A sentence: the kind of growth and the number of orbits of this kind, or the kinds if they differ."""
+        """A sentence with the kind of growth and the number of orbits of this kind, or with the different kinds."""
         total, cut = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
-            # If all initial points of one eps agree, the kinds differ between the eps.
+            # If the kinds agree for each single eps, they differ only between the eps.
             decided_kinds = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
             which = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
             return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)}){cut}"
@@ -139,20 +139,20 @@ def height_survey(
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
         time_step, h: the time step 2 eps, instead of eps.
-        starts: the initial points, or the number of random ones, whose orbits do not meet a singular point.
+        starts: the initial points, or the number of random points whose orbits do not meet a singular point.
         steps: the length of the orbits.
         max_digits: orbits end at a number with more digits; None for no limit.
-        effort: each increase by 1 doubles the work limit, at which the current orbit ends and no other is started.
+        effort: each increase by 1 doubles the work limit, at which the current orbit ends and no further orbit starts.
         normal_form: the normal form of the system, if it is known.
         seed: the random seed.
         progress: called with a message before each orbit.
 
     Returns:
-        The survey. If a TimeLimit expires, it has the orbits completed before. If `effort` is a Budget, the survey is a
-        stage of another computation, and the TimeLimit is raised.
+        The survey. If a TimeLimit expires, the survey has the orbits that were complete. If `effort` is a Budget, the
+        survey is a stage of another computation, and the TimeLimit is raised.
 
     Raises:
-        InputError: for eps = 0, no or too many initial points, and points of another dimension.
+        InputError: for eps = 0, for no or too many initial points, and for points of a wrong dimension.
 
     >>> from kahanmaps.documents.catalog import load
     >>> survey = height_survey(load("weierstrass").system, starts=2, steps=40)
@@ -168,7 +168,7 @@ def height_survey(
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
-    given_eps = DEFAULT_EPS if eps is None else (rational(eps),)  # text that is no number is refused for every map
+    given_eps = DEFAULT_EPS if eps is None else (rational(eps),)  # refuses text that is no number, for every map
     for value in given_eps if map_.has_eps else (fmpq(1),):
         map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")

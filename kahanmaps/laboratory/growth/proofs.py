@@ -1,8 +1,8 @@
-"""Growth of degrees that is proved: of monomial maps, and of maps some iterate of which is linear.
+"""Proofs of the growth of degrees, for monomial maps and for maps with a linear iterate.
 
-A monomial map x~_i = c_i x^(a_i) has the exponent matrix A of its rows a_i, and its n-th iterate has A^n: degrees are
-those of matrices, and the dynamical degree is the spectral radius of A (hasselblatt-propp-2007). If the N-th iterate
-has degree 1 on projective space, which is decided by composing formulas, then d_(n + N) = d_n for all n.
+A monomial map x~_i = c_i x^(a_i) has the exponent matrix A with the rows a_i, and its n-th iterate has the exponent
+matrix A^n. The dynamical degree is the spectral radius of A (hasselblatt-propp-2007). If the N-th iterate has degree 1
+on projective space, then d_(n + N) = d_n for all n; the iterates are computed by composing formulas.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from kahanmaps.maps.implicit import MapFamily
 _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
 _MAX_ORDER = 12  # of a linear iterate
-_MAX_DIMENSION = 8  # for the algebraic number: polynomials of degree up to 2 dim^2 are factored
+_MAX_DIMENSION = 8  # for the spectral radius, which needs factors of polynomials of degree up to 2 dim^2
 _BITS = 256
-_LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
+_LARGEST_ORDER = 60  # of an integer matrix of finite order with at most _MAX_DIMENSION rows
 
 
 @dataclass(frozen=True)
 class GrowthProof:
     """A proved statement about the degrees of all iterates.
 
-    `power` is k for growth as n^k, times an exponential if the `rate`, the dynamical degree, is more than 1; `reason`
-    is the proof in a phrase. With `period` N the N-th iterate is linear; `is_identity` says whether it is the identity.
+    The degrees grow as n^power rate^n, where the `rate` is the dynamical degree; `reason` is the proof as a phrase. If
+    there is a `period` N, the N-th iterate is linear; `is_identity` says whether this iterate is the identity.
     """
 
     growth: Growth
@@ -53,9 +53,9 @@ class GrowthProof:
 
 
 def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
-    """The matrix A of a monomial map x~_i = c_i x^(a_i), at one eps or (None) over Q(eps); None for other maps.
+    """Return the matrix A of a monomial map x~_i = c_i x^(a_i), at one eps or (None) over Q(eps); None for other maps.
 
-    A composition of monomial maps is one: its matrix is the product of theirs.
+    A composition of monomial maps is monomial, and its matrix is the product of their matrices.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.maps.explicit import explicit_map
@@ -69,13 +69,13 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
     value = field.variables[0] if isinstance(field, FunctionField) else fmpq(1) if eps is None else eps
     try:
         equations = map_.at(value, field).equations
-    except (BudgetExceeded, InputError):  # of an inverse that is not known
+    except (BudgetExceeded, InputError):  # InputError: an inverse is not known
         return None
     if len(equations) > _MAX_FACTORS:
         return None
     n = map_.dim
     product = fmpz_mat([[int(i == j) for j in range(n)] for i in range(n)])
-    for equation in equations:  # each row is to be m x~_j = r with monomials m and r
+    for equation in equations:  # each row must have the form m x~_j = r with monomials m and r
         rows = {}
         for *entries, right in equation.terms:
             columns = [j for j, entry in enumerate(entries) if entry]
@@ -87,17 +87,17 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
         if len(rows) < n:
             return None
         product = fmpz_mat([rows[j] for j in range(n)]) * product
-    return None if product.det() == 0 else product  # singular at a special eps only
+    return None if product.det() == 0 else product  # it is singular only at special eps
 
 
 def monomial_degree(matrix: fmpz_mat) -> int:
-    """The degree of a monomial map on projective space.
+    """Return the degree on projective space of the monomial map with this exponent matrix.
 
     >>> monomial_degree(fmpz_mat([[0, 1], [-1, 0]])), monomial_degree(fmpz_mat([[2, 1], [1, 1]]))
     (2, 3)
     """
     rows: list[list[int]] = [[int(entry) for entry in row] for row in matrix.tolist()]
-    # The factors of X_j and Z that make them polynomial: the last coordinate is then the product of these powers.
+    # The powers of X_j and Z that clear the denominators of all coordinates. Their product is the last coordinate.
     powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
     degree: int = sum(powers) + max(0, *(sum(row) for row in rows))
     return degree
@@ -106,7 +106,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
 
-    The quotient of the degree by the largest modulus of the entries of A^n lies between two positive constants.
+    The reason: deg(Phi^n) divided by the largest modulus of the entries of A^n lies between two positive constants.
     """
     if matrix.nrows() > _MAX_DIMENSION:
         return None
@@ -144,8 +144,8 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     '1.21060779440608593277, root of t^6 - t^4 - 1'
     """
     minimal = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
-    # The square of a modulus is the product of an eigenvalue and its conjugate, thus a root of the polynomial that has
-    # all products of two eigenvalues as roots; that of the radius is the largest real one.
+    # The polynomial with all products of two eigenvalues as roots has |e|^2 = e conj(e) as a root for every eigenvalue
+    # e. Its largest real root is the radius squared.
     rows = matrix.tolist()
     kronecker_square = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
     products = [factor for factor, _ in kronecker_square.charpoly().factor()[1]]
@@ -159,7 +159,7 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
             moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
             largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
-            # Moduli are among the real roots, so that a ball that meets that of one root only is that root.
+            # Moduli are among the real roots. So a modulus whose ball meets the ball of only one root is that root.
             if all(radius > other for other, _ in others) and not any(
                 modulus.overlaps(other) for modulus, _ in largest for other, _ in others
             ):
@@ -171,7 +171,7 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
     """Prove that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
 
     Exact, by composing formulas. Returns None if the iterate is not linear or the formulas have too many terms. If it
-    is linear, its powers up to 12 are computed, and the proof names the first one that is the identity.
+    is linear, its powers up to the 12th are computed, and the proof names the first power that is the identity.
     """
     if map_.symbols or map_.root is not None:
         return None
@@ -189,7 +189,7 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
         return None
     common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.denominator for entry in point))
     forms = [entry.numerator * (common / entry.denominator) for entry in point] + [common]
-    # Coordinates are in lowest terms: this is the degree on projective space.
+    # The forms have no common factor, so that their degree is the degree on projective space.
     if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None
     first_linear = period

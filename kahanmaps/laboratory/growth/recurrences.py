@@ -1,9 +1,9 @@
 """Shortest linear recurrences of integer sequences, their kind of growth, and the exact growth rate.
 
-A sequence of integers that satisfies a linear recurrence over Q satisfies one of the same length with integer
-coefficients and leading coefficient 1 (fatou-1906). So the shortest recurrence is computed modulo one large prime
-(massey-1969), lifted to integers, and then checked exactly on every term. Terms that were not needed to find it are
-evidence for it; they do not prove that it holds for all further terms.
+The shortest linear recurrence over Q of a sequence of integers has integer coefficients and leading coefficient 1
+(fatou-1906). So it is computed modulo one large prime (massey-1969), lifted to integers, and then checked exactly on
+every term. Terms that were not needed to determine the recurrence are evidence for it; they do not prove that it holds
+for all further terms.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from kahanmaps.invariants.growth import Growth
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
 _MODULO = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
 _BITS = 256  # working precision of the roots
-_MAX_CLASSES = 12  # residue classes in a closed form
+_MAX_CLASSES = 12  # residue classes of n with a polynomial each
 
 
 @dataclass(frozen=True)
 class GrowthRate(ResultPart):
-    """The largest modulus of the characteristic roots if it is itself a root: lim a_n^(1/n) for positive sequences.
+    """The largest modulus of the characteristic roots, if it is itself a root: lim a_n^(1/n) for positive sequences.
 
     `minimal_polynomial` is irreducible over Q, `enclosure` is the text of a ball that provably contains the number, and
-    `multiplicity` is that of the root; if it is more than 1, the growth has a polynomial factor.
+    `multiplicity` is the multiplicity of the root; above 1 the growth has a polynomial factor.
     """
 
     minimal_polynomial: fmpz_poly
@@ -78,9 +78,9 @@ class Recurrence(ResultPart):
     """The shortest linear recurrence of a_0, a_1, ..., which holds for all `terms` given terms.
 
     `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] stands for
-    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the first k terms (`preperiod`) are exempt
-    from the recurrence of the others. `checked` of the terms were not needed to find it. If the recurrence was derived
-    from other results, only the first `measured` values were measured, and the recurrence gives the others.
+    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the recurrence without this factor holds from
+    the term k (`preperiod`) on. `checked` terms were not needed to determine the recurrence. If it was derived from
+    other results, only the first `measured` values were measured, and the recurrence gives the others.
 
     >>> recurrence = find_recurrence([2 * n * n + 1 for n in range(12)])
     >>> recurrence.characteristic, recurrence.order, recurrence.checked, str(recurrence.growth)
@@ -110,13 +110,13 @@ class Recurrence(ResultPart):
 
     @cached_property
     def factors(self) -> tuple[tuple[fmpz_poly, int], ...]:
-        """The irreducible factors of the characteristic polynomial over Q with their multiplicities, x left out."""
+        """The irreducible factors over Q, other than x, of the characteristic polynomial, with their multiplicities."""
         factors = self.characteristic.factor()[1]
         return tuple((factor, int(k)) for factor, k in factors if factor[0] != 0)
 
     @cached_property
     def preperiod(self) -> int:
-        """The number of terms at the beginning that do not belong to the recurrence of the others."""
+        """The number k of initial terms for which the recurrence does not hold; x^k divides `characteristic`."""
         return next(k for k in count() if self.characteristic[k] != 0)
 
     @cached_property
@@ -126,7 +126,7 @@ class Recurrence(ResultPart):
 
     @property
     def power(self) -> int:
-        """k for growth as n^k (times an exponential, if the growth is exponential); 0 for the zero sequence."""
+        """The k in growth as n^k, or as n^k r^n if the growth is exponential; 0 for the zero sequence."""
         if not self.factors:
             return 0
         if self.is_polynomial or self.rate is None:
@@ -142,20 +142,20 @@ class Recurrence(ResultPart):
 
     @cached_property
     def rate(self) -> GrowthRate | None:
-        """The growth rate; None for the zero sequence, and where no positive root has the largest modulus."""
+        """The growth rate; None for the zero sequence, and if no positive root has the largest modulus."""
         if not self.factors:
             return None
         if self.is_polynomial:
             return GrowthRate(fmpz_poly([-1, 1]), "1", "1", max(k for _, k in self.factors))
-        # The positive root that no other root exceeds in modulus, certified by balls.
+        # The largest positive root; balls certify that no other root has a larger modulus.
         best: tuple[arb, fmpz_poly, int] | None = None
         with flint.ctx.workprec(_BITS):
             moduli = []
             for factor, multiplicity in self.factors:
-                roots: Any = factor.complex_roots()  # pairs; the stubs of python-flint are wrong here
+                roots: Any = factor.complex_roots()  # pairs (root, multiplicity); the stubs of python-flint are wrong
                 for root, _ in roots:
                     moduli.append(abs(root))
-                    # FLINT isolates real roots as such: their imaginary part is the exact 0.
+                    # FLINT recognizes real roots: their imaginary part is exactly 0.
                     if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
                         best = (root.real, factor, multiplicity)
             if best is None or any(modulus > best[0] for modulus in moduli):
@@ -167,7 +167,7 @@ class Recurrence(ResultPart):
     def closed_form(self) -> str | None:
         """The polynomials in n that give a_n, one for each class of n modulo the period; None for exponential growth.
 
-        They hold from n = `preperiod` on. None also if there are more than 12 classes.
+        They hold from n = `preperiod` on. None also if the period is more than 12.
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None
@@ -190,7 +190,7 @@ class Recurrence(ResultPart):
 
     @property
     def closed_form_text(self) -> str | None:
-        """The closed form, with the first n for which it holds unless that is 0."""
+        """The closed form; if it does not hold from n = 0 on, with the first n for which it holds."""
         after = f" for n >= {self.preperiod}"
         if not self.closed_form or not self.preperiod:
             return self.closed_form
@@ -252,8 +252,8 @@ class Recurrence(ResultPart):
 def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     """Return the shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
 
-    The first 2k terms determine a recurrence of order k. It is accepted if it holds for all terms, with at least 2 and
-    at least k/3 terms beyond these. The first terms may be exempt (`preperiod`); they count in the order. Raises
+    The first 2k terms determine a recurrence of order k. It is accepted if it holds for all terms, and if there are at
+    least 2 and at least k/3 further terms. It may begin after a preperiod, whose length is part of the order. Raises
     InputError if a value is not an integer.
 
     >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
@@ -271,7 +271,7 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     if len(values) < 2 * order + needed_checks(order):
         return None
     # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
-    # to 0 are candidates for them. The test below is exact, and rejects wrong ones.
+    # # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
     lifted = [int(c) for c in polynomial.coeffs()]
     lifted = [c - _PRIME if 2 * c > _PRIME else c for c in lifted]
     for n in range(len(values) - order):

@@ -1,15 +1,15 @@
 """The degrees of all iterates from the singularity patterns: the renewal equation.
 
-Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract, mu_i(t) the
-power of the curve parameter that is divided out at the t-th step along a generic curve through C_i, and nu_ij(t) the
-multiplicity of C_j there. A generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points, and
+Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract. At the t-th
+step along a generic curve through C_i let mu_i(t) be the power of the curve parameter that is divided out, and nu_ij(t)
+the order of the form of C_j. If a generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points,
 
     d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
     s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
 
-with d_0 = 1. For the factors that are divided out are powers of the forms of these preimages, and the zeros of C_i
-along the image of the line lie in such preimages, too. Summed up as power series in z this is a linear system over
-Q(z). docs/mathematics.md proves it. Multiplicities along hypersurfaces are measured, all else follows exactly.
+with d_0 = 1. The reason: the factors that are divided out are powers of the forms of these preimages, and the zeros of
+C_i along the image of the line lie in such preimages, too. For the generating functions in z this is a linear system
+over Q(z). docs/mathematics.md proves it. Multiplicities along hypersurfaces are measured, all else follows exactly.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def degree_series(
     """Return the generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms; exact.
 
     Args:
-        degrees: d_1; for a composition, whose maps are applied one after the other and periodically, the degree of each
-            map.
+        degrees: the degree d_1 of the map; for a composition, whose maps are applied periodically, the degree of each
+            of its maps.
         hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
             columns nu are in the same order. Multiplicities that are not known must not be `needed`.
         stages: for a composition, the index (from 0) of the map that contracts each hypersurface. The series then has
-            the degrees of iterates of the composition only, and the exponent of z counts single maps.
+            the degrees of the iterates of the whole composition only, while the exponent of z counts single maps.
 
     Source: docs/mathematics.md.
 
@@ -97,10 +97,10 @@ def degree_series(
 
 
 def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
-    """The hypersurfaces whose preimages have to be counted for the degrees; None if their multiplicities are unknown.
+    """Return the hypersurfaces on which the degrees depend; None if one of their multiplicities is unknown.
 
-    These are the hypersurfaces that lower the degree, those with images in one of these, and so on. An unknown
-    multiplicity, in a hypersurface of `eventually_in`, matters only if that hypersurface is needed.
+    These are the hypersurfaces that lower the degree, the hypersurfaces with images in one of these, and so on. An
+    unknown multiplicity, in a hypersurface of `eventually_in`, matters only if that hypersurface is needed.
 
     >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
     >>> lowering = OrbitData(((1, 0),), (), 9, True)
@@ -122,10 +122,10 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
 
 
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
-    """The generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
+    """Return the generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
 
-    Exact. The roots of the new denominator are the n-th powers of the roots of the given one, so that its degree does
-    not grow. Raises ArithmeticError if its coefficients have more than 520 bits.
+    Exact. The roots of the new denominator are the n-th powers of the roots of the given one, so that the degree of the
+    denominator does not grow. Raises ArithmeticError if the new coefficients have more than 520 bits.
 
     >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
     ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)
@@ -142,7 +142,7 @@ def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
 
 
 def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
-    """The recurrence of the coefficients of a fraction; `measured` are the terms that were measured.
+    """Return the recurrence of the power series coefficients of a fraction; `measured` are the measured terms.
 
     >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
     'a(n) = 2*a(n-1) for n >= 1, derived from the singularity patterns; 3 measured terms agree'
@@ -156,7 +156,7 @@ def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
 
 
 def coefficients(series: Fraction, count: int) -> list[int]:
-    """The first coefficients of a fraction of integer polynomials whose denominator has the constant term 1."""
+    """Return the first `count` power series coefficients of a fraction; its denominator has the constant term 1."""
     numerator, denominator = series
     denominator_coefficients = [int(c) for c in denominator.coeffs()]
     values: list[int] = []
@@ -167,7 +167,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
 
 
 def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
-    """The generating function of a column of orbit data, continued through hypersurfaces that are images of `start`."""
+    """Return the generating function of a column of orbit data of `start`, continued according to `continues_as`."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}

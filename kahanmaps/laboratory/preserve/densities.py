@@ -1,8 +1,8 @@
-"""The search for invariant volume forms dx/phi of a map, with phi a polynomial or a product of powers of polynomials.
+"""The search for invariant volume forms dx/phi of a map; phi is a polynomial or a product of powers of polynomials.
 
 dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
-All polynomials phi up to a degree form one null space modulo a prime. Products of powers of known polynomials, of any
-degree, are found by their exponents (products.py). Everywhere here "density" means the denominator phi, not 1/phi.
+All polynomials phi up to a degree form one null space modulo a prime. For products of powers of known polynomials, of
+any degree, the exponents are computed (products.py). In this module "density" means the denominator phi, not 1/phi.
 Source: celledoni-2019.
 """
 
@@ -75,10 +75,10 @@ class FoundDensity(FoundFunction):
 class DensitySearch(Search):
     """The result of `find_densities`.
 
-    `densities` is a basis of all phi of the least degree in which any exist. There are two exceptions: if none of these
-    is proved, a proved phi of another degree, if there is one, precedes them; for a Hamiltonian system the list is
-    det(I - eps f') alone, whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says
-    why the search stopped before the requested degree, and is empty if it did not. `period` is the period of the map,
+    `densities` is a basis of all phi of the least degree in which any exist, with two exceptions. If no phi of this
+    basis is proved, a known proved phi of another degree comes first. For a Hamiltonian system the list has only
+    det(I - eps f'), whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says why
+    the search stopped before the requested degree, and is empty if it did not stop. `period` is the period of the map,
     if orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
     |dx/phi| is invariant.
     """
@@ -93,12 +93,12 @@ class DensitySearch(Search):
 
     @property
     def shows_none(self) -> bool:
-        """Whether all requested degrees were searched and no density exists there: a measured answer."""
+        """Whether all requested degrees were searched and no density of these degrees exists (measured)."""
         return not self.densities and not self.cut
 
     @property
     def may_use_integrals(self) -> bool:
-        """Whether factors of the integrals are to be tried, since the search on a map (not a flow) found nothing."""
+        """Whether factors of the integrals should be tried, since a search for a map (not a flow) found no density."""
         return not (self.densities or self.anti_invariant or self.flow)
 
     @property
@@ -111,7 +111,7 @@ class DensitySearch(Search):
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
-        """The density to print: the shortest proved one or else the shortest; the others are multiples by integrals."""
+        """The density to print: the shortest proved one, or else the shortest; integrals times it give all others."""
         return tuple(sorted(self.densities, key=lambda phi: (phi.verdict is not Certainty.PROVED, len(phi.text)))[:1])
 
     @property
@@ -171,7 +171,7 @@ def find_densities(
 ) -> DensitySearch:
     """Search for densities phi: the map preserves the volume form dx/phi.
 
-    The result is a basis of the polynomials phi of the least degree or, if there are none, a product of powers.
+    The result is a basis of the polynomials phi of the least degree, or a product of powers if there is no polynomial.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
@@ -179,19 +179,19 @@ def find_densities(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         flow: search for densities of the differential equation instead, div(f/phi) = 0.
-        max_degree: the largest degree of phi; by default as the number of unknowns allows, at most 12.
-        integrals: the known integrals: if nothing else is found, products of powers of their factors are tried. By
-            default the integrals are then searched for.
+        max_degree: the largest degree of phi; by default at most 12, and as large as the number of unknowns allows.
+        integrals: the known integrals. If no other density is found, products of powers of their factors are tried. By
+            default the integrals are searched for in this case.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. That there is none up to a degree is measured.
+        A `DensitySearch`; formulas are exact, proved or supported. The absence of densities up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, symbols in a [family] file, eps = 0, and a negative degree.
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0, or a negative degree.
 
     Source: celledoni-2019.
 
@@ -226,7 +226,7 @@ def densities_of(
         densities, tried = [theorem], theorem.degree(dim)
     else:
         progress("densities that are products")
-        stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
+        stages = budget.share([1, 2, 2])  # the stages: products; polynomials; integrals, whose factors are tried
         product, anti_invariant = _products(laboratory, max_degree, next(stages))
         so_far = () if product is None else (product,)
         on_result(DensitySearch(*laboratory.request, so_far, -1, UNFINISHED, period, anti_invariant, flow=flow))
@@ -235,7 +235,7 @@ def densities_of(
         densities, tried, cut = _search(laboratory, product, max_degree, polynomial_budget, progress)
         none_proved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
-            # The lemma on Lotka-Volterra systems may prove phi = x_1 ... x_n, whatever its degree.
+            # The lemma on Lotka-Volterra systems may prove phi = x_1 ... x_n in any dimension n.
             x = ring(laboratory.map.names).gens()
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
@@ -257,13 +257,13 @@ def densities_of(
 def with_factors(
     result: DensitySearch, integrals: Sequence[FoundIntegral], max_degree: int | None = None
 ) -> DensitySearch:
-    """Complete a search that found no density by products of powers of factors of integrals."""
+    """Try products of powers of factors of integrals, to complete a search that found no density."""
     if not (result.may_use_integrals and integrals):
         return result
     laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed, algebraic=True)
     if laboratory.defect:
         return result
-    # The laboratory is that of a map, so `candidates` does not use the budget.
+    # The budget is not used: `candidates` needs it only for flows, and this laboratory is that of a map.
     product, anti_invariant = _products(laboratory, max_degree, Budget(), integrals)
     if product is None:
         return replace(result, anti_invariant=anti_invariant)
@@ -279,9 +279,9 @@ def _search(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Search for polynomial densities; the `product` is the result unless a simpler one is found.
+    """Search for polynomial densities; the `product` is the result unless a simpler density is found.
 
-    Returns the densities, the largest degree that was tried, and what ended the search.
+    Returns the densities, the largest degree that was tried, and the reason for which the search ended.
     """
     dim = laboratory.map.dim
     last_degree = max_degree if max_degree is not None else _MAX_DEGREE
@@ -290,9 +290,9 @@ def _search(
         budget,
     )
     if product is not None:
-        # Higher degrees are not needed then, and the other degrees get a part of the budget only.
+        # With a product higher degrees are not needed, and the lower degrees get only a part of the budget.
         degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
-    # If the space of a degree is 0, so are those of lower degrees: try only degrees that double the monomials.
+    # If the space of a degree is 0, the spaces of lower degrees are 0: each degree tried doubles the monomials.
     degrees, tried = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
         smaller = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
@@ -303,7 +303,7 @@ def _search(
             progress(f"densities of degree {degree}")
             model = _space(laboratory.maps[0], degree)
             if model.basis and degree > tried + 1:
-                degrees = list(range(last_degree + 1))  # go back: the answer is the least degree with a density
+                degrees = list(range(last_degree + 1))  # search again for the least degree with a density
                 continue
             if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
                 densities, reason = list[FoundDensity](), ""
@@ -364,7 +364,7 @@ def _certified(
 
 
 def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
-    """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for others."""
+    """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for other systems."""
     if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
     if constant_structures(laboratory.system).hamiltonian is None:

@@ -1,17 +1,16 @@
 """Hirota-Kimura bases: polynomial relations along orbits, modulo primes.
 
-For a set of polynomials phi_1, ..., phi_M the null space K(x) of an orbit consists of the c with sum c_j phi_j = 0 at
-every point of the orbit. Its reduced echelon basis depends on the orbit only, so that every coefficient that is not the
-same number for all orbits is an integral of the map. The codimension of the variety of the orbit, which is the number
-of independent integrals that such relations show, is the rank of their gradients at a point of the orbit.
-
-All this is measured: modulo two primes, for two eps and several orbits; it proves nothing.
+For a set of polynomials phi_1, ..., phi_M the null space K(x) of the orbit of x consists of all vectors c such that
+sum c_j phi_j = 0 at every point of the orbit. Its reduced echelon basis depends on the orbit only, so that a
+coefficient that is not the same number for all orbits is an integral of the map. The rank of the gradients of the
+relations at a point of the orbit is the codimension of their variety, and the number of independent integrals that
+they show. All this is measured, modulo two primes, for two eps and several orbits, and proves nothing.
 
 `sparse_relations` writes out the relations of one degree: their monomials, numbers and integrals. It takes the reduced
-echelon basis of the null space with monomials of the highest degree first, and leaves out what relations of lower
-degrees imply. A coefficient that differs for two orbits is an integral; these are named c1, c2, ... A coefficient that
-does not is a number, times a power of eps where the maps differ in eps; if no such number fits, it is a function of eps
-and gets a name e1, e2, ... Source: petrera-pfadler-suris-2009.
+echelon basis of the null space with monomials of the highest degree first, and leaves out relations that relations of
+lower degrees imply. A coefficient that differs for two orbits is an integral, named c1, c2, ... Another coefficient is
+a number times a power of eps or, if no such number fits, a function of eps, named e1, e2, ...
+Source: petrera-pfadler-suris-2009.
 """
 
 from __future__ import annotations
@@ -51,24 +50,24 @@ from kahanmaps.laboratory.modular_points import (
     places_of,
 )
 
-_SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
+_SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at each with probability 1/p
 MAX_UNKNOWNS = 1800
-MAX_INDEPENDENT = 800  # monomials that lower degrees leave independent; eliminating their matrix takes about a second
+MAX_INDEPENDENT = 800  # monomials that no relation of lower degree reduces; their elimination takes about a second
 _SETTLED_DEGREES = 4
-_SPARE_BITS = 40  # of 122 modulo two primes, by which a number must be shorter than a random residue
+_SPARE_BITS = 40  # a number must be shorter by this than a random residue modulo two primes, which has 122 bits
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
 
 @dataclass(frozen=True)
 class OrbitRelations:
-    """The polynomials up to a degree that vanish along one orbit: a space of this `dimension`.
+    """The space of the polynomials up to a degree that vanish along one orbit; `dimension` is its dimension.
 
     On the orbit, `independent` monomials are linearly independent. `form` is the reduced echelon form of the values of
     the monomials in `exponents_up_to`. If multiples of leading monomials were left out, it has only the other
-    monomials, whose relations imply the rest. `leading` are the monomials that depend linearly on earlier ones; all
-    their multiples have the same property. `normals` is a basis of the span of the gradients at `point`; `period` is
-    the number of points if the orbit closed, otherwise None.
+    monomials, whose relations imply all relations. `leading` are the monomials that depend linearly on earlier ones;
+    all multiples of leading monomials are leading. `normals` is a basis of the span of the gradients at `point`.
+    `period` is the number of points of a closed orbit, otherwise None.
     """
 
     form: nmod_mat
@@ -81,12 +80,12 @@ class OrbitRelations:
 
     @property
     def codimension(self) -> int:
-        """The rank of the gradients."""
+        """The rank of the gradients of the relations at `point`."""
         return len(self.normals)
 
     @cached_property
     def vectors(self) -> list[list[int]]:
-        """The reduced echelon basis of the relations; only valid if no monomials were left out."""
+        """The reduced echelon basis of the relations; it requires that no monomials were left out."""
         return echelon(kernel(self.form, self.independent), self.form.modulus())
 
 
@@ -94,9 +93,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimensions` are those of the varieties that these polynomials define; `with_known` counts known integrals, too.
-    `period` is the number of points of orbits that close, else None. `agree`: all maps gave the same numbers.
-    `complete`: all requested degrees were tried; otherwise `cut` says why not.
+    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` includes known
+    integrals. `period` is the number of points of closed orbits, else None. `agree`: all maps gave the same numbers.
+    `complete`: all requested degrees were tried; if not, `cut` says why.
     """
 
     dim: int
@@ -139,11 +138,11 @@ def relations_on_orbit(
 ) -> OrbitRelations:
     """Compute the polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
-    `rank_bound` is an upper bound of the number of independent monomials, if one is known: a few more points than that
-    suffice. For a generic point the rank of the rows grows until it is final, since relations of the points 0 to k that
-    hold at the point k + 1 are, one step later, relations of the points 1 to k + 1, and so on. `leading` are the
+    `rank_bound` is an upper bound of the number of independent monomials, if one is known: `rank_bound` points and a
+    few more suffice. For a generic point the rank of the rows grows until it is final: if all relations of the points 0
+    to k hold at the point k + 1, they hold one step later for the points 1 to k + 2, and so on. `leading` are the
     leading monomials of relations of lower degrees; their proper multiples are dependent and left out. Raises NoPoint
-    where orbits meet the singular set.
+    if orbits meet the singular set.
     """
     exponents = exponents_up_to(map_.dim, degree)
     support = _not_multiples(map_.dim, degree, leading)
@@ -155,7 +154,7 @@ def relations_on_orbit(
     new_leading = frozenset(exponents[support[k]] for k in free)
     if independent > rank_bound or not leading <= new_leading:
         return relations_on_orbit(map_, degree)  # `rank_bound` or `leading` came from a special orbit
-    # The gradient of a relation: that of its dependent monomial minus the combination of those of the independent ones.
+    # The gradient of a relation: its dependent monomial minus a combination of independent ones, differentiated.
     count_work(len(exponents) / 2 + map_.dim * len(support) / 3)
     monomial_gradients = [[row[k] for k in support] for row in monomial_derivatives(point, degree, map_.prime)]
     at_pivots = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - independent) for row in monomial_gradients]
@@ -165,9 +164,9 @@ def relations_on_orbit(
 
 
 def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
-    """Return the indices in `exponents_up_to` of the monomials that are not proper multiples of any in `leading`."""
+    """Return the indices in `exponents_up_to` of the monomials that are no proper multiples of one in `leading`."""
     exponents = exponents_up_to(dim, degree)
-    is_multiple: list[bool] = []  # a proper multiple or a leading monomial itself
+    is_multiple: list[bool] = []  # of a leading monomial, or equal to one
     support = []
     for k, (exponent, factors) in enumerate(zip(exponents, monomial_tables(dim, degree), strict=True)):
         is_proper = any(is_multiple[place] for _, _, place in factors)
@@ -180,7 +179,7 @@ def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[
 def span_of_relations(map_: ModularMap, degree: int, largest: float = inf) -> list[list[int]]:
     """Return the reduced echelon basis of the span of the relations of all orbits.
 
-    Orbits are added until two in a row do not enlarge the span, or its dimension exceeds `largest`.
+    Orbits are added until two successive ones do not enlarge the span, or its dimension exceeds `largest`.
     """
     first, unchanged = relations_on_orbit(map_, degree), 0
     basis, rank_bound = first.vectors, first.independent
@@ -199,21 +198,21 @@ def orbit_profile(
     known_gradients: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
-    """Measure the relations of degree 1, 2, ... on one orbit of each map; the maps are expected to agree.
+    """Measure the relations of degree 1, 2, ... on one orbit of each map, which should have the same dimensions.
 
     Args:
         maps: the maps, with different primes and, if eps is not given, different eps.
-        max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
+        max_degree: the largest degree; by default it depends on the dimension and on the number of monomials.
         budget: no further degree is tried after the budget is spent; None means no limit.
         known_gradients: returns the gradients of known integrals at a point.
-        progress: called with the degree that is tried.
+        progress: called with each degree before it is tried.
 
     Returns:
-        The `Profile`, measured. The search ends when the codimension is dim - 1, so that orbits lie on curves (dim if
-        orbits close), or at `max_degree`. It ends early, and is not complete, for too many monomials or a spent budget.
+        The `Profile`, measured. The search ends at `max_degree`, or when the codimension is dim - 1, so that orbits lie
+        on curves (dim if orbits close). With too many monomials or a spent budget it ends early and is not complete.
 
     Raises:
-        NoPoint: where orbits meet the singular set.
+        NoPoint: if orbits meet the singular set.
 
     Source: petrera-pfadler-suris-2009.
 
@@ -247,7 +246,7 @@ def orbit_profile(
         orbits = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
         leading = [orbit.leading for orbit in orbits]
         agree = agree and len({(orbit.dimension, orbit.codimension) for orbit in orbits}) == 1
-        # A special orbit has more relations, never fewer: take the minimum.
+        # A special orbit never has fewer relations than a generic one, so the minimum counts.
         nullities.append(min(orbit.dimension for orbit in orbits))
         codimensions.append(min(orbit.codimension for orbit in orbits))
         ranks = [
@@ -257,7 +256,7 @@ def orbit_profile(
         with_known = max(with_known, min(ranks))
         if period is None and len({orbit.period for orbit in orbits}) == 1:
             period = orbits[0].period
-        # An orbit that closes is a finite set, even if relations of low degree only show a curve through it.
+        # A closed orbit is a finite set, even if relations of low degree only show a curve through its points.
         if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
     return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, not cut, with_known, cut)
@@ -268,7 +267,7 @@ class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
     `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
-    entries are integrals. `agree`: all orbits gave the same dimension. `period` is that of closed orbits, else None.
+    entries are integrals. `agree`: all orbits gave the same dimension. `period` is the period if orbits close.
     """
 
     functions: tuple[str, ...]
@@ -289,14 +288,14 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
 
     Args:
         maps: maps of one system, with different primes.
-        functions: exact polynomials in the variables of the system, or in these and their iterates, at least one.
+        functions: at least one exact polynomial in the variables of the system, or in the variables and their iterates.
         names: the texts of the functions.
 
     Returns:
-        The `Basis`, measured: its dimension is the smallest on any orbit.
+        The `Basis`, measured; its dimension is the smallest one of all orbits.
 
     Raises:
-        NoPoint: where orbits meet the singular set.
+        NoPoint: if orbits meet the singular set.
 
     Source: petrera-pfadler-suris-2009.
 
@@ -317,7 +316,7 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
         two_bases: list[list[list[int]]] = []
         for _ in range(2):
             points = map_.orbit(count + iterates)
-            closed = len(points) < count + iterates  # a cycle: its points are continued around it
+            closed = len(points) < count + iterates  # a cycle, whose points are then repeated
             periods.add(len(points) if closed else None)
             continued = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
@@ -331,8 +330,8 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
             ]
             two_bases.append(null_space(rows, len(functions), map_.prime))
         bases += two_bases
-        # Entries of reduced bases that agree on two orbits of one map are constants; the others depend on the orbit,
-        # and are values of integrals.
+        # An entry of the reduced basis that is equal on two orbits of one map is a constant. Every other entry depends
+        # on the orbit and is the value of an integral.
         if len(two_bases[0]) == len(two_bases[1]):
             same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*two_bases, strict=True)]
             constant = same if constant is None or len(constant) != len(same) else constant
@@ -352,8 +351,8 @@ class SparseRelation:
     """A polynomial with integrals as coefficients that vanishes along every orbit.
 
     `terms` are pairs of a monomial and its coefficient. A coefficient is the text of a number, perhaps with a power of
-    eps, or a name such as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list
-    them.
+    eps, or a name such as "c3" of an integral or "e1" of a function of eps; `integrals` and `functions_of_eps` list
+    these names.
     """
 
     terms: tuple[tuple[str, str], ...]
@@ -375,18 +374,18 @@ class SparseRelation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The coefficients that are names."""
+        """The names of the integrals and functions of eps in the coefficients."""
         return tuple(text for _, text in self.terms if text in self.integrals or text in self.functions_of_eps)
 
 
 def sparse_relations(
     maps: Sequence[ModularMap], degree: int, variables: Sequence[str], max_terms: int = 12, first: int = 1
 ) -> tuple[SparseRelation, ...] | None:
-    """Return the relations of degree `degree` that lower degrees do not imply; None where orbits disagree.
+    """Return the relations of degree `degree` that lower degrees do not imply; None if orbits disagree.
 
     `maps` are two or more maps of one system, with different primes. Relations with more than `max_terms` terms are
-    left out. Integrals are numbered through all relations of the degree, from `first` on; equal ones share a name.
-    Raises NoPoint where orbits meet the singular set.
+    left out. The integrals of all these relations are numbered from `first` on; equal ones share a name.
+    Raises NoPoint if orbits meet the singular set.
 
     Source: petrera-pfadler-suris-2009.
 
@@ -401,19 +400,19 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leads = []  # leading monomials of relations of lower degree, which imply their multiples
+    leads = []  # leading monomials of relations of lower degree, which imply the relations of their multiples
     if degree > 1:
         lower = _descending_exponents(maps[0].dim, degree - 1)
         leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
     relations, context = [], ring(variables)
-    # Letters for the names c1, c2, ... and e1, e2, ... that no variable has as its name.
+    # Letters for the names c1, c2, ... and e1, e2, ... such that no variable has one of these names.
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
     integral_letter, eps_letter = (
         next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES")
     )
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
-    # Two orbits of the first map distinguish integrals from constants; the second map gives constants as numbers.
+    # Two orbits of the first map distinguish integrals from constants; constants are reconstructed from both maps.
     for row, other_orbit, other_map in zip(*tables, strict=True):
         columns = [k for k, entry in enumerate(row) if entry]
         is_implied = any(all(map(ge, support[columns[0]], lead)) for lead in leads)
@@ -450,7 +449,7 @@ def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
 
 
 def _number_text(entry: int, other_entry: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """Recognize a coefficient, given modulo two primes, as a simple number times a power of eps; None otherwise."""
+    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is none."""
     for power in _POWERS:
         residues = [
             [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]

@@ -2,10 +2,9 @@
 
 First comes a lower bound of the number of integrals: from theorems (hamiltonian_structure.py) and from the codimension
 of orbits, which is measured (hirota_kimura.py). Then the search looks for spaces of polynomials with a common cofactor
-modulo a prime (search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters
-that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py). Integrals that
-theorems give and the search missed are added. The remaining ones are searched for as formulas in iterates
-(iterates.py).
+modulo a prime (search.py); ratios of their elements are integrals. The coefficients are functions of eps and of the
+parameters that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py).
+Integrals that theorems give and the search missed are added. The search ends with formulas in iterates (iterates.py).
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ from kahanmaps.maps.kahan import SystemLike
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
-_CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo these and the first prime with probability 1/32
+_CONJUGATE_PRIMES = 4  # two conjugate pencils are rational modulo these and the first prime with probability 1/32
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class FoundIntegral(FoundFunction):
     origin: str
     verdict: Certainty
     evidence: Evidence
-    product: str = ""  # the formula in factored form, where the search gives it
+    product: str = ""  # the formula in factored form, if the search gives it
 
     @property
     def text(self) -> str:
@@ -95,9 +94,9 @@ class FoundIntegral(FoundFunction):
 
 @dataclass(frozen=True)
 class TimeDependentIntegral(ResultPart):
-    """A time-dependent integral c^-n I(x), where x is the n-th point of an orbit and I(x~) = c I(x) with a number c.
+    """A time-dependent integral c^-n I(x) at the n-th point x of an orbit, with I(x~) = c I(x) and c independent of x.
 
-    For a flow the integral is exp(-c t) I(x), with I' = c I.
+    For a flow the time-dependent integral is exp(-c t) I(x), with I' = c I.
     """
 
     name: str
@@ -130,12 +129,12 @@ class TimeDependentIntegral(ResultPart):
 class IntegralSearch(Search):
     """The result of `find_integrals`.
 
-    `integrals` are functionally independent, also together with the `time_dependent` ones and with those whose
-    formulas contain iterates of x, `in_iterates`. `profile` holds the dimensions of the relations along orbits
-    (measured); `by_theorems` is the number of independent integrals that theorems give the Kahan map
-    (hamiltonian_structure.py), `theorems` names the theorems (with symbols: at random values). `reason` says what is
-    missing and why; it is empty if nothing is missing. `period_at_values` is the period of the map where the symbols
-    have the values of the file, if orbits close there.
+    `integrals`, `time_dependent` integrals and integrals `in_iterates`, whose formulas contain iterates of x, are
+    functionally independent together. `profile` holds the dimensions of the relations along orbits (measured).
+    `by_theorems` is the number of independent integrals that theorems give the Kahan map, at random values of the
+    symbols; `theorems` names these theorems (hamiltonian_structure.py). `reason` says what is missing and why; it is
+    empty if nothing is missing. `period_at_values` is the period of the map at the values that the file gives the
+    symbols, if orbits close there.
     """
 
     _parts, _noun = "all_integrals", ("integral", "integrals")
@@ -151,7 +150,7 @@ class IntegralSearch(Search):
 
     @property
     def note(self) -> str:
-        """A sentence on the period of the map; empty where orbits do not close."""
+        """A sentence on the period of the map; empty if orbits do not close."""
         if self.profile.period is None and self.period_at_values is not None:
             values = ", ".join(f"{name} = {self.file.parameters[name]}" for name in self.symbols)
             if self.flow:
@@ -161,17 +160,17 @@ class IntegralSearch(Search):
 
     @property
     def codimension(self) -> int:
-        """The largest of the numbers of independent integrals that orbits show, theorems give or formulas prove."""
+        """The largest number of independent integrals that orbits show, theorems give or formulas prove."""
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property
     def all_integrals(self) -> list[FoundIntegral | IntegralInIterates]:
-        """The integrals with a formula, those in iterates last."""
+        """The integrals with a formula; integrals in iterates come last."""
         return [*self.integrals, *self.in_iterates]
 
     @property
     def formulas(self) -> list[tuple[str, Certainty]]:
-        """Each formula with its verdict, those in iterates last."""
+        """Each formula with its verdict; integrals in iterates come last."""
         return [(integral.text, integral.verdict) for integral in self.all_integrals]
 
     @property
@@ -181,9 +180,9 @@ class IntegralSearch(Search):
 
     @property
     def is_exact(self) -> bool:
-        """Whether there can be no more than `codimension` integrals; otherwise it is a lower bound.
+        """Whether there are exactly `codimension` integrals; if not, this number is a lower bound.
 
-        Relations of higher degrees could show more integrals, unless orbits lie on curves (on points, if they close).
+        Relations of higher degrees could show more integrals, unless orbits lie on curves (or close).
         """
         dim, measured = self.profile.dim, bool(self.profile.nullities)
         closes = self.profile.period is not None or self.period_at_values is not None
@@ -208,7 +207,7 @@ class IntegralSearch(Search):
 
     @property
     def is_complete(self) -> bool:
-        """Whether there are as many closed forms as independent integrals are known to exist."""
+        """Whether there is a formula for each of the independent integrals that are known to exist."""
         return self.formula_count >= self.codimension
 
     def rows(self) -> list[dict[str, str]]:
@@ -250,7 +249,7 @@ def find_integrals(
     progress: Callable[[str], None] = lambda _: None,
     on_result: Callable[[IntegralSearch], None] = lambda _: None,
 ) -> IntegralSearch:
-    """Search for independent integrals of a map in closed form, and verify each.
+    """Search for independent integrals of a map in closed form, and verify each formula.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
@@ -258,7 +257,7 @@ def find_integrals(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         flow: search for rational integrals of the differential equation instead.
-        max_degree: the largest degree of relations along orbits; by default as the dimension and the budget allow.
+        max_degree: the largest degree of relations along orbits; the default depends on dimension and budget.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
@@ -269,7 +268,7 @@ def find_integrals(
         that orbits show is measured modulo two primes.
 
     Raises:
-        InputError: for unknown symbols, symbols in a [family] file, and eps = 0.
+        InputError: for unknown symbols, symbols in a [family] file, or eps = 0.
 
     Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
 
@@ -298,7 +297,7 @@ def integrals_of(
     # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
     stages = budget.share([3, 4, 1, 3, 3])
     collected = _Collected(laboratory, progress)
-    # The integrals that theorems give a Kahan map, for each map of the laboratory; without symbols they are the same.
+    # The integrals that theorems give, for each map of the laboratory; without symbols all maps have the same.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
         systems = {
@@ -353,13 +352,13 @@ def integrals_of(
         on_result(result(profile, UNFINISHED))
         stage = next(stages)
         cofactors = laboratory.cofactors()
-        # For a vector field the candidates would be too many, and few integrals have other denominators than these.
+        # For a vector field there would be too many candidates. Most integrals have denominators with these factors.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, stage)
         denominators = denominators_among(factors, laboratory.map.dim)
 
         def quick_search(map_: ModularMap) -> SpaceSearch:
-            # Half of the remaining work, on each map: the other half is for the formulas.
+            # On each map half of the remaining work: the other half is for the formulas.
             return search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
 
         base = laboratory.maps[0]
@@ -379,7 +378,7 @@ def integrals_of(
     result_so_far, stage = result(profile, ""), next(stages)
     on_result(replace(result_so_far, reason=UNFINISHED))
     if not result_so_far.is_complete:
-        # This may take longer than all earlier stages, so it comes after their formulas.
+        # This stage may take longer than all earlier stages, so it comes after their formulas.
         steps_before = len(space_search.steps)
         cut = add_relation_spaces(base, profile, space_search, LARGEST_SPAN, stage.part(0.5), progress)
         if len(space_search.steps) > steps_before:
@@ -408,7 +407,7 @@ def integrals_of(
         reason += f" {space_search.tried}: coefficients of Hirota-Kimura bases are such integrals"
     reasons = [reason, *([space_search.cut, cut] if missing > 0 else []), *collected.cut]
     if at_values is not None:
-        # Formulas with symbols may become dependent, or vanish, at the values of the file.
+        # At the values of the file, integrals with symbols may become dependent or vanish.
         independent = Independent(at_values)
         rows = [independent.gradient(integral.function) for integral in result_so_far.integrals]
         point = independent.point
@@ -437,9 +436,9 @@ def _formulas(
 ) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
     """Interpolate the ratios of the polynomials that a search found on the map `base`.
 
-    Where their spaces may be conjugate over an extension of Q, `search_on` repeats the search on maps modulo other
-    primes, until one has no conjugate spaces. Returns the map and the search that were used, the formulas, and the
-    reason why there are no others. Raises NoPoint.
+    If their spaces may be conjugate over an extension of Q, `search_on` repeats the search on maps modulo other primes,
+    until there are no conjugate spaces. Returns the map and the search that were used, the formulas, and the reason why
+    there are no further formulas. Raises NoPoint.
     """
     if may_be_conjugate(result):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
@@ -452,7 +451,7 @@ def _formulas(
     origins = [step.text for step, spaces in zip(result.steps, result.spaces, strict=True) for _ in spaces]
     formulas = list[Formula]()
     for (Q, *numerators), origin in zip(bases, origins, strict=False):
-        for P in numerators:  # prefer whichever of P/Q and Q/P has a constant denominator at eps = 0
+        for P in numerators:  # prefer P/Q or Q/P, whichever has a constant denominator at eps = 0
             P_is_number, Q_is_number = (substitute(F, {"eps": fmpq(0)}).is_constant() for F in (P, Q))
             is_inverse = P_is_number and not Q_is_number
             formulas.append((RationalFunction(Q, P) if is_inverse else RationalFunction(P, Q), origin, ""))
@@ -474,10 +473,10 @@ class _Collected:
         self.in_iterates: list[IntegralInIterates] = []
 
     def offer(self, formulas: Sequence[Formula]) -> None:
-        """Add the formulas that are independent of the others and pass as identities, short ones first."""
+        """Add the formulas that are independent of the collected ones and not refuted, short formulas first."""
 
         def size(formula: Formula) -> tuple[int, int, list[list[int]]]:
-            """The sort key: size, then monomials. The order must not depend on the primes."""
+            """Return the sort key: size, then monomials. The order must not depend on the primes."""
             P = formula[0].numerator
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
@@ -498,7 +497,7 @@ class _Collected:
                 self._add(gradient, function, origin, verdict, evidence, product)
 
     def _normalized(self, formula: Formula) -> Formula:
-        """Normalize the formula so that it tends to an integral of the flow as eps -> 0, where that is possible."""
+        """Normalize the formula so that it tends to an integral of the flow as eps -> 0, if that is possible."""
         function, origin, product = formula
         if not self._has_limit:
             return formula
@@ -507,7 +506,7 @@ class _Collected:
 
     @property
     def _has_limit(self) -> bool:
-        """Whether the limit eps -> 0 makes sense: for maps that approximate a flow for every eps, and for flows."""
+        """Return whether the limit eps -> 0 is defined: for flows, and for maps of any eps that approximate a flow."""
         laboratory = self._laboratory
         of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return of_flow and laboratory.eps is None and laboratory.root is None
@@ -573,7 +572,7 @@ class _Collected:
                 self.time_dependent.append(TimeDependentIntegral(name, integral, product.constant, laboratory.flow))
 
     def add_in_iterates(self, required: int, budget: Budget) -> None:
-        """Add integrals in iterates of x, and further ones in x alone, until there are `required` in all."""
+        """Add integrals in iterates of x, and further integrals in x alone, until there are `required` of them."""
         laboratory = self._laboratory
         # Time-dependent integrals do not count here.
         self._gradients = Independent(laboratory.maps[0], [integral.function for integral in self.integrals])

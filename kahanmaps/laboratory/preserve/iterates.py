@@ -1,14 +1,14 @@
 """Integrals whose formulas contain iterates x~, x~~, ...: coefficients of bilinear relations along orbits.
 
 The search looks modulo a prime for bilinear functions F_0, F_1, ... of (x, x^(k)) whose values along every orbit span a
-line or a plane (darboux_spaces.py), and interpolates them. On a line the ratios of the F are integrals, on a plane the
-ratios of 2 x 2 minors. The identity to be verified says that such a ratio I has the same value one step later. It is
-written with x in the middle of the orbit segment: I(x, x~) = I(x_, x) contains one step forward and one step backward
-instead of two forward, which keeps the expansion short.
+line or a plane (darboux_spaces.py), and interpolates these functions. For a line the ratios of the F are integrals, for
+a plane the ratios of 2 x 2 minors. The identity to be verified says that such a ratio I has the same value one step
+later. It is written with x in the middle of the orbit segment: I(x, x~) = I(x_, x), where x_ is the preimage of x,
+contains one step forward and one step backward instead of two forward, which keeps the expansion short.
 
-If there are affine integrals, the search runs on their level sets, where x has fewer coordinates and relations of a
-lower degree suffice. The values c of the levels are symbols of this search; in the results v.x replaces c.
-Source: petrera-suris-2018.
+If there are affine integrals v.x, the search runs on their level sets v.x = c, which have fewer coordinates, so that
+relations of a lower degree suffice. The values c are symbols of this search; in the results v.x replaces c. Source:
+petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from kahanmaps.maps.implicit import MapFamily
 
 @dataclass(frozen=True)
 class RatioOfIterates:
-    """A function I of an orbit segment: the ratio of two of the `functions` or, for rank 2, of two of their minors.
+    """A function I of an orbit segment: the ratio of two `functions` or, for rank 2, of two minors of them.
 
     The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `numerator` and
     `denominator` are indices into `functions`: one index a for F_a, two indices a, b for F_a F_b~ - F_b F_a~.
@@ -64,11 +64,11 @@ class RatioOfIterates:
 
     @property
     def length(self) -> int:
-        """The number of successive points that I depends on."""
+        """The number of successive points of an orbit on which I depends."""
         return self.two_point_basis.shift + self.two_point_basis.rank
 
     def with_limit(self, count: int) -> RatioOfIterates:
-        """Normalize a ratio that tends to a constant as eps -> 0; its first `count` variables are coordinates."""
+        """Normalize a ratio that tends to a constant as eps -> 0; the first `count` variables are coordinates."""
         if self.two_point_basis.rank > 1:
             return self
         result = normalized(self.formula[0], count)
@@ -77,7 +77,7 @@ class RatioOfIterates:
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
-        """The ratio and, for rank 2, the definitions of the letters F0, F1, ... that abbreviate functions in it."""
+        """The ratio and, for rank 2, the definitions of the names F0, F1, ... that abbreviate functions in it."""
         if self.two_point_basis.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         taken = self.functions[0].context().names()
@@ -92,7 +92,7 @@ class RatioOfIterates:
 
     @property
     def text(self) -> str:
-        """The formula; x~ is the image of x, x~~ that of x~."""
+        """The formula; x~ is the image of x, and x~~ is the image of x~."""
         ratio, letters = self.formula
         return ", ".join([format_rational_function(ratio), *(f"{F} = {format_polynomial(P)}" for F, P in letters)])
 
@@ -105,7 +105,7 @@ class RatioOfIterates:
     def numerator_and_denominator(
         self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]
     ) -> tuple[Any, Any]:
-        """Return numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
+        """Return numerator and denominator at successive points of an orbit, at the values of the symbols and eps."""
         rows = [
             [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
             for x, iterate in zip(points, points[self.two_point_basis.shift :], strict=False)
@@ -153,7 +153,7 @@ def verdict_on_ratio(
 ) -> tuple[Certainty, Evidence]:
     """Decide whether I has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of orbit segments that are too long to be expanded; longer ones are not tried.
+    `too_long` collects the lengths of orbit segments whose identity was too long to expand; longer ones are not tried.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()
@@ -194,18 +194,18 @@ def integrals_in_iterates(
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:
-    """Search for integrals independent of the known ones: in x alone, and in iterates, each with its origin.
+    """Search for integrals, in x alone and in iterates, that are independent of the known integrals.
 
     Args:
         laboratory: the map.
         required: the number of independent integrals at which the search stops, known ones included.
         independent: the known integrals, on the first map of the laboratory.
         budget: no further basis is tried after the budget is spent.
-        progress: called with the basis that is tried.
+        progress: called with each basis before it is tried.
 
     Returns:
-        Formulas that are still to be verified, those in x with an empty text for their factored form; and a sentence
-        on what was skipped because the work limit was reached. Raises NoPoint.
+        Formulas in x and in iterates, not yet verified, each with its origin (formulas in x also with an empty text for
+        a factored form); and a sentence on what was skipped because the work limit was reached. Raises NoPoint.
 
     Source: petrera-suris-2018.
     """
@@ -232,7 +232,7 @@ def integrals_in_iterates(
                 functions = [_bilinear_function(P, basis_with_rank, level_laboratory.map) for P in basis]
                 if replace_levels is not None:
                     functions = [replace_levels(F, basis_with_rank.shift) for F in functions]
-                # These ratios generate all others.
+                # These ratios generate all ratios of the functions.
                 candidates = [RatioOfIterates(basis_with_rank, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
                 if basis_with_rank.rank == 2:
                     pairs = [(first, k) for k in range(2, len(functions)) for first in (0, 1)]
@@ -251,7 +251,7 @@ def integrals_in_iterates(
 
 
 def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
-    """The names in formulas: variables, variables of the iterate, symbols, eps."""
+    """Return the names in formulas: variables, variables of the iterate, symbols, eps."""
     names = map_.variables
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
 
@@ -274,8 +274,8 @@ def _bilinear_function(P: fmpq_mpoly, two_point_basis: TwoPointBasis, map_: MapF
 def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
     """Restrict the map to level sets of its affine integrals, whose values become symbols.
 
-    Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result; None
-    where there are no affine integrals or fewer than two coordinates remain.
+    Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result, or
+    None if there are no affine integrals or fewer than two coordinates remain.
     """
     system, n = laboratory.system, laboratory.map.dim
     integrals = affine_integrals(system) if system is not None else ()

@@ -1,17 +1,17 @@
-"""Integrals and densities that are products of powers of known polynomials, of any degree: exponents from a lattice.
+"""Integrals and densities of any degree that are products of powers of known polynomials, by lattices of exponents.
 
 For polynomials g_1, ..., g_r let C_i = g_i(x~)/g_i(x). A product g_1^k_1 ... g_r^k_r with exponents of either sign is
 an integral if C_1^k_1 ... C_r^k_r = 1, and the phi of an invariant volume form dx/phi if this product is det dPhi. If
-it is another number c, then c^-n times the product at step n does not depend on n: a time-dependent integral.
+C_1^k_1 ... C_r^k_r is another number c, then c^-n times the product of the g at step n is a time-dependent integral.
 
-On a random line modulo a prime all of these functions are quotients of polynomials in one variable. Over a basis of
-coprime polynomials, which takes gcds but no factorization, each C_i becomes a vector of integers, and the exponents k
-form a lattice. Polynomials in x without a common factor have none on a random line, except with a probability of about
-degree^2/p. The numbers c that remain are functions of eps and the symbols: they are interpolated, and their
-multiplicative relations are a lattice again.
+On a random line modulo a prime all C_i and det dPhi are quotients of polynomials in one variable. In terms of coprime
+polynomials, which are computed by gcds without a factorization, each C_i is a vector of integers. The exponents k for
+which the product of powers is constant form a lattice. Polynomials in x without a common factor have none on a random
+line, except with a probability of about degree^2/p. The constants c are functions of eps and the symbols; they are
+interpolated, and their multiplicative relations form a lattice again.
 
 The g_i need not be Darboux polynomials, unlike in celledoni-2019: for the Lyness map (x, y) -> (y, (a + y)/x), neither
-x nor y is one, and dx dy/(x y) is invariant. Source: celledoni-2019.
+x nor y is a Darboux polynomial, and dx dy/(x y) is invariant. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
 _MAX_TERMS = 20_000  # of an expanded product
-_DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that lattice reduction makes it small first
+_DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that this exponent is small in reduced bases
 
 
 @dataclass(frozen=True)
 class Product:
     """A product I of powers g^k of the `factors`, a function of (variables, symbols, eps); it may be empty.
 
-    `constant` is c in I(x~) = c I(x), a function of the symbols and eps, and 1 for an integral. For a density it is c
-    in phi(x~) = c det dPhi(x) phi(x), which is 1 or -1. For a time-dependent integral of a flow it is c in I' = c I.
+    `constant` is c in I(x~) = c I(x), a function of the symbols and eps; it is 1 for an integral. For a density it is
+    the c in phi(x~) = c det dPhi(x) phi(x), 1 or -1, and for a time-dependent integral of a flow the c in I' = c I.
     """
 
     factors: tuple[tuple[fmpq_mpoly, int], ...]
@@ -71,7 +71,7 @@ class Product:
 
     @property
     def function(self) -> RationalFunction | None:
-        """The expanded product; None where it has too many terms."""
+        """The expanded product; None if it has too many terms."""
         numerator_and_denominator = []
         for sign in (1, -1):
             powers = [(g, sign * k) for g, k in self.factors if sign * k > 0]
@@ -86,7 +86,7 @@ class Product:
 class Products:
     """The result of `products_of`: integrals, a density (None without one), and time-dependent integrals.
 
-    If there is no density, `density` is an anti-invariant phi (constant -1), if any: then |dx/phi| is invariant.
+    Without a density, `density` may be an anti-invariant phi (constant -1), so that |dx/phi| is invariant.
     """
 
     integrals: tuple[Product, ...]
@@ -101,7 +101,7 @@ def candidates(
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `further` polynomials. For a flow they are its Darboux polynomials, until the budget is spent.
+    of the `further` polynomials. For a flow they are the Darboux polynomials that are found within the budget.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -114,7 +114,7 @@ def candidates(
 
 
 def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
-    """Return the primitive irreducible factors that contain one of the first n variables, by their text."""
+    """Return the primitive irreducible factors that contain one of the first n variables; the keys are texts."""
     factors: dict[str, fmpq_mpoly] = {}
     for P in polynomials:
         if eps is not None:
@@ -127,7 +127,7 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
     return factors
 
 
-@counted_cache(4)  # may take half a second, and the searches for integrals and densities both need it
+@counted_cache(4)  # may take half a second; the searches for integrals and for densities call it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
     """Return the factors of numerator and denominator of det dPhi^-1 and, with `both`, of det dPhi."""
     n, fractions = map_.dim, list[Function]()
@@ -144,10 +144,10 @@ def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str
 
 
 class _Line:
-    """A random line modulo the prime of a map, and its image.
+    """A random line modulo the prime of a map, and the image of the line.
 
-    Both are homogeneous coordinates (X : Z), polynomials in t without common factor. On the line, det dPhi is
-    `numerator` / (Z^n `denominator`) with Z of the image. Raises NoPoint.
+    Both have homogeneous coordinates (X : Z), polynomials in t without common factor. On the line, det dPhi is
+    `numerator` / (Z^n `denominator`), where Z belongs to the image. Raises NoPoint.
     """
 
     def __init__(self, map_: ModularMap) -> None:
@@ -160,7 +160,7 @@ class _Line:
             self._apply(factor)
 
     def _apply(self, factor: ElementaryMap) -> None:
-        """Apply one factor of the map to the image; its determinant is numerator Z^n / (denominator Z~^n)."""
+        """Apply one factor of the map to the image; its Jacobi determinant is numerator Z^n / (denominator Z~^n)."""
         p, n, curve = self.prime, factor.dim, self.image
         map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
@@ -178,7 +178,7 @@ class _Line:
             denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
-        # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
+        # The common factor is removed: its degree would multiply in each further map, and its zeros are no zeros of Z~.
         undivided = _interpolated(homogeneous, n * map_degree * curve_degree, p)
         common = reduce(nmod_poly.gcd, undivided)
         self.image = [entry // common for entry in undivided]
@@ -229,7 +229,7 @@ def _interpolated(values: Callable[[int], list[int]], max_degree: int, p: int) -
 
 
 def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
-    """Return nonconstant coprime polynomials such that all given ones are products of them, up to constants.
+    """Return nonconstant coprime polynomials such that the given ones are products of powers of them, up to constants.
 
     >>> P, Q = nmod_poly([1, 1], 101), nmod_poly([2, 1], 101)
     >>> [B.degree() for B in coprime_base([P * P * Q, P * Q])]
@@ -281,7 +281,7 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
-    """Return the coefficients of polynomials, one polynomial a row, times a common denominator.
+    """Return the coefficients of polynomials, one row for each polynomial, times a common denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -295,7 +295,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
 
 
 def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
-    """Return a short basis of the lattice (LLL), where each entry counts times its weight."""
+    """Return a short basis (LLL) of the lattice; each entry of a vector is multiplied by its weight in the length."""
     if not vectors:
         return []
     weighted = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
@@ -305,7 +305,7 @@ def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[l
 def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Products:
     """Find the products of powers of the polynomials that are integrals, time-dependent integrals or a density.
 
-    The exponents are computed modulo one prime: the results are still to be verified. Raises NoPoint.
+    The exponents are computed modulo one prime, and the results are not verified. Raises NoPoint.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("lotka_volterra"))
@@ -316,7 +316,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     n, context, field = laboratory.map.dim, ring(laboratory.map.names), laboratory.field
     one, minus_one = (RationalFunction(context.constant(c), context.constant(1)) for c in (1, -1))
     if field is not None and laboratory.flow:
-        # With K the cofactor of P: sum k K is 0 for integrals, div f for densities, free of x for time-dependent ones.
+        # For P with cofactor K: sum k K is 0 for integrals, div f for densities, free of x if time-dependent.
         gens = context.gens()
         cofactors = [
             field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
@@ -389,7 +389,7 @@ def _assembled(
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are the vectors with constant 1; `of_densities` are those for a density with the constant 1 or -1.
+    `constant_one` are the vectors with constant 1; `of_densities` are pairs of a constant, 1 or -1, and vectors of phi.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
@@ -402,7 +402,7 @@ def _assembled(
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     def cost(vector: Sequence[int]) -> tuple[int, int, int]:
-        """The sort key of a vector: the degree of the denominator, then that of the numerator."""
+        """Return the sort key of a vector: first the degree of the denominator, then the degree of the numerator."""
         denominator, numerator = (
             sum(sign * k * d for k, d in zip(vector, degrees, strict=True) if sign * k > 0) for sign in (-1, 1)
         )
@@ -424,7 +424,7 @@ def _assembled(
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:
-    """Interpolate numbers that are known on every map as functions of the symbols and eps; None where that fails."""
+    """Interpolate `constants`, whose values on every map are known, in the symbols and eps; None for failures."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
 
@@ -473,6 +473,6 @@ def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list
                     row[str(q)] = row.get(str(q), 0) + s * int(k)
         rows.append(row)
     keys = sorted({key for row in rows for key in row} | {"sign"})
-    # Signs count modulo 2: an additional row 2 * sign allows that; its weight is dropped from the answer.
+    # Signs matter modulo 2 only, by an additional row 2 * sign. The exponent of this row is dropped from the result.
     table = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
     return [vector[:-1] for vector in relations(table)]

@@ -15,7 +15,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 
-_CLOSES_WITHIN = 64  # points of an orbit, about as many as the search for relations of a low degree uses
+_CLOSES_WITHIN = 64  # points of an orbit, about the number in a search for relations of a low degree
 
 
 class FoundFunction(LatexDisplay, ResultPart):
@@ -24,7 +24,7 @@ class FoundFunction(LatexDisplay, ResultPart):
     function: RationalFunction
 
     def __call__(self, *point: Any, **named: Any) -> Any:
-        """Return the value at a point and eps: exact, or rounded where a coordinate is a float; None at a pole."""
+        """Return the value at a point and eps: exact, or rounded if a coordinate is a float; None at a pole."""
         return self.function(*point, **named)
 
 
@@ -32,7 +32,7 @@ class FoundFunction(LatexDisplay, ResultPart):
 class Search(PrintableResult):
     """The request of a search: the system file, the symbols that formulas contain, and eps (None: a symbol as well).
 
-    With `flow` the search concerns the differential equation, not its map. Random points are taken modulo the `primes`.
+    With `flow` the search is for the differential equation, not its map. Random points are taken modulo the `primes`.
     """
 
     file: SystemFile
@@ -52,12 +52,12 @@ class Search(PrintableResult):
 
     @property
     def of_flow(self) -> dict[str, Any]:
-        """The first entry of the JSON record if the search concerns the flow; empty otherwise."""
+        """The first entry of the JSON record if the search is for the flow; empty for a map."""
         return {"flow": True} if self.flow else {}
 
     @property
     def toml_comments(self) -> list[str]:
-        """The comment of a system file that formulas hold at one eps only; empty where the formulas contain eps."""
+        """The comment, for a system file, that formulas hold at one eps only; empty if the formulas contain eps."""
         if self.eps is None:
             return []
         time_step_text = eps_suffix(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
@@ -65,7 +65,7 @@ class Search(PrintableResult):
 
 
 def closing_period(maps: Sequence[ModularMap]) -> int | None:
-    """Return the common period of random orbits of all maps; None where an orbit does not close within 64 points."""
+    """Return the common period of random orbits of all maps; None if an orbit does not close within 64 points."""
     try:
         [*others, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
     except NoPoint:

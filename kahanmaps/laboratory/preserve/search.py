@@ -1,12 +1,12 @@
 """The search for spaces of polynomials with a common cofactor, recorded so that it can be repeated on another map.
 
 A search runs on one map: modulo a prime, at one eps, at one value of each symbol. It records the steps that gave a
-space: affine integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other
-primes, eps and values of the symbols gives the coefficients of the same polynomials there, to be interpolated.
+space: affine integrals, the relations of a degree, a product of cofactors. The steps are repeated on maps with other
+primes, eps and values of the symbols, which gives the coefficients of the same polynomials for an interpolation.
 
-Interpolation needs the same space on every map, but two spaces may have bases with the same zero pattern: then a single
-map, modulo one prime and at one value of the symbols, does not determine which space is which. Take a coefficient w in
-which they differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k), whose
+Interpolation needs the same space on every map. If two spaces have bases with the same zero pattern, a single map,
+modulo one prime and at one value of the symbols, does not determine which space is which. Take a coefficient w in which
+the spaces differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k), whose
 coefficients do not depend on the order of the spaces, so that they can be interpolated. A linear factor of chi over Q
 gives the coefficient w_i of one space as a function of the symbols and eps, and its value identifies this space on any
 other map. A factor of higher degree belongs to spaces conjugate over an extension of Q, without formulas over Q.
@@ -54,28 +54,28 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.maps.kahan import KahanMap
 
-# Largest degrees of polynomials with a given cofactor that are searched for, by dimension.
+# The largest degree, by dimension, in the search for polynomials with a given cofactor.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000
 SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # for a prime and values of the names
 
-_SAMPLES = (150, 600, 3000)  # all coefficients are tried with few samples before any is tried with many
+_SAMPLES = (150, 600, 3000)  # numbers of samples; all coefficients are tried with 150 before any is tried with 600
 _COEFFICIENTS = 6
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8  # points beyond the number of unknowns
 AFFINE = "v.x with v.f(x) = 0"
-_SPARE_BITS = 20  # bits by which a fraction must be shorter than that of a random residue
+_SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction of a random residue
 
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern, distinguished by the coefficient at `place`: its formula is `roots[i]` on space i."""
+    """Spaces of one zero pattern, distinguished by the coefficient at `place`, which is `roots[i]` for the space i."""
 
     place: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
     def in_order(self, spaces: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
-        """Return the spaces on a map in the order of the roots; None where two roots agree there or one is missing."""
+        """Return the spaces on a map in the order of the roots; None if two roots are equal there or one is missing."""
         field = GF(map_.prime)
         parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
         row, column = self.place
@@ -108,16 +108,16 @@ def search_spaces(
 ) -> SpaceSearch:
     """Search for spaces whose ratios give as many independent integrals as the profile shows, by fast methods only.
 
-    The fast methods are: affine integrals, relations along orbits that span few dimensions, polynomials with known
-    cofactors, and polynomials over known denominators. Over the `budget` only affine integrals are tried. Raises
-    NoPoint.
+    The fast methods are: affine integrals, relations along orbits whose span has a small dimension, polynomials with
+    known cofactors, and polynomials over known denominators. After the `budget` is spent, only affine integrals are
+    tried. Raises NoPoint.
     """
     result, required = SpaceSearch(), profile.codimension
     is_of_vector_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
     affine = affine_space(map_)
     if affine is not None:
         result.add(SearchStep("affine", 1, None, AFFINE if is_of_vector_field else "affine integral"), [affine])
-    if is_of_vector_field:  # denominators divide det(I - eps f'): relations of small span cost less than these factors
+    if is_of_vector_field:  # before cofactors: relations of small span are faster than factors of det(I - eps f')
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     if gradient_rank(map_, result.all_spaces) >= required:
         return result
@@ -176,8 +176,8 @@ def repeat_search(
 ) -> SpaceSearch | None:
     """Repeat the steps of a search on another map; return None if its spaces have other zero patterns (special values).
 
-    `reference` is the prime of the search. Spaces with the same zero pattern are in any order unless `branches`
-    distinguishes those of their step.
+    `reference` is the prime of the given search. Spaces with the same zero pattern are in any order unless `branches`
+    has an entry for them.
     """
     repeated = SpaceSearch(cofactors=original.cofactors)
     steps = list(zip(original.steps, original.spaces, strict=True))
@@ -196,7 +196,7 @@ def repeat_search(
             spaces = two_point_spaces(map_, step.two_point_basis)
         else:
             spaces = darboux_spaces(map_, step.degree, repeated.all_spaces) or []
-        # Sort as in the model: by zero pattern and, where patterns agree, by branches. There may be more spaces than in
+        # Sort as in the model: by zero pattern and, for equal patterns, by branches. There may be more spaces than in
         # the model, see `may_be_conjugate`.
         by_pattern, step_branches, ordered = (
             group_by_pattern(spaces),
@@ -225,7 +225,7 @@ def group_by_pattern(spaces: Sequence[DarbouxSpace]) -> dict[Pattern, list[Darbo
 
 
 def may_be_conjugate(result: SpaceSearch) -> bool:
-    """Whether two spaces of one step have the same zero pattern, as spaces conjugate over an extension of Q have.
+    """Return whether two spaces of one step have the same zero pattern, as for spaces conjugate over an extension of Q.
 
     Conjugate spaces exist only modulo primes at which the extension splits, and have no formula over Q.
     """
@@ -235,7 +235,7 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
 def _most_similar(
     spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
-    """Return for each model the space that shares most coefficients with it; conjugate spaces share none.
+    """Return for each model the space that shares most coefficients with it; conjugate spaces share none of them.
 
     Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
@@ -271,7 +271,7 @@ def interpolate_bases(
         except (NoPoint, BadPrime):
             return None
 
-    branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, where several spaces share it
+    branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, if several spaces have this pattern
     for number, group in enumerate(result.spaces):
         for pattern, model in group_by_pattern(group).items():
             if len(model) == 1:
@@ -310,8 +310,8 @@ def find_branches(
 ) -> Branches | None:
     """Find a coefficient that distinguishes spaces of one zero pattern at every value of `names`.
 
-    `model` holds the spaces on one map; `spaces_at(prime, values)` returns those on another map in any order, or None
-    at special values. Returns None where the spaces are conjugate over an extension of Q, or the budget is spent first.
+    `model` holds the spaces on one map; `spaces_at(prime, values)` returns the spaces on another map in any order, or
+    None at special values. Returns None if the spaces are conjugate over an extension of Q, or if the budget is spent.
     """
     distinguishing_places = [
         (i, k)
@@ -332,7 +332,7 @@ def find_branches(
             spaces = spaces_at(prime, values)
             if spaces is None or len(spaces) != count:
                 return None
-            coefficients = [1]  # of prod (T - w), the highest first
+            coefficients = [1]  # of prod (T - w), in descending order
             for space in spaces:
                 w = space.basis[place[0]][place[1]]
                 shifted = zip([*coefficients, 0], [0, *coefficients], strict=True)

@@ -1,4 +1,4 @@
-"""Conditions over Q on parameters, lifted from the components of the special members modulo primes."""
+"""Conditions over Q on parameters, lifted from components of the set of special members modulo primes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kahanmaps.laboratory.scan.modular_components import ModularComponents, find
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
-_SHARE = 0.5  # a curve has at least this share of p points
+_SHARE = 0.5  # a curve over GF(p) has at least _SHARE * p points
 
 
 def conditions(
@@ -27,8 +27,8 @@ def conditions(
 ) -> list[Component]:
     """Find the components over Q of the special members with these degrees.
 
-    Hypersurfaces come first, from random lines, which hardly meet anything smaller; then smaller components of the
-    points outside these hypersurfaces. `check` is called repeatedly, and may raise.
+    Hypersurfaces come first, from random lines, which rarely meet components of lower dimension; then components of
+    lower dimension, from the points outside these hypersurfaces. `check` is called repeatedly, and may raise.
     """
     components: list[Component] = []
     count = len(names)
@@ -41,7 +41,7 @@ def conditions(
                 min_dimension = 0 if sweep.complete else count - sweep.width
                 if unassigned:
                     modular.append(find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check))
-        if count > 1:  # rows of hyperplanes end with the constant; forms of other hypersurfaces begin with it
+        if count > 1:  # the constant is last in rows of hyperplanes, but first in other forms
             hypersurfaces = {
                 at_prime.prime: [
                     *((row[-1], *row[:-1]) for (row,) in at_prime.linear.get(count - 1, [])),
@@ -62,7 +62,7 @@ def conditions(
         if dimension == 0 and len(linear) > 1:
             low, high = min(linear), max(linear)
             few, many = len(linear[low]), len(linear[high])
-            # Their number grows like the prime: these are points of a curve that was not found, not isolated points.
+            # The number of points grows like the prime: they lie on a curve that was not found, and are not isolated.
             if few >= _SHARE * low and many - few >= _SHARE * (high - low):
                 continue
         lifted = lift_linear(linear)

@@ -1,13 +1,13 @@
 """Lift components modulo several small primes to varieties over Q, by Chinese remaindering and rational reconstruction.
 
-A variety reconstructed from some of the primes must also appear modulo the others. This does not prove that it is a
-component over Q; `scan` confirms it at members on it.
+A variety reconstructed from some of the primes must also appear modulo all other primes. This does not prove that it is
+a component over Q; `scan` confirms it at members on the variety.
 
-A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 there: for most
-fields more than half of the primes. The Chinese remainder theorem combines one residue, of any of the conjugates, for
-each of several primes. The equations are small integer relations between products of the coordinates, found as short
-vectors of a lattice: an equation over Q for the first coordinate, and for each further one an equation over the field
-of the earlier ones.
+A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 in the field:
+for most fields more than half of the primes. The Chinese remainder theorem combines, for several primes, one residue of
+any conjugate point. The equations are small integer relations between products of the coordinates, which are short
+vectors of a lattice: an equation over Q for the first coordinate, and for each further coordinate an equation over the
+field of the earlier coordinates.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from kahanmaps.laboratory.scan.modular_components import Rows
 
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
-_MAX_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
-_MAX_CONJUGATES = 24  # largest number of hypersurfaces modulo a prime of which pairs are formed
-_LOW_HEIGHT = 12  # up to this height one prime may be bad
+_MAX_PAIRS = 100_000  # tried pairs of affine subspaces modulo two primes
+_MAX_CONJUGATES = 24  # the largest number of hypersurfaces modulo a prime for which products of two are tried
+_LOW_HEIGHT = 12  # up to this height a subspace may be missing modulo one prime
 _MIN_PRIMES = 3
 MAX_FIELD_DEGREE = 6
-SPARE_BITS = 12  # bits by which relations of a point must be shorter than those of random residues
+SPARE_BITS = 12  # bits by which relations of a point must be shorter than relations of random residues
 _MAX_FAILURES = 200
-_MAX_POINTS = 24  # modulo a prime
-_MAX_PRIMES = 14  # that are combined
+_MAX_POINTS = 24  # points modulo a prime
+_MAX_PRIMES = 14  # primes that are combined
 
 
 def height_bound(primes: Sequence[int]) -> int:
@@ -52,7 +52,7 @@ def lift_linear(
 ) -> dict[RationalRows, tuple[int, ...]]:
     """Return the affine subspaces over Q, as reduced rows, whose residues occur modulo the primes, with these primes.
 
-    A subspace must occur modulo all primes, or if not `everywhere` modulo three of them.
+    A subspace must occur modulo all primes (all but one up to height 12), or if not `everywhere` modulo three of them.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lift_linear(modulo)
@@ -62,7 +62,7 @@ def lift_linear(
     lifted: dict[RationalRows, tuple[int, ...]] = {}
     sizes = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
     pairs = 0
-    # Primes with the fewest pairs of subspaces first: a subspace over Q is lifted from the first pair that has it.
+    # Pairs of primes with the fewest pairs of subspaces first: the first pair that has a subspace over Q gives it.
     for p, q in sorted(sizes, key=sizes.__getitem__):
         pairs += sizes[p, q]
         if pairs > _MAX_PAIRS:
@@ -104,7 +104,7 @@ def _lift_rows(at_p: Rows, p: int, at_q: Rows, q: int) -> RationalRows | None:
 
 
 def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
-    """Return the rows modulo a prime, None if it divides a denominator."""
+    """Return the rows modulo a prime; None if the prime divides a denominator."""
     if any(int(x.q) % p == 0 for row in rows for x in row):
         return None
     return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
@@ -116,8 +116,8 @@ def lift_hypersurfaces(
     """Lift hypersurfaces modulo primes to irreducible hypersurfaces over Q; return them with their primes.
 
     Three kinds are tried: single hypersurfaces; products of two, which may be conjugate over a quadratic field; and the
-    product of all remaining ones, which is lifted from all primes but one and compared with the product modulo that
-    one.
+    product of all remaining hypersurfaces. This product is lifted from all primes but one, and compared with the
+    product modulo the last prime.
 
     >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
     >>> lift_hypersurfaces(circle, ["a", "b"])
@@ -197,7 +197,7 @@ def lift_conjugate_points(
 ) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
     """Return equations of points with their conjugates, one for each parameter, and the primes where all of them occur.
 
-    Among the primes modulo which the equations have solutions, all but one must contain these solutions.
+    For all but one of the primes modulo which the equations have solutions, these must be among the `points`.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
     >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))
@@ -219,7 +219,7 @@ def lift_conjugate_points(
             values, modulus = chinese(values, modulus, rng.choice(sorted(remaining[p])), p), modulus * p
             if (equations := _search_equations(values, modulus, names)) is not None:
                 break
-        # If the points are not conjugate, the relation of the first coordinate is a product of polynomials.
+        # If the points are not conjugate, the relation of the first coordinate is reducible.
         if equations is None or len(equations[0].factor()[1]) > 1:
             continue
         solution_sets = {p: _solve_modulo(equations, p) for p in point_sets}
@@ -234,7 +234,7 @@ def lift_conjugate_points(
 def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
     """Return a relation of least degree in each coordinate; None if there are no relations with small coefficients."""
     context = ring(names)
-    basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products and their residues
+    basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products with residues
     equations = []
     for x, value in zip(context.gens(), values, strict=True):
         lower, (power, residue) = list(basis), (x, value)
@@ -253,7 +253,7 @@ def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str])
 def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | None:
     """Return small integers c_i with sum c_i r_i = 0 modulo `modulus`, the last one not 0; None if there are none.
 
-    The first residue must be 1. Small means `spare` bits below the size expected of random residues.
+    The first residue must be 1. Small means `spare` bits smaller than expected for random residues r_i.
     """
     size = len(residues)
     rows = [[modulus, *[0] * (size - 1)]]
@@ -261,7 +261,7 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
-    # Any residues have a relation with (2 height + 1)^size of about the modulus; only much smaller ones count.
+    # Any residues have a relation of a height with (2 height + 1)^size about the modulus; it must be much smaller.
     is_small = (2 * height + 1) ** size << spare <= modulus
     return [int(c) for c in shortest] if is_small and shortest[-1] else None
 

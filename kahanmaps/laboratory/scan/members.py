@@ -19,16 +19,16 @@ from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import MapFamily
 
-_TRIES = 200  # random values of the free variables, until the equations have a root
+_TRIES = 200  # the number of random values of the free variables for which a root of the equations is tried
 _PRIMES = 40
-_HEIGHTS = (12, 120)  # of random values: small ones where an equation of higher degree must have a rational root
+_HEIGHTS = (12, 120)  # of random values; the small height if an equation of higher degree must have a rational root
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
     """Return a random solution over Q, of small height, or over GF(p); None if none was found.
 
-    `equations` are those of an affine subspace, reduced so that the first variable of each occurs in no other; that of
-    a hypersurface; or those of a point over a number field, each with one more variable than the one before. Raises
+    `equations` define an affine subspace (reduced: the first variable of each equation occurs in no other), or a
+    hypersurface, or a point over a number field (each equation has one more variable than the one before). Raises
     BadPrime if the prime divides a denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
@@ -79,7 +79,7 @@ def solutions(
 
 @dataclass(frozen=True)
 class Scanned:
-    """A scanned family: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
+    """A scanned family: the file and its map with the parameters `names` as symbols; the last name may be eps.
 
     `eps` is an exact number, or None for generic eps.
     """
@@ -91,7 +91,7 @@ class Scanned:
     seed: int
 
     def member(self, values: Mapping[str, fmpq]) -> tuple[SystemFile, fmpq | None]:
-        """The system of a member and its eps."""
+        """Return the system of a member and its eps."""
         parameters = {name: value for name, value in values.items() if name != "eps"}
         return member_of(self.file, parameters), values.get("eps", self.eps)
 
@@ -100,11 +100,11 @@ class Scanned:
     ) -> Degrees | None:
         """Measure the degrees of a random member on a component modulo a random prime of 61 bits, on one random line.
 
-        Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is defined
-        nowhere. The sequence is as long as `expected`, the degrees it is likely to have, or ends before a degree above
-        `max_degree`.
+        Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is nowhere
+        defined. The sequence is as long as the `expected` degrees (guesses that only affect speed), or ends before a
+        degree above `max_degree`.
         """
-        for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
+        for _ in range(_PRIMES):  # a point over a number field has residues modulo some primes only
             field = GF(random_prime(rng))
             try:
                 values = point_on(equations, len(self.names), field, rng)

@@ -1,8 +1,8 @@
-"""The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces of these, single points.
+"""The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces of affine subspaces, single points.
 
-The points with one degree sequence lie on certain varieties, outside of special subvarieties; a few have it by chance.
-So a candidate is a variety through few random points of the set; it is accepted as a component if it has about as many
-points of the set as a variety of its dimension d has points, p^d.
+The points with a given degree sequence are the points of certain varieties, without special subvarieties, and a few
+points by chance. So a candidate is a variety through few random points of the set; it is accepted as a component if the
+set contains most of its points, of which there are about p^d in dimension d.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ Rows = tuple[tuple[int, ...], ...]
 Form = tuple[int, ...]
 
 MAX_DEGREE = 6  # of the product of all hypersurfaces with the same degree sequence
-_SHARE = 0.5  # least share of the points of a component: those on special subvarieties are missing
-_SPARE = 1.2  # points for each coefficient of a hypersurface
-# Samples of points. With more than 3 parameters a sample rarely lies on one component, so that more are needed; from
-# degree 3 on a sample is expensive, and useless if its points lie on two components.
+_SHARE = 0.5  # the least share of the points of a component; points on special subvarieties are missing
+_SPARE = 1.2  # number of points per coefficient of a hypersurface
+# Numbers of samples of points. With more than 3 parameters a sample rarely lies on one component, so that more samples
+# are needed. From degree 3 on a sample is expensive, and useless if its points lie on two components.
 _TRIES, _TRIES_MANY_PARAMETERS, _TRIES_HIGH_DEGREE = 80, 3000, 12
 _MAX_PRODUCT_DEGREE = 12
-_MAX_SINGLE_POINTS = 400  # if more are left over, they are not isolated points
+_MAX_SINGLE_POINTS = 400  # if more points lie on no component, they are not isolated points
 
 
 @dataclass
@@ -37,8 +37,8 @@ class ModularComponents:
     """The components of a set of points modulo `prime`.
 
     `linear` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
-    `hypersurfaces` has the irreducible hypersurfaces of each affine subspace (no rows: the full space). Each is given
-    by the coefficients of the monomials of `exponents_up_to`, in their order, in the free variables of the subspace.
+    `hypersurfaces` has the irreducible hypersurfaces of each affine subspace (no rows: the full space). A hypersurface
+    is given by the coefficients, in the order of `exponents_up_to`, of monomials in the free variables of the subspace.
     """
 
     prime: int
@@ -86,8 +86,8 @@ def find_components(
                     yield tuple(map(tuple, rows)), is_inside
 
     for dimension in range(count - 1, max(min_dimension, 1) - 1, -1):
-        # Affine subspaces first, then hypersurfaces of affine subspaces of one dimension more. Largest dimension first:
-        # the points of a hyperplane would otherwise appear as many smaller components.
+        # Affine subspaces first, then hypersurfaces of affine subspaces of one dimension more. The largest dimension
+        # comes first, so that the points of a hyperplane do not appear as many smaller components.
         needed = max(_SHARE * measured / prime ** (count - dimension), dimension + 3)
         for rows, inside in affine_subspaces(dimension, needed):
             components.linear.setdefault(dimension, []).append(rows)
@@ -117,8 +117,8 @@ def _hypersurfaces(
 ) -> Iterator[tuple[Form, Any]]:
     """Yield irreducible hypersurfaces with at least `needed` of the points, each with a mask of the points on it.
 
-    The first attempt interpolates more points than there are coefficients, and finds the product of all hypersurfaces;
-    further ones interpolate just enough points to determine one hypersurface, if all of them happen to lie on it.
+    The first attempt interpolates more points than there are coefficients, and gives the product of all hypersurfaces.
+    Further attempts interpolate as many points as determine one hypersurface, if all of them happen to lie on it.
     """
     for degree in range(2, _MAX_PRODUCT_DEGREE + 1):
         size = len(exponents_up_to(points.shape[1], degree))
@@ -141,7 +141,7 @@ def _hypersurfaces(
 
 
 def degree_reached(points: float, count: int) -> int:
-    """Return the largest degree, at most `MAX_DEGREE`, of hypersurfaces that this number of points determines.
+    """Return the largest degree, at most `MAX_DEGREE`, such that `points` points determine hypersurfaces of it.
 
     >>> degree_reached(53, 2), degree_reached(11, 2)
     (6, 2)
@@ -151,7 +151,7 @@ def degree_reached(points: float, count: int) -> int:
 
 
 def _monomials(points: Any, degree: int, prime: int) -> Any:
-    """Return the values of all monomials up to a degree: a row for each point."""
+    """Return the values of all monomials up to a degree, one row for each point."""
     import numpy as np
 
     divisors = monomial_tables(points.shape[1], degree)
@@ -164,7 +164,7 @@ def _monomials(points: Any, degree: int, prime: int) -> Any:
 
 
 def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[tuple[Form, int]]:
-    """Return the irreducible factors of a polynomial, with first nonzero coefficient 1, and their degrees."""
+    """Return the irreducible factors of a polynomial, scaled to first nonzero coefficient 1, and their degrees."""
     context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
     terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
     factors = []

@@ -1,7 +1,7 @@
 """Search for projective changes of parameters that permute the special members of a family.
 
-A few kinds are tried: signed permutations of the parameters, the same with a shift or a factor for each parameter, and
-signed permutations of the homogeneous coordinates (a : b : ... : 1), for families whose parameters are ratios.
+Three kinds are tried: signed permutations of the parameters; signed permutations with a shift or a factor for each
+parameter; and, for families whose parameters are ratios, signed permutations of the coordinates (a : b : ... : 1).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
 Row = tuple[fmpq, ...]
-Change = tuple[Row, ...]  # a matrix that acts on (a, b, ..., 1), up to a factor: the first entry in its last row is 1
+Change = tuple[Row, ...]  # a matrix acting on (a, b, ..., 1), scaled to first nonzero entry 1 in the last row
 
 _MAX_POINTS = 24
 
@@ -28,9 +28,9 @@ _MAX_POINTS = 24
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
     """Return generators of the group of all changes of parameters that were found, as images of the parameters.
 
-    Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
-    hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a component, or
-    preserve one that is not affine, are reported.
+    Each change preserves the degrees of the special members, modulo each prime for which all members were tried, and
+    the degrees of hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a
+    component, or preserve a component that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]
@@ -50,7 +50,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
             generators.append(change)
             group = _generate_group(generators, len(names))
     texts = []
-    for change in generators:  # denominators are constants or one parameter
+    for change in generators:  # a denominator is a constant or a multiple of one parameter
         *numerators, denominator = map(format_polynomial, _images(change, names))
         if denominator == "1":
             texts.append(tuple(numerators))
@@ -60,7 +60,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
 
 
 def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
-    """Return whether every special member modulo p is mapped to one with the same degrees, or to infinity."""
+    """Return whether every special member modulo p is mapped to a member with the same degrees, or to infinity."""
     rows = residues(change, p)
     count_work(20)
     for point, degrees in special.items() if rows is not None else ():
@@ -72,7 +72,7 @@ def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) 
 
 
 def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
-    """Yield the changes to be tried; their shifts and factors take one rational point to another."""
+    """Yield the changes to be tried; their shifts and factors map a rational point component to another one."""
     signed_permutations = [
         tuple(
             tuple(fmpq(sign * (k == position)) for k in range(count + 1))
@@ -99,18 +99,18 @@ def _times(change: Change, vector: Sequence[fmpq]) -> Row:
 
 
 def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
-    """Return the numerators of the images of the parameters, and last their denominator."""
+    """Return the numerators of the images of the parameters, and as the last entry their common denominator."""
     context = ring(names)
     vector = [*context.gens(), context.constant(1)]
     return [sum((c * x for c, x in zip(row, vector, strict=True)), context.constant(0)) for row in change]
 
 
 def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
-    """Return whether the change preserves the degrees of hypersurfaces, and some component moves or is not affine."""
+    """Return whether a change preserves hypersurfaces with degrees, and some component moves or is not affine."""
     *images, denominator = _images(change, names)
 
     def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:
-        """Return the equation of the preimage; a constant if only points at infinity are mapped to the component."""
+        """Return the equation of the preimage of a component; a constant if it has only points at infinity."""
         terms = {(*m, equation.total_degree() - sum(m)): c for m, c in equation.terms()}
         form = ring([f"x{k}" for k in range(len(images) + 1)]).from_dict(terms)
         return primitive_part(form.compose(*images, denominator, ctx=denominator.context()))[1]
@@ -126,7 +126,7 @@ def _is_reportable(change: Change, components: Sequence[Component], names: Seque
         is_affine = all(equation.total_degree() == 1 for equation in component.equations)
         if component.values is None:
             is_fixed = set(map(str, preimage)) == set(map(str, component.equations))
-        else:  # tested at a random member, or at the point itself
+        else:  # tested at one member, for a point at the point itself
             is_fixed = replace(component, equations=tuple(preimage)).contains([*component.values.values()])
         is_reportable = is_reportable or not (is_affine and is_fixed)
     return is_reportable

@@ -22,17 +22,17 @@ from kahanmaps.laboratory.scan.lift import MAX_FIELD_DEGREE, SPARE_BITS, height_
 from kahanmaps.laboratory.scan.modular_components import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
-_MAX_LISTED = 12  # primes
-STEPS = 40  # for which singularities are traced to determine the growth at a member
+_MAX_LISTED = 12  # primes that are listed
+STEPS = 40  # the number of steps for which singularities are traced to determine the growth at a member
 
 
 @dataclass(frozen=True)
 class Component:
-    """A condition on the parameters: `equations`, polynomials over Q that vanish on it, found modulo `primes`.
+    """A component of parameter space on which the polynomials `equations` over Q vanish, found modulo `primes`.
 
-    `degrees` are d_1, ..., d_N there, and `confirmed` of `tried` random members have them. `values` are the parameters
-    of a rational member, None if none was found; `growth` is the growth of its degrees, and `verdict` the verdict of
-    its analysis, None if none was requested.
+    `degrees` are d_1, ..., d_N there, and `confirmed` of `tried` random members have these degrees. `values` are the
+    parameters of a rational member, None if none was found; `growth` is the growth of the degrees of this member, and
+    `verdict` the verdict of its analysis, None if no analysis was requested.
     """
 
     equations: tuple[fmpq_mpoly, ...]
@@ -63,7 +63,7 @@ class Component:
 
     @property
     def text(self) -> str:
-        """The condition: the parameters of a point, else equations."""
+        """The condition as text: the parameters of a point, or equations."""
         if self.is_rational_point:
             return self.member_text
         return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
@@ -73,7 +73,7 @@ class Component:
         return not any(evaluate(equation, QQ, point) for equation in self.equations)
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; equations as text."""
+        """Return plain data; equations are text."""
         growth = self.growth
         return {
             **attributes(self, "equations", "dimension", "primes", "confirmed", "tried", "is_confirmed", "values"),
@@ -84,23 +84,23 @@ class Component:
 
 
 def growth_on(components: Sequence[Component]) -> DegreeGrowth | None:
-    """Return the growth on components with the same degrees: the first that is known."""
+    """Return the first known growth among components with the same degrees."""
     return next((component.growth for component in components if component.growth is not None), None)
 
 
 def _abbreviate(texts: Sequence[str]) -> str:
-    """Join the texts; of many only the first three and the last one."""
+    """Join the texts; if there are many, only the first three and the last one."""
     return ", ".join(texts if len(texts) <= _MAX_LISTED else [*texts[:3], "...", f"{texts[-1]} ({len(texts)} of them)"])
 
 
 @dataclass(frozen=True)
 class Scan(PrintableResult):
-    """The result of a scan: components, those with the slowest growth first.
+    """The result of a scan: components of parameter space, in the order of increasing growth.
 
     `generic` are the degrees d_1, ..., d_N of a generic member, `sweeps` the special members modulo each prime, and
-    `unassigned` the numbers of special members on no component: they are points over number fields or of a height above
-    `height`, or special modulo this prime by chance. `symmetric` lists changes of parameters that permute the special
-    members, by their images. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was not done.
+    `unassigned` the numbers of special members on no component: points over number fields or of a height above
+    `height`, or special by chance. `symmetric` has changes of parameters that permute the special members, as images of
+    the parameters. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was not done.
     """
 
     file: SystemFile
@@ -125,13 +125,13 @@ class Scan(PrintableResult):
 
     @property
     def height(self) -> int:
-        """The bound up to which numerators and denominators in conditions are found; 0 with too few primes."""
+        """The largest numerator and denominator for which conditions are found; 0 with too few primes."""
         bounds = [height_bound([sweep.prime for sweep in sweeps]) for sweeps in self._kinds if len(sweeps) > 2]
         return min(bounds, default=0)
 
     @property
     def _kinds(self) -> tuple[list[Sweep], ...]:
-        """The sweeps over all members, those over random lines of parameter space, and those over random planes."""
+        """The sweeps over all members, over random lines of parameter space, and over random planes."""
         return (
             [sweep for sweep in self.sweeps if sweep.complete],
             *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == width] for width in (1, 2)),
@@ -139,7 +139,7 @@ class Scan(PrintableResult):
 
     @property
     def degree(self) -> int:
-        """The total degree up to which hypersurfaces with the same degrees of iterates are found."""
+        """The largest total degree of hypersurfaces, with the same degrees of iterates, that is found."""
         count = len(self.over)
         degrees = [
             degree_reached(0.75 * min(sweep.measured / sweep.prime for sweep in sweeps), count)
@@ -158,7 +158,7 @@ class Scan(PrintableResult):
 
     @property
     def coverage(self) -> str:
-        """A sentence on the members that were searched and the components that such a search finds."""
+        """A sentence on the members that were measured and on the components that can be found from them."""
         if not self.height:
             tried = counted(len(self.sweeps), "prime")
             return f"conditions need members modulo three primes, and those modulo {tried} were tried"
@@ -198,7 +198,7 @@ class Scan(PrintableResult):
     def text(self) -> str:
         """The lines of the report, each a label, a tab and its value."""
         if not self.height:
-            lines = [  # nothing was lifted: the numbers of special members by degrees
+            lines = [  # no component was lifted: the numbers of special members by degrees
                 ("special", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {sweep.prime}")
                 for sweep in self.sweeps
                 for degrees, points in sorted(sweep.classes.items())
@@ -240,7 +240,7 @@ class Scan(PrintableResult):
         if any(self.unassigned):
             counts = list(zip(self.unassigned, self.sweeps, strict=True))
             shown = [f"{n} modulo {sweep.prime}" for n, sweep in counts if n or len(counts) <= _MAX_LISTED]
-            missed_dimension = 0  # the largest dimension of a variety with this number of members
+            missed_dimension = 0  # the largest dimension of a variety with at most about n points
             for n, sweep in counts:
                 dimension = len(self.over) - 1
                 while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (
@@ -281,7 +281,7 @@ class Scan(PrintableResult):
         }
 
     def member(self, component: Component) -> SystemFile:
-        """Return the system of a rational member on a component. Raises InputError if none is known."""
+        """Return the system of a rational member on a component. Raises InputError if no such member is known."""
         if component.values is None:
             raise InputError(f"no rational member is known where {component.text}")
         return member_of(self.file, {name: x for name, x in component.values.items() if name != "eps"})

@@ -1,10 +1,10 @@
 """The search for integrable members of a family of maps: components of parameter space where degrees grow more slowly.
 
-All members with parameters in GF(p) are tried for several small primes p (`sweep`). Those with smaller degrees than a
-generic member are special. They fall into classes by their degrees, and these into components modulo each prime
-(`modular_components`); components that appear modulo all primes are lifted to conditions over Q (`lift`). A condition
-is *found modulo* these primes. It is *confirmed* if random members on it, modulo large primes, have the same degrees
-when these are computed as by `degrees`. None of this is a proof. The kind of growth is that of one rational member.
+All members with parameters in GF(p) are tried for several small primes p (`sweep`). Members with smaller degrees than a
+generic member are special. Special members with the same degrees form a class, which is decomposed into components
+modulo each prime (`modular_components`). Components that appear modulo all primes are lifted to conditions over Q
+(`lift`). A condition is *found modulo* these primes. It is *confirmed* if random members on it, modulo large primes,
+have the same degrees, computed as by `degrees`. None of this is a proof. The growth is that of one rational member.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from kahanmaps.processes import processors
 
 Progress = Callable[[str], None]
 
-UNITS = 240e6  # of counted work at effort 1, most of it that of the kernel, which sweeps on all processors
+UNITS = 240e6  # of counted work at effort 1, mostly of the kernel, which runs on all processors
 MAX_PARAMETERS = 8
-# By the number of parameters, the primes modulo which all members are tried: the preferred ones, then those for
-# families whose members are expensive. A cubic in one parameter has all its zeros modulo one prime in 6.
+# For each number of parameters the primes modulo which all members are tried: the preferred list, then lists for
+# families with expensive members. A cubic in one parameter has all its zeros in GF(p) for one prime in 6.
 _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     1: (
         tuple(p for p in range(307, 500) if fmpz(p).is_prime()),
@@ -55,16 +55,16 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
 }
 # Further primes, as many as the budget allows, if the remaining members may be points over number fields.
 _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
-# The primes for members on random lines of parameter space. Every field Q(sqrt(d)) with |d| <= 10 splits modulo three
-# of them: otherwise hypersurfaces that split over such a field would have no points to be found.
+# The primes for members on random lines of parameter space. Each field Q(sqrt(d)) with |d| <= 10 splits modulo three of
+# them: a hypersurface that splits over such a field has points on lines only modulo primes that split.
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
-_LINE_FACTOR = 4  # factor for the number of lines if hypersurfaces were missed
+_LINE_FACTOR = 4  # by which the number of lines grows if hypersurfaces were missed
 _MANY_LINES = (150, 60)
-# The number of random planes, for components that lines do not meet, and the primes.
+# The number of random planes, which meet components that lines do not meet, and their primes.
 _PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
 _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
-# The shares of the budget at which sweeps, conditions, confirmation and growth end.
+# The shares of the budget after which sweeps, conditions, confirmation and growth end.
 _STAGE_ENDS = (0.6, 0.75, 0.85, 0.9)
 # Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
 _DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
@@ -72,12 +72,12 @@ _MAX_LENGTH = 4096
 _TRIAL_PRIME = 8179  # so large that hardly any member is special
 _MAX_TERMS = 7
 _CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
-_TRIES = 20  # to find a rational member
+_TRIES = 20  # attempts to find a rational member
 _GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member
-# Without a rational member: how many degrees are measured, and their bound.
+# For the growth without a rational member: the number of degrees that are measured, and a bound of the degrees.
 _FITTED_TERMS, _MAX_FITTED_DEGREE = 26, 1000
 _COMPARED_DEGREE = 100  # degrees are compared at least up to this value
-# Growths that components with the same degrees do not share.
+# Kinds of growth that are measured on each component, also if components have the same degrees.
 _MEASURED_ON_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
@@ -101,22 +101,22 @@ def scan(
     Args:
         system: the family; its claims are ignored.
         over: names of the parameters that vary; the others keep the values of the file. eps may be one of them.
-        eps: half the time step (exact), or None for generic eps: conditions that hold for every eps.
+        eps: half the time step (exact), or None for generic eps: the conditions then hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
-        terms: the number of iterates that are measured; by default those of small degree, at most 7.
-        primes: at least three primes; by default there are some ten thousand members modulo them.
-        effort: an integer; each increase by 1 doubles the work limit. Anything skipped is reported.
+        terms: the number of iterates that are measured; by default at most 7, all of small degree.
+        primes: at least three primes; the default has some ten thousand members modulo all primes.
+        effort: an integer; each increase by 1 doubles the work limit. Stages that are skipped are reported.
         seed: the random seed.
         jobs: the number of threads, which need numba; by default the number of processors.
-        analysis: the effort of an analysis of one member on each component whose degrees do not grow exponentially;
-            of several points with the same degrees, only one is analyzed. None: no analyses.
+        analysis: the effort for an analysis of one member on each component whose degrees do not grow exponentially;
+            only one of several points with the same degrees is analyzed. None: no analyses.
         progress: called repeatedly with a message; a TimeOver that it raises, or a TimeLimit, ends the scan early.
 
     Returns:
         A `Scan`. Conditions are found modulo primes and confirmed at members; this is evidence, not proof.
 
     Raises:
-        InputError: for unknown parameters, wrong primes, a map that is nowhere defined.
+        InputError: for unknown parameters, unsuitable primes, or a map that is nowhere defined.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lines = parse_system('''variables = ["x", "y"]
@@ -175,7 +175,7 @@ def scan(
     )
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
     components.sort(key=lambda component: component.degrees[::-1])
-    # Growth that is measured on one component only; others with the same degrees share it if more degrees agree.
+    # Growth that is measured on one component; other components with the same degrees share it if more degrees agree.
     shared: dict[Degrees, DegreeGrowth] = {}
 
     def with_growth(component: Component, _: Callable[[], None]) -> Component:
@@ -196,7 +196,7 @@ def scan(
     }
     components.sort(key=lambda c: (OF_DEGREES.index(kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
-        analyzed: set[Degrees] = set()  # the degrees of points that were analyzed
+        analyzed: set[Degrees] = set()  # the degree sequences of points that were analyzed
 
         def with_verdict(component: Component, _: Callable[[], None]) -> Component:
             is_exponential = component.growth is None or component.growth.growth is Growth.EXPONENTIAL
@@ -262,12 +262,12 @@ class _ScanRun:
         return check
 
     def omit(self, missed: int, text: str) -> None:
-        """Record what was omitted, if `missed` is not 0."""
+        """Record `text`, a phrase on what was omitted, if `missed` is not 0."""
         if missed:
             self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
-        """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are not the largest ones."""
+        """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are smaller than those of others."""
         self.planned_members += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
@@ -300,10 +300,10 @@ class _ScanRun:
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def more_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
-        """Plan new and more random lines, if a hypersurface was probably missed on the present ones.
+        """Plan more random lines, all new, if a hypersurface was probably missed on the lines so far.
 
-        A hypersurface was probably missed if there are as many unassigned members as it has points. The plan is empty
-        if none was missed, or if it needs more than `max_members` members.
+        A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
+        plan is empty if none was missed, or if the plan would need more than `max_members` members.
         """
         lines = [sweep for sweep in self.sweeps if sweep.on_lines]
         plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
@@ -319,7 +319,7 @@ class _ScanRun:
         """Plan further primes if points were probably missed, with at most `max_members` members in total.
 
         Points were probably missed if there are unassigned members, but fewer than a curve (on random lines: a
-        hypersurface) has points. The plan is empty if none were missed, or if the user gave the primes.
+        hypersurface) has points. The plan is empty if no points were missed, or if the user gave the primes.
         """
         sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(
@@ -357,7 +357,7 @@ class _ScanRun:
         return results, missed
 
     def components(self, rng: random.Random) -> tuple[list[Component], int]:
-        """Return the components, smaller degrees first, and the number of degree sequences not searched for them."""
+        """Return the components, smaller degrees first, and the number of degree sequences that were not searched."""
         names, classes = self.family.names, sorted({degrees for sweep in self.sweeps for degrees in sweep.classes})
         components, missed = self.apply(
             classes,
@@ -370,11 +370,11 @@ class _ScanRun:
 
 
 def _measure_growth(component: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
-    """Return the growth at a rational member; without one, or if it is special, the growth fitted to more degrees."""
+    """Return the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees."""
     growth = None
     if component.values is not None:
         member, eps_of_member = family.member(component.values)
-        for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps, which may be special
+        for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
             growth = degree_growth(
                 member.map,
                 eps_of_member,
@@ -400,7 +400,7 @@ def _fit_growth(component: Component, family: Scanned, max_degree: int = _MAX_FI
 
 
 def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: Scanned) -> bool:
-    """Return whether further degrees agree with those of a member on another component with the same first degrees."""
+    """Return whether further degrees agree with the growth on another component with the same first degrees."""
     if other_growth is None:
         return False
     growth = _fit_growth(component, family, max(_COMPARED_DEGREE, 2 * component.degrees[-1]))
@@ -412,7 +412,7 @@ def _agree(first: Degrees, second: Degrees) -> bool:
 
 
 def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members: float) -> list[Choice]:
-    """Choose primes, each with the number of random lines or planes in parameter space, or None for all members.
+    """Choose primes, each with a number of random lines or planes in parameter space, or with None for all members.
 
     Returns the largest plan that needs at most `max_members` members.
     """
@@ -437,7 +437,7 @@ def _choose_terms(
 ) -> tuple[int, int, float]:
     """Return how many iterates are measured, a bound of the lengths of polynomials, and the units per member.
 
-    They are determined from a few members modulo a larger prime.
+    These numbers are determined from a few members modulo a larger prime.
     """
     import numpy as np
 
@@ -456,7 +456,7 @@ def _choose_terms(
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
     max_length = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: measured - 1]])
-    # Compile the kernel now: there are no results yet that Ctrl-C could interrupt.
+    # Compile the kernel now, since Ctrl-C during the compilation loses no results.
     family.degrees(np.resize(members, (LONG, parameter_count)), eps, 1, max_length, random.Random(0))
     return measured, max_length, family.units([1, *degrees[:measured]])
 
@@ -468,7 +468,7 @@ def _confirm(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> Component:
-    """Measure random members on a component, and search for a rational member that is on no smaller component."""
+    """Measure random members on a component, and search for a rational member outside of smaller components."""
     sequences, names = [], family.names
     for _ in range(_CONFIRMING_MEMBERS):
         check()

@@ -1,8 +1,8 @@
-"""Degree sequences of the members of a family modulo a small prime, and the members whose degrees are smaller.
+"""Degree sequences of the members of a family modulo a small prime, and the special members with smaller degrees.
 
-The degrees of any member are at most those of a generic one. So the largest degrees at each step are the generic
-sequence, and a member with another sequence is *special*. A generic member on a line in special position looks special,
-too: so special members are measured on further lines until none of them turns out to be generic.
+The degrees of any member are at most the degrees of a generic member. So the largest degrees at each step are the
+generic sequence, and a member with another sequence is *special*. On a line in special position a generic member looks
+special, too. So special members are measured on further lines until none of them turns out to be generic.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Degrees = tuple[int, ...]
 Choice = tuple[int, int | None, int]  # a prime, the number of affine subspaces (None: all members), their dimension
 
 _BATCH_SIZE = 512
-_MIN_LINES, _MAX_LINES = 3, 12  # on which a special member is measured
+_MIN_LINES, _MAX_LINES = 3, 12  # the numbers of lines on which a special member is measured
 
 
 class TimeOver(Exception):
@@ -35,9 +35,9 @@ class TimeOver(Exception):
 class Sweep:
     """The special members modulo one prime: `classes` maps degrees to points.
 
-    `generic` are the degrees of all other members that were `measured` (their number). If not `complete`, only members
-    on random affine subspaces of dimension `width` were measured. `false_alarms` counts generic members that looked
-    special on their first line.
+    `measured` is the number of measured members, and `generic` are the degrees of those that are not special. If not
+    `complete`, only members on random affine subspaces of dimension `width` were measured. `false_alarms` counts
+    generic members that looked special on their first line.
     """
 
     prime: int
@@ -50,7 +50,7 @@ class Sweep:
 
     @property
     def on_lines(self) -> bool:
-        """Whether only members on random lines were measured; these rarely meet anything but hypersurfaces."""
+        """Whether only members on random lines were measured; lines rarely meet components other than hypersurfaces."""
         return not self.complete and self.width == 1
 
     @property
@@ -60,7 +60,7 @@ class Sweep:
 
 
 def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.Random) -> Iterator[Point]:
-    """Yield all points of GF(p)^count, or those on random affine subspaces; `on` is their number and dimension."""
+    """Yield all points of GF(p)^count, or the points of random affine subspaces, with number and dimension `on`."""
     if on is None:
         yield from product(range(prime), repeat=count)
         return
@@ -93,8 +93,8 @@ def sweep(
 
     Args:
         map_: the family; its symbols are the parameters that vary.
-        count: the number of parameters that vary. If it is one more than that of the symbols, eps is the last
-            parameter; it is never 0.
+        count: the number of parameters that vary. If it is one more than the number of symbols, eps is the last
+            parameter, with values other than 0.
         prime: the prime.
         eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
         terms: the number of degrees.
@@ -104,7 +104,7 @@ def sweep(
         seed: the random seed.
         jobs: as for `Family.degrees`.
         check: called repeatedly; may raise TimeOver.
-        progress: called with the number of members done and their total.
+        progress: called with the number of measured members and the number of all members.
 
     Raises:
         InputError: if the map is nowhere defined, or the degrees are too large.
@@ -138,7 +138,7 @@ def sweep(
     for line in range(1, _MAX_LINES):
         if not len(special):
             break
-        # The degree of an iterate is the largest on any line; a line in special position can only lower it.
+        # The degree of an iterate is the largest degree on all lines; a line in special position can only lower it.
         earlier, on_new_line = degrees[special], measure([points[i] for i in special])
         degrees[special] = np.maximum(earlier, on_new_line)
         still_special = special[(degrees[special] != generic).any(axis=1)]

@@ -2,16 +2,15 @@
 
 Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
 contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or
-infinity Z = 0, or a zero of det M'(F(X)). Of these forms only det M, det M' and their factors over Q are expanded,
-which are short. On a random line modulo a prime their zeros are points. Points with the same multiplicities at all
-steps are taken to represent one hypersurface.
+infinity Z = 0, or a zero of det M'(F(X)). Only det M, det M' and their factors over Q are expanded; they are short. The
+zeros of all forms on a random line modulo a prime are points. Points with the same multiplicities at all steps are
+taken to represent one hypersurface.
 
-Along a curve only the orders of forms are known, and each form is a product of powers of hypersurfaces. The exponents
-are the orders at the points themselves, and so linear equations give the multiplicities and degrees of the
-hypersurfaces. Where these equations do not suffice, because several hypersurfaces are zeros of one form over Q, the
-forms are factored on surfaces through the curves: restricted to a generic ruled surface, an irreducible factor of a
-form in many variables stays irreducible (Bertini), with its degree. So a polynomial of two variables is factored where
-the form itself would be too large.
+Along a curve only the orders of forms are known, and each form is a product of powers of equations of hypersurfaces.
+The exponents are the orders of the form at the points of the hypersurfaces. So linear equations give the multiplicities
+and degrees of the hypersurfaces. If these equations do not suffice, because several hypersurfaces are zeros of one form
+over Q, the forms are factored on surfaces through the curves. On a generic ruled surface an irreducible factor of a
+form stays irreducible and keeps its degree (Bertini). So only polynomials of two variables are factored.
 """
 
 from __future__ import annotations
@@ -42,9 +41,9 @@ Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 
 @dataclass(frozen=True)
 class HypersurfaceComponent:
-    """A component of zero sets: its exponents in the forms, its degree, and its equation on the surface (t, u).
+    """A component of the zeros of forms: its exponents in the forms, its degree and its equation on the surface (t, u).
 
-    `order` is its order along the curve u = 0; None if it contains the curve.
+    `order` is the order of the equation along the curve u = 0; None if the component contains the curve.
     """
 
     exponents: tuple[int, ...]
@@ -54,7 +53,7 @@ class HypersurfaceComponent:
 
     @property
     def kind(self) -> Kind:
-        """The data by which components are distinguished."""
+        """The exponents and the degree, by which components are distinguished."""
         return self.exponents, self.degree
 
     def roots(self, t: int) -> list[int]:
@@ -69,10 +68,10 @@ class HypersurfaceComponent:
 def components(
     equation: Equation, forms: Sequence[tuple[Any, bool]], curve: Sequence[nmod_poly], direction: Sequence[int]
 ) -> list[HypersurfaceComponent]:
-    """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
+    """Return the components of the zeros of forms on the surface curve(t) + u direction, in P^n over GF(p).
 
-    Each form over Q has a flag, whether it is evaluated at the image of the point under the map of the equation.
-    `direction` must be random, so that degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
+    Each form over Q comes with a flag: whether it is evaluated at the image of the point under the map of the equation.
+    `direction` is random, so that components have the degrees of hypersurfaces. Exact on the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)
     ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
@@ -102,25 +101,25 @@ def components(
     ]
 
 
-_MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
-_REPEATED = 4  # after this number of equal multiplicities for the same orders of forms, they are not computed again
-_DISTINGUISHING_STEPS = 12  # first steps, by which hypersurfaces are distinguished
+_MIN_LINES, _MAX_LINES = 8, 24  # each modulo its own prime, until two have points of every hypersurface
+_REPEATED = 4  # equal multiplicities for the same orders of forms, after which they are not computed again
+_DISTINGUISHING_STEPS = 12  # the number of first steps by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
-_TRIES = 16  # lines on a surface, for a point of a component
-_PRECISION = 8  # of the orders at points themselves
-_BITS = 31  # of primes: with larger ones python-flint does not order the factors of polynomials in several variables
+_TRIES = 16  # the number of lines on a surface that are searched for a point of a component
+_PRECISION = 8  # of the series for the orders before the first step
+_BITS = 31  # of primes; for larger primes python-flint does not order the factors of multivariate polynomials
 
 
-Key = tuple[Any, ...]  # whether it is contracted; its orders in the poles, in Z and in all forms; its first rows
+Key = tuple[Any, ...]  # whether it is contracted; the orders in the poles, in Z and in all forms; its first rows
 
 
 class OrbitDataUnknown(ArithmeticError):
-    """Raised where the multiplicities along the hypersurfaces cannot be determined."""
+    """Raised if the multiplicities along the hypersurfaces cannot be determined."""
 
 
 @dataclass(frozen=True)
 class _Forms:
-    """The factors over Q of det M, which are evaluated at a point, those of det M', evaluated at its image, and Z."""
+    """Z, the factors over Q of det M (evaluated at a point) and of det M' (evaluated at the image of the point)."""
 
     poles: tuple[Any, ...]
     images: tuple[Any, ...]
@@ -128,7 +127,7 @@ class _Forms:
 
     @property
     def all(self) -> list[tuple[Any, bool]]:
-        """The forms in the order of columns, each with whether it is evaluated at the image; a form may occur twice."""
+        """Pairs of a form and whether it is evaluated at the image, in the order of columns; a form may occur twice."""
         at_points = [(form, False) for form in self.poles]
         return [*at_points, *((form, True) for form in self.images), (self.infinity, False)]
 
@@ -137,8 +136,9 @@ class _Forms:
 class _Curve:
     """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
-    `across` is another random vector, which spans surfaces. `minor_exponents` are the exponents of the forms in the
-    common factor of the minors of the equation, which does not belong to the map. `limits` bound the number of steps.
+    `across` is a random vector that spans surfaces through the curve. `minor_exponents` are the exponents of the forms
+    in the common factor of the minors of the equation, which is not part of the map. `limits` bound the number of
+    steps.
     """
 
     equation: Equation
@@ -167,14 +167,14 @@ class _Curve:
 
     @cached_property
     def initial_orders(self) -> tuple[int, ...]:
-        """The orders of the forms at the point itself."""
+        """The orders of the forms along the curve before the first step."""
         return tuple(function(self.line, _PRECISION) or 0 for function in self.functions)
 
     @cached_property
     def key(self) -> Key:
         """The key of the hypersurface: whether it is contracted, which forms vanish on it, and the first `rows`.
 
-        Raises OrbitDataUnknown where there is no first step.
+        Raises OrbitDataUnknown if the first step cannot be computed.
         """
         run = self.test_curve(self).steps(_DISTINGUISHING_STEPS)[0]
         if not run:
@@ -191,7 +191,7 @@ class _Curve:
         )
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `OrbitData` for steps along the curve but the last, with forms in place of hypersurfaces."""
+        """The rows of `OrbitData` for all steps but the last, with orders of forms instead of hypersurfaces."""
         return tuple(
             (mu, *orders)
             for mu, orders in zip(
@@ -211,11 +211,11 @@ class _Curve:
         return form_orders
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
-        """Return the components of the forms on a surface through any curve."""
+        """Return the components of the forms on the surface that `across` spans through `curve`."""
         return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return this curve at a point of a component on the surface through `curve`. Raises OrbitDataUnknown."""
+        """Return such a curve through a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
@@ -224,7 +224,7 @@ class _Curve:
 
     @cached_property
     def components_with_points(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
-        """Return all components on a plane, each with a curve through one of its points; empty if one has none."""
+        """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
         try:
             return [(component, self.through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:
@@ -235,10 +235,10 @@ class _Curve:
 class _Resolved:
     """The rows of `OrbitData`: the orders of hypersurfaces along a curve, computed from the orders of forms.
 
-    `exponents` are those of the hypersurfaces in the forms; its `left_inverse` turns orders of forms into orders of
-    hypersurfaces, and the results are checked. If it is None, forms are factored on surfaces: `keys_of_kind` has the
-    keys of the hypersurfaces with components of a kind, `keys` all keys in the order of the hypersurfaces, and
-    `multiplicities` the results after each number of steps.
+    `exponents` is the matrix of the exponents of hypersurfaces in the forms. Its `left_inverse` turns orders of forms
+    into orders of hypersurfaces, which are checked. If there is no left inverse (None), forms are factored on surfaces:
+    `keys_of_kind` has the keys of the hypersurfaces with components of a kind, `keys` all keys in the order of the
+    hypersurfaces, and `multiplicities` the results after each number of steps.
     """
 
     curve: _Curve
@@ -269,11 +269,11 @@ class _Resolved:
         return tuple(rows)
 
     def _on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
-        """The orders of hypersurfaces along a curve, from factors of forms on a surface. Raises OrbitDataUnknown."""
+        """Return orders of hypersurfaces along a curve, from factors of forms on a surface. Raises OrbitDataUnknown."""
         nu, largest = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
         if largest == 0:
             return nu
-        # Equal orders of forms often have the same multiplicities; otherwise the fewest terms that show them are taken.
+        # Equal orders of forms often have the same multiplicities. If not, take the fewest terms that suffice.
         known = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
         if len(known) >= _REPEATED and all(column == known[0] for column in known):
             return known[0]
@@ -303,11 +303,11 @@ class _Resolved:
 def exceptional_hypersurfaces(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range
 ) -> tuple[int, list[Hypersurface]]:
-    """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
+    """Return the degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
-    Hypersurfaces with the same orders count as one. The equation of the map and that of its inverse must be linear in
-    the point. Points modulo random primes are followed. If the forms do not distinguish the hypersurfaces, their
-    degrees are set to 0 and their orders are those of the forms. Raises OrbitDataUnknown.
+    Hypersurfaces with the same orders count as one. The equations of the map and of its inverse must be linear in the
+    point. Points modulo random primes are followed. If the forms do not distinguish the hypersurfaces, the degrees are
+    set to 0, and orders of forms replace orders of hypersurfaces. Raises OrbitDataUnknown.
     """
     map_at_eps = map_.at(eps)
 
@@ -331,13 +331,13 @@ def exceptional_hypersurfaces(
         degree, zeros, curves = _on_line(map_at_prime.factors[0], forms, functions, limits, rng)
         for curve in curves:
             curves_by_key.setdefault(curve.key, []).append(curve)
-        # A hypersurface that splits over an extension has points modulo some primes only.
+        # A hypersurface that splits over an extension of Q has points in GF(p) for some primes p only.
         if line >= _MIN_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in curves_by_key.values()):
-            curves_by_key = dict(sorted(curves_by_key.items()))  # the same order for all random choices
+            curves_by_key = dict(sorted(curves_by_key.items()))  # an order that does not depend on random choices
             try:
                 return degree, _resolved(curves_by_key, forms, degree, zeros)
             except OrbitDataUnknown:
-                continue  # a hypersurface without points modulo the primes so far
+                continue  # some hypersurface has no points modulo the primes so far
     if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in curves_by_key.values()):
         raise OrbitDataUnknown("the exceptional hypersurfaces could not be distinguished by random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
@@ -347,7 +347,7 @@ def exceptional_hypersurfaces(
 
 
 def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
-    """The exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
+    """Return the exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
     keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     form_degrees = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
@@ -372,7 +372,7 @@ def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, keys_of_kind)))
     if exponents * degrees != total_degrees or sum(degrees.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
-    # Orders on hypersurfaces that are not contracted are not needed.
+    # Orders in hypersurfaces that are not contracted are not needed.
     contracted = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in degrees.entries()], contracted)
 
@@ -380,7 +380,7 @@ def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int
 def _followed(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], degrees: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
-    """The exceptional hypersurfaces with these columns of their patterns, by two primes. Raises OrbitDataUnknown."""
+    """Return the exceptional hypersurfaces with these columns of their patterns, modulo two primes."""
     hypersurfaces = []
     for degree, (key, pairs) in zip(degrees, curves.items(), strict=True):
         if key[0]:
@@ -422,7 +422,7 @@ def _on_line(
     degree = max(int(entry.degree()) for entry in image)
     at_points = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
     at_images = [evaluate(form, map_.field, image) for form in forms.images]
-    point_exponents = []  # how often each divides the common factor
+    point_exponents = []  # the exponent of each form in the common factor
     for value in at_points:
         quotient, exponent = common, 0
         while value.degree() > 0 and (quotient % value).is_zero():

@@ -1,8 +1,8 @@
-"""The multiplicities along an exceptional hypersurface, step by step: its singularity pattern.
+"""The singularity pattern of an exceptional hypersurface: the multiplicities along its images after 1, 2, ... steps.
 
 A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out:
-its exponent mu is the multiplicity with which the image lies in the indeterminacy locus. The multiplicities nu with
-which it lies in the critical hypersurfaces are their orders along the image. Series are computed until it has settled.
+its exponent mu is the multiplicity of the indeterminacy locus at the image. The multiplicities nu of the critical
+hypersurfaces are the orders of their forms along the image. Series are computed until the pattern has settled.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-# Numbers of terms of long series: the cost of a step is at least proportional to them.
+# Numbers of terms of long series: the work of a step is at least proportional to the number.
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
-_CONSTANT = 8  # a column is constant if its last entries, at least this number, are equal
-_CONFIRMING_ORDERS = 4  # that must satisfy a recurrence, beyond those that determine it
+_CONSTANT = 8  # a column counts as constant if at least this number of last entries are equal
+_CONFIRMING_ORDERS = 4  # orders that must satisfy a recurrence, beyond the orders that determine it
 _FREE_STEPS = 100  # steps for which a confined hypersurface is followed
 
 
@@ -48,8 +48,8 @@ class OrbitData:
 
     If it `is_settled`, the rows are known for all steps, in one of three cases. The columns satisfy the `recurrences`,
     given by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th
-    hypersurface, whose pattern continues this one. Otherwise all later rows are zero up to the step `followed`, except
-    for unknown multiplicities in the hypersurfaces of `eventually_in`, in which the images lie again and again.
+    hypersurface, whose pattern continues this one. Or all later rows up to the step `followed` are zero, except for
+    unknown multiplicities in the hypersurfaces of `eventually_in`, in which the images lie again and again.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -61,7 +61,7 @@ class OrbitData:
 
     @property
     def compared(self) -> tuple[object, ...]:
-        """The data in which two points on one hypersurface have to agree."""
+        """The data that must be equal for two points on one hypersurface."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property
@@ -73,7 +73,7 @@ class OrbitData:
 
     @property
     def sentences(self) -> list[str]:
-        """Two phrases: the steps at which the degree drops; the exceptional hypersurfaces in which images lie."""
+        """Two phrases: on steps at which the degree drops, and on exceptional hypersurfaces in which images lie."""
         rows = self.rows[: self.settled_at]
         drops = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
         incidences = [
@@ -103,12 +103,12 @@ class OrbitData:
 
     def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
         """Return the data with the columns of these hypersurfaces only."""
-        columns = [0, *(1 + k for k in hypersurfaces)]  # of orders without a return
+        columns = [0, *(1 + k for k in hypersurfaces)]  # mu, and nu for each of the hypersurfaces
         rows = tuple(tuple(row[k] for k in columns) for row in self.rows)
         return replace(self, rows=rows, recurrences=tuple(self.recurrences[k] for k in columns if self.recurrences))
 
     def generating_function(self, column: int) -> Fraction:
-        """The generating function of a column (entries times z, z^2, ...), as a fraction; up to the return.
+        """Return the generating function of a column (entries times z, z^2, ...); any `continues_as` is ignored.
 
         >>> OrbitData(((1,), (2,), (4,)), (fmpz_poly([-2, 1]),)).generating_function(0)
         (x, (-2)*x + 1)
@@ -138,16 +138,16 @@ class AlongCurves(Protocol):
         """The functions in the form that `images_of_curve` takes."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the power that is divided out and the orders of hypersurfaces, for all steps or the first ones."""
+        """Return the power of t that is divided out and the orders of hypersurfaces, for all or the first steps."""
 
 
 @dataclass(frozen=True)
 class Tracked:
     """The functions whose orders are measured along curves through a hypersurface.
 
-    `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which does
-    not belong to the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
-    first `critical` of them are those of exceptional hypersurfaces.
+    `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
+    not part of the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
+    first `critical` functions belong to exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
@@ -164,7 +164,7 @@ class Tracked:
 
 
 def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_exponents: Sequence[int]) -> list[int]:
-    """The powers of t that are divided out, without those that belong to the common factor of the minors.
+    """Return the powers of t that are divided out, without the contributions of the common factor of the minors.
 
     `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
     """
@@ -183,9 +183,9 @@ class Range:
     """The number of steps for which hypersurfaces are followed: `shown` along series, and `reach` in all.
 
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
-    point of the image is followed, which is fast. If it reaches the locus, series are needed, which are slow: for at
-    most `series_steps` steps, or `repeating_steps` if multiplicities repeat and every step uses up terms, so that the
-    series must be long. The computation stops when the `budget` is spent.
+    point of the image is followed, which is fast. If this point reaches the locus, slow series are computed, for at
+    most `series_steps` steps. If multiplicities repeat and every step uses up terms, the series must be long, and the
+    limit is `repeating_steps`. The computation stops when the `budget` is spent.
     """
 
     shown: int
@@ -215,7 +215,7 @@ class TestCurve:
     ) -> tuple[list[JetStep], bool]:
         """Return steps along series of sufficient length, and whether budget and precision allowed all `count` of them.
 
-        With tangents no function is tracked.
+        If tangents are given, no function is tracked.
         """
         precision = 8
         functions = () if tangents else self.tracked.functions
@@ -241,9 +241,9 @@ class TestCurve:
         return tuple(run)
 
     def orbit_data_until_return(self, up: int) -> OrbitData:
-        """The orders along a curve if the image is a hypersurface again after the step `up`.
+        """Return the orders along a curve whose image is a hypersurface again after the step `up`.
 
-        If the image is a critical hypersurface after some step, the later orders are those of that hypersurface.
+        If the image is a critical hypersurface after some step, the pattern of the latter gives the later orders.
         """
         steps = self.limits.shown
         reach = min(self.limits.reach, steps + _FREE_STEPS)
@@ -256,7 +256,7 @@ class TestCurve:
                         raise NotGeneric("a point on several critical hypersurfaces")
                     return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
             event, reached = self._next_event(run[-1].limit, len(run), reach)
-            if event is None or not self.tracked.functions:  # nothing is needed beyond the next indeterminacy point
+            if event is None or not self.tracked.functions:  # no orders are needed beyond the next indeterminacy point
                 return OrbitData(rows[:up], (), reached, True)
             steps = event
 
@@ -281,7 +281,7 @@ class TestCurve:
                 recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CONFIRMING_ORDERS)
                 for recurrence in recurrences
             )
-            is_cut = not is_complete and not limits.budget.is_spent  # by the precision
+            is_cut = not is_complete and not limits.budget.is_spent  # the largest precision did not suffice
             is_far = len(run) >= min(limits.reach, limits.series_steps)
             if (
                 rows
@@ -307,10 +307,10 @@ class TestCurve:
             steps = longest
 
     def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the critical hypersurfaces that the orbit of a point meets, if the orbit closes; otherwise None.
+        """Return the critical hypersurfaces that the orbit of a point meets, or None if the orbit is not periodic.
 
-        None also if a point of the orbit is an indeterminacy point, so that a power of t would be divided out. The map
-        is evaluated along lines in the direction of the curve.
+        Also returns None if a point of the orbit is an indeterminacy point, where a power of t would be divided out.
+        The map is evaluated along lines in the direction of the curve.
         """
         tracked, p = self.tracked, self.prime
         if not isinstance(tracked, Tracked) or isinstance(self.equations, Letters):
@@ -335,7 +335,7 @@ class TestCurve:
     def _next_event(self, limit: Sequence[int], steps: int, reach: int) -> tuple[int | None, int]:
         """Follow a point to the next step at which the map is undefined or a tracked function is zero.
 
-        Returns this step, None if there is none up to `reach`, and the step up to which the point was followed.
+        Returns this step (None if there is no such step) and the step up to which the point was followed.
         """
         point: Sequence[int] = limit
         for step in range(steps + 1, reach + 1):
@@ -352,6 +352,6 @@ class TestCurve:
 
 
 def _normal(point: Sequence[int], p: int) -> tuple[int, ...]:
-    """The coordinates of a point with the first one that is not zero as 1."""
+    """Return the coordinates of a point, divided by the first nonzero coordinate."""
     inverse = pow(next(x for x in point if x), -1, p)
     return tuple(x * inverse % p for x in point)

@@ -1,8 +1,8 @@
 """Images of curves in projective space, with their tangent directions, under a map over GF(p)((t)).
 
-Coordinates are power series in t, known up to a power of t. They are homogeneous, so that the only divisor is a common
-power of t. For the differential a curve has neighbours, which are shifted by t^N in tangent directions: t^N acts like a
-number whose square is 0, and the terms from t^N to t^2N give the derivative.
+Coordinates are power series in t, known up to a power of t. They are homogeneous, so that only common powers of t are
+divided out. The differential is computed from neighbours of the curve, which are shifted by t^N in tangent directions:
+t^N acts like a number whose square is 0, and the terms from t^N to t^2N give the derivative.
 """
 
 from __future__ import annotations
@@ -25,37 +25,37 @@ Function = Callable[[Sequence[nmod_poly], int], int | None]
 
 
 Pivot = tuple[int, int, int]  # an exponent of t, a row and a column
-_MIN_ELIMINATION_DIMENSION = 4  # in which elimination takes fewer steps than minors
+_MIN_ELIMINATION_DIMENSION = 4  # the least dimension in which elimination needs fewer operations than minors
 _LOW_PRECISION = 4  # terms that usually suffice to see the order of a function
 
 
 class PrecisionTooLow(ArithmeticError):
-    """The series have too few terms: start again with a higher precision."""
+    """Raised if the series have too few terms; the caller starts again with a higher precision."""
 
 
 class NotGeneric(ArithmeticError):
-    """The point is in special position on its hypersurface: take another."""
+    """Raised if the point is in special position on its hypersurface; the caller takes another point."""
 
 
 class Letters(tuple[Equation, ...]):
     """The maps of a composition: equations that are applied periodically, one in each step.
 
-    A function belongs to one of the maps: it is evaluated after the number of steps given in `places`, and again
-    whenever all maps have been applied once more.
+    A function belongs to one of the maps. It is evaluated first after the number of steps given in `places`, and then
+    after every period of the composition.
     """
 
     places: tuple[int, ...] = ()
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of a step, counted from 1: for a composition those of one map, otherwise all."""
+    """Return the equations of a step, counted from 1: one equation for `Letters`, otherwise all equations."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
 
 
 def orders_of(
     equations: Sequence[Equation], functions: Sequence[Function], step: int, X: Sequence[nmod_poly], precision: int
 ) -> list[int | None]:
-    """Return the orders of functions along a curve after a step; 0 for functions of another map of a composition."""
+    """Return the orders of functions along a curve after a step; 0 for a function that belongs to another map."""
     if isinstance(equations, Letters):
         is_due = [(step - place) % len(equations) == 0 for place in equations.places]
         return [function(X, precision) if due else 0 for function, due in zip(functions, is_due, strict=True)]
@@ -63,7 +63,7 @@ def orders_of(
 
 
 def valuation(series: nmod_poly, precision: int) -> int | None:
-    """Return the exponent of the first nonzero term below t^precision, None if there is none.
+    """Return the exponent of the first nonzero term below t^precision; None if all these terms are 0.
 
     >>> valuation(nmod_poly([0, 0, 3], 7), 5)
     2
@@ -73,10 +73,10 @@ def valuation(series: nmod_poly, precision: int) -> int | None:
 
 @dataclass(frozen=True)
 class JetStep:
-    """The result of one step: valuations in t (None if at least the precision), and the rank of the differential.
+    """The result of one step: valuations in t (None: at least the precision), and the rank of the differential.
 
     Attributes:
-        common: the power of t divided out of all coordinates; for several factors that of their composed minors.
+        common: the power of t divided out of all coordinates, or for several factors out of their composed minors.
         pole: the valuation of Z at the image, where the least valuation of all coordinates is 0.
         denominator: the valuation of det(I - eps f') at the point before the step.
         rank: the rank of the differential of the map from the hypersurface to the limits of its points.
@@ -102,10 +102,10 @@ def images_of_curve(
     tangents: Sequence[Sequence[int]] = (),
     functions: Sequence[Function] = (),
 ) -> Iterator[JetStep]:
-    """Yield steps without end of the curve point + t direction, with its neighbours in the tangent directions.
+    """Yield all successive steps of the curve point + t direction, with its neighbours in the tangent directions.
 
-    Exact. The equations of the map are over GF(p); points and vectors are residues (X : Z). Give either tangents, for
-    the rank, or `functions`, for their orders. Raises PrecisionTooLow and NotGeneric.
+    Exact. The equations of the map are over GF(p); points and vectors are residues (X : Z). Give either `tangents`, to
+    compute the rank, or `functions`, to compute their orders. Raises PrecisionTooLow and NotGeneric.
     """
     prime = equations[0].over.characteristic
     shift = precision if tangents else 0  # N: neighbours differ by multiples of t^N
@@ -123,7 +123,7 @@ def images_of_curve(
                 raise PrecisionTooLow
             precision -= common
             curves = [[entry.truncate(shift + precision) for entry in curve] for curve in images]
-            # The differences between the coordinates of the neighbours and those of the curve.
+            # The differences between the coordinates of the neighbours and of the curve.
             differences = [b - a for neighbour in curves[1:] for a, b in zip(curves[0], neighbour, strict=True)]
             if not all(difference.truncate(shift).is_zero() for difference in differences):
                 raise NotGeneric("the valuation differs at neighbouring points")
@@ -135,7 +135,7 @@ def images_of_curve(
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
         rank = 0
-        if tangents:  # at t = 0 in projective space, where tangent vectors are modulo the limit point
+        if tangents:  # the rank at t = 0; in projective space tangent vectors are taken modulo the limit point
             entries = [*limit, *(int(difference[shift]) for difference in differences)]
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         valuations = tuple(order or 0 for order in orders)
@@ -150,8 +150,8 @@ def _image(
 ) -> list[nmod_poly]:
     """Return the image of a curve known below t^known_terms, divided by a common power of t.
 
-    An empty list `pivots` is filled with the pivots used, which determine this power. For the neighbours of a curve
-    the pivots of the curve must be given. Raises PrecisionTooLow.
+    An empty list `pivots` is filled with the pivots that are used; they determine this power. For the neighbours of a
+    curve the pivots of the curve must be given. Raises PrecisionTooLow.
     """
     zero, units_per_product = X[0] * 0, product_units(known_terms, known_terms)
     count_work(row_units(equation, known_terms))
@@ -177,9 +177,9 @@ def kernel(
 ) -> list[nmod_poly]:
     """Return the kernel of an n x (n + 1) matrix of series, without a common power of t.
 
-    The minors are the kernel times t to the sum of the exponents of all `pivots`; missing pivots are chosen and
-    appended. A pivot has the least exponent of the remaining entries, so that only its own power of t is divided out;
-    its exponent must be below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
+    The minors are the kernel times t^s, with s the sum of the exponents of all `pivots`; missing pivots are chosen and
+    appended. A pivot has the least exponent of all remaining entries, so that only its power of t is divided out; its
+    exponent must be below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
     units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
@@ -215,7 +215,7 @@ def _search_pivot(
 ) -> Pivot:
     """Return the entry with the least exponent of t in these rows and columns. Raises PrecisionTooLow if all are 0."""
     best: Pivot | None = None
-    # Rows with few entries come first: eliminating with them fills in the fewest new entries.
+    # Rows with few nonzero entries come first, since they create the fewest new nonzero entries.
     for i in sorted(free_rows, key=lambda i: sum(not rows[i][j].is_zero() for j in free_columns)):
         for j in free_columns:
             power = valuation(rows[i][j], precision)
@@ -231,8 +231,8 @@ def _search_pivot(
 def roots_modulo(polynomial: nmod_poly) -> list[int]:
     """Return the distinct roots in GF(p) of a nonconstant polynomial.
 
-    The product of its distinct linear factors is computed first, as a gcd: at high degrees a complete factorization
-    would take a hundred times as long.
+    A gcd gives the product of the distinct linear factors, which is then factored: at high degrees a complete
+    factorization of the polynomial would take a hundred times as long.
 
     >>> sorted(roots_modulo(nmod_poly([1, 0, 1], 5) * nmod_poly([2, 0, 1], 5)))
     [2, 3]
@@ -264,7 +264,7 @@ def form_order(form: Any, field: PrimeField) -> Function:
         count_work(2 + len(terms) / 5)
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
-        if precision > _LOW_PRECISION:  # most orders are small, and few terms show them
+        if precision > _LOW_PRECISION:  # most orders are so small that few terms suffice
             low = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
             if low is not None:
                 return low

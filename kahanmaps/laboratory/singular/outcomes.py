@@ -1,12 +1,12 @@
-"""The images of a hypersurface under iterates of the map: points on it modulo large primes, followed along series.
+"""The images of a hypersurface under iterates of the map, along curves through points modulo large primes.
 
 Source: grammaticos-ramani-papageorgiou-1991.
 
-If the polynomials of hypersurfaces are too large to be expanded, their zeros on a random line give points on them. For
-an equation M(x) x~ = r(x) that is linear in both points, det dPhi(x) is det M'(x~)/det M(x) up to its sign, where M'
-belongs to the inverse map. So away from poles and infinity the exceptional hypersurfaces are the zeros of E(X) = det
-M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one variable. Source: petrera-suris-2016, eq.
-(Jac).
+If the polynomials of hypersurfaces are too large to be expanded, their zeros on a random line give points of the
+hypersurfaces. For an equation M(x) x~ = r(x) that is linear in both points, det dPhi(x) is det M'(x~)/det M(x) up to
+its sign, where M' is the matrix of the inverse map. So away from poles and infinity the exceptional hypersurfaces are
+the zeros of E(X) = det M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one variable. Source:
+petrera-suris-2016, eq. (Jac).
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ from kahanmaps.maps.implicit import MapFamily
 _MAX_TANGENT_PRECISION = 1024
 _KEY_PRECISION = 64  # terms of the series by which points are distinguished
 _TRIES = 40
-_MIN_LINES = 6  # lines on which critical points are searched; more lines while there is a multiplicity without a point
-_POINTS = 2  # of a hypersurface, each modulo a prime of its own
+_MIN_LINES = 6  # lines that are searched for critical points; more lines as long as a multiplicity has no point
+_POINTS = 2  # of each hypersurface, modulo different primes
 MAX_CHARACTERS = 60  # characters of a polynomial in a sentence
 
 FIRST_STEPS = 12  # the number of steps that are printed
@@ -61,7 +61,7 @@ FIRST_STEPS = 12  # the number of steps that are printed
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p where the differential degenerates, its multiplicity as a zero of E, and the gradient there.
+    """A point modulo p at which the differential degenerates, with its multiplicity as a zero of E and the gradient.
 
     For a pole, E stands for det(I - eps f').
     """
@@ -74,12 +74,12 @@ class CriticalPoint:
 def critical_points(
     equations: Sequence[Equation], inverses: Sequence[Equation] | None, rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
+    """Return the critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
-    `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
-    inverses; for several factors E is the product of the E of the factors. Without inverses det M replaces E, and the
-    points are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros
-    over the closure of GF(p): there may be zeros without points in GF(p).
+    `equations` are the equations of the factors of the map over the field, linear in the point, and `inverses` the
+    equations of their inverses; for several factors E is the product of the E of all factors. Without inverses det M
+    replaces E, and the points are the poles that are not at infinity. Returns the points and, for each multiplicity,
+    the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
@@ -87,7 +87,7 @@ def critical_points(
     excluded = line[-1]
 
     def function(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
-        """Return E or det M; on the line, images are taken without their common factors, whose zeros do not count."""
+        """Return E or det M at X; on the line common factors of images are divided out, whose zeros do not count."""
         nonlocal excluded
         total = X[0] * 0 + 1
         for k, equation in enumerate(equations):
@@ -116,8 +116,8 @@ def critical_points(
         degrees[power] = degrees.get(power, 0) + int(part.degree())
         for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
-            # (t F_v + d F_w)^power G + ... For d a power of t above all relevant ones is used.
+            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w the form E is
+            # (t F_v + d F_w)^power G + ... A power of t that is higher than all relevant ones replaces d.
             gap = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             t_to_gap = nmod_poly([0] * gap + [1], p)
@@ -136,7 +136,7 @@ def critical_points(
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-    """The last minor of the equation at X, a point with polynomial coordinates: det M up to its sign."""
+    """Return the last minor of the equation at X, a point with polynomial coordinates: det M up to its sign."""
     zero = X[0] * 0
     rows = equation.rows(equation.monomials(X, times), zero)
     minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
@@ -144,7 +144,7 @@ def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> 
 
 
 class SingularityOutcome(StrEnum):
-    """The outcome for a hypersurface."""
+    """What happens to a hypersurface under the iterates of the map."""
 
     CONFINED = "confined"
     NOT_CONFINED = "not confined"
@@ -164,15 +164,15 @@ class Hypersurface(ResultPart):
 
     `divides_denominator` says whether it is a factor of det(I - eps f'(x)); `multiplicity` is its exponent in the
     Jacobian determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at
-    infinity, and "?" if it is too large: then `degree` is that of all components of this multiplicity together. The
-    step `contracted_at` contracts the hypersurface, and after the step `confined_at` the image is a hypersurface again
-    (None if that did not happen). `steps` are the first steps, at the first of two points, modulo the first of the
-    `primes`.
+    infinity, and "?" if it is too large: `degree` is then the sum of the degrees of all components of this
+    multiplicity. The step `contracted_at` contracts the hypersurface, and after the step `confined_at` the image is a
+    hypersurface again (each is None if there is no such step). `steps` are the first steps, at the first of two points,
+    modulo the first of the `primes`.
 
-    It was followed for `followed` steps in all. From the step `settled_at` on, the pattern follows from its earlier
-    rows: it is zero, periodic, or given by a linear recurrence. `settled_at` is None if the pattern has not settled.
-    `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single maps, and
-    the map of number `stage`, from 0, contracts it; otherwise `stage` is None. `generic` is its polynomial over Q[eps].
+    The hypersurface was followed for `followed` steps in all. `orbit_data` is its pattern. From the step `settled_at`
+    on the pattern follows from its earlier rows: it is zero, periodic, or given by a linear recurrence; `settled_at` is
+    None if it has not settled. In a composition that is followed map by map all steps are steps of single maps, and the
+    map with index `stage` (from 0) contracts; otherwise `stage` is None. `generic` is the polynomial over Q[eps].
     """
 
     polynomial: str = "?"
@@ -197,9 +197,9 @@ class Hypersurface(ResultPart):
         return f"{self.polynomial} = 0: {self.status}"
 
     def sentence(self, at: str) -> str:
-        """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.
+        """Describe the pattern: where images lie, at which steps they lower the degree, and whether it is confined.
 
-        `at` names the eps of the polynomial if this is not the one over Q[eps].
+        `at` names the eps of the polynomial, for a polynomial that is not over Q[eps].
         """
         text, max_characters = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         cut = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
@@ -249,11 +249,11 @@ class HypersurfaceForm:
 
 @dataclass(frozen=True)
 class Tracking:
-    """The forms whose orders are measured along curves: `critical` ones, and those in the common factor of the minors.
+    """The forms whose orders are measured along curves.
 
-    The map contracts the critical ones. The minors are those of an equation of the map; `of_minors` are the forms in
-    their common factor. If the maps of a composition are followed one by one, `stage` is the index (from 0) of the map
-    that contracts, and steps are single maps, which repeat after `period` steps.
+    The map contracts the zeros of the `critical` forms; `of_minors` are the forms in the common factor of the minors of
+    an equation of the map. If the maps of a composition are followed one by one, `stage` is the index (from 0) of the
+    map that contracts, and steps are steps of single maps, which repeat after `period` steps.
     """
 
     critical: Sequence[HypersurfaceForm] = ()
@@ -293,10 +293,10 @@ def outcome_of(
     limits: Range,
     tracking: Tracking = NONE_TRACKED,
 ) -> Hypersurface:
-    """The hypersurface of a form over Q with its singularity pattern, at one exact eps (half the time step).
+    """Return the hypersurface of a form over Q with its singularity pattern, at one exact eps (half the time step).
 
-    The form is irreducible, in the variables (X : Z), and `text` is its name; two points modulo two random primes are
-    followed. Source: grammaticos-ramani-papageorgiou-1991.
+    The form is irreducible, in the variables (X : Z), and `text` is its text in output. Two points of the hypersurface,
+    modulo two random primes, are followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
     outcome, note = _UNKNOWN, BUDGET_SPENT
@@ -328,7 +328,7 @@ def outcome_of(
     if len(outcomes) == _POINTS:
         first, second = ((h.status, h.contracted_at, h.confined_at, h.orbit_data.compared) for h in outcomes.values())
         outcome, note = next(iter(outcomes.values())), ""
-        if first != second:  # a spent budget may be the reason
+        if first != second:  # a reason may be that the budget was spent
             outcome, note = Hypersurface(steps=outcome.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
     hypersurface = replace(
         outcome,
@@ -359,11 +359,11 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
 
 
 def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
-    """The exceptional hypersurfaces without polynomials, distinguished by multiplicity and outcome of random points.
+    """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.
 
-    At one exact `eps` (half the time step), on lines modulo random primes. With `poles` they are the poles, otherwise
-    all others except infinity. If no point with some multiplicity was found, a hypersurface of this multiplicity is
-    returned as undecided. Source: zander-2021.
+    At one exact `eps` (half the time step), on lines modulo random primes. With `poles` the poles are returned, and
+    otherwise all exceptional hypersurfaces except poles and infinity. If no point with some multiplicity was found, a
+    hypersurface of this multiplicity is returned as undecided. Source: zander-2021.
     """
     hypersurfaces: dict[tuple[Any, ...], Hypersurface] = {}
     keys_by_orders: dict[
@@ -410,7 +410,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
                 multiplicity=key[0],
                 primes=(field.prime,),
             )
-            if key in hypersurfaces:  # if two points have the same outcome, the shorter run counts
+            if key in hypersurfaces:  # of two points with the same outcome, the smaller number of steps counts
                 earlier = hypersurfaces[key]
                 settled = [k for k in (earlier.settled_at, hypersurface.settled_at) if k is not None]
                 hypersurfaces[key] = replace(
@@ -427,7 +427,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
 
 
 def _by_ranks(ranks: Sequence[int], full_rank: int) -> tuple[SingularityOutcome, int | None, int | None]:
-    """Return the status, the step that contracts the hypersurface, and the step after which it is confined."""
+    """Return the outcome, the step that contracts the hypersurface, and the step after which it is confined."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full_rank), None)
     if down is None:
         return NOT_CONTRACTED, None, None
@@ -443,7 +443,7 @@ def _outcome_at(
     limits: Range,
     tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
-    """The outcome and the singularity pattern of the hypersurface with these tangents at a point."""
+    """Return the outcome and the singularity pattern of the hypersurface with these tangent vectors at a point."""
     full_rank = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     curve = TestCurve(equations, point, direction, limits, tracked)
@@ -456,7 +456,7 @@ def _outcome_at(
     data = NO_ORBIT_DATA
     if up is None:
         data = curve.orbit_data(limits.shown)
-        # After the steps that are shown the image may be a hypersurface again, whose pattern continues this one.
+        # After the steps that are shown the image may be another hypersurface, whose pattern continues this pattern.
         longest = min(limits.series_steps, limits.reach)
         while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
@@ -485,11 +485,11 @@ def _outcome_at(
 
 
 def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) -> list[list[int]] | None:
-    """A basis of the tangent space of a hypersurface at a point, modulo the point itself; None in special position."""
+    """Return a basis of the tangent space of a hypersurface at a point, modulo the point; None in special position."""
     p, places = field.prime, range(len(point))
     pivot = next(k for k in places if gradient[k])
     inverse = pow(gradient[pivot], -1, p)
-    # The point itself is tangent to the cone: it replaces a basis vector that occurs in it.
+    # The point is itself a tangent vector of the cone, so a basis vector that occurs in it is left out.
     occurs = next((k for k in places if k != pivot and point[k]), None)
     free = [k for k in places if k not in (pivot, occurs)]
     basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in places] for k in free]

@@ -1,4 +1,4 @@
-"""Singularity confinement: the images of the exceptional hypersurfaces (contracted by the map) and of its poles.
+"""Singularity confinement: the images of the exceptional hypersurfaces (contracted by the map) and of the poles.
 
 A hypersurface on which the differential of the map degenerates may be contracted: its image has a lower dimension, and
 the image of a point no longer determines the point. The singularity is confined if, along curves through the
@@ -66,7 +66,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of the numbers in eps and the system
-_DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
+_DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # units of work, by dimension
 _FEW_DIGITS = 50
 _DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
 _LEAST_STEPS = 100  # in dimension 5 and 6
@@ -74,8 +74,8 @@ _SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimens
 _LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
 _REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MOST_SHOWN = 200
-_DRAWS = 2  # of two values of eps, if the first ones are special
-WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
+_DRAWS = 2  # the number of pairs of eps that are tried, as an eps may be special
+WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; they are slow in higher ones
 _POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
 _STOPPED = "work limit reached before all singularities were traced; raise --effort"
@@ -83,7 +83,7 @@ _DIFFERENT = "the singularities at the two values of eps differ; choose one with
 
 
 class TooLongFormula(InputError):
-    """Raised where a composition is too long for its singularities to be followed."""
+    """Raised if a composition is too long for its singularities to be followed."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class SingularityRun(PrintableResult):
     degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is too large to expand, and
     exceptional hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
     not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` describes the maps of a
-    composition that is followed map by map; steps of hypersurfaces are then single maps.
+    composition that is followed map by map; the steps of hypersurfaces are then steps of single maps.
     """
 
     _parts, _noun = "hypersurfaces", ("hypersurface", "hypersurfaces")
@@ -122,8 +122,8 @@ class SingularityRun(PrintableResult):
     def verdict(self) -> str:
         """The verdict on all hypersurfaces together.
 
-        "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; for a map
-        that is not birational at this eps "singular everywhere" or "not dominant".
+        It is "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided", or
+        for a map that is not birational at this eps "singular everywhere" or "not dominant".
         """
         if self.is_undefined:
             return "singular everywhere"
@@ -154,12 +154,12 @@ class SingularityRun(PrintableResult):
 
     @property
     def unit(self) -> str:
-        """What `steps` of hypersurfaces counts: steps of the map, or single maps of a composition."""
+        """The unit of `steps` of hypersurfaces: steps of the map, or steps of single maps of a composition."""
         return "step" if self.word is None else "single map"
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """Data that are the same for all generic eps: degrees, kinds and patterns."""
+        """The data that are the same for all generic eps: degrees, kinds and patterns."""
         patterns = sorted(
             (h.degree, h.divides_denominator, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
@@ -182,22 +182,22 @@ def singularities(
 
     Args:
         system: a map, or a system, which stands for its Kahan map; of dimension at most 6.
-        eps: half the time step, an exact number; None: two values are tried, and their patterns must agree.
+        eps: half the time step, an exact number; None: two values are used, and their patterns must agree.
         time_step, h: the time step 2 eps, instead of eps.
         steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
-            3, 250 in dimension 4 and 100 above, fewer if all of them need power series.
+            3, 250 in dimension 4 and 100 above; fewer if all steps need power series.
         seed: the random seed.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message for each hypersurface.
 
     Returns:
-        A `SingularityRun`; if eps is None, for the first value. Hypersurfaces are exact; their outcome is measured at
-        two random points modulo two random primes, and "not confined" refers to this number of steps. A TimeLimit ends
-        the computation early; it is passed on if `effort` is a Budget.
+        A `SingularityRun`; if eps is None, for the first of the two values. Hypersurfaces are exact; their outcome is
+        measured at two random points modulo two random primes, and "not confined" refers to `steps`. A TimeLimit ends
+        the computation early; if `effort` is a Budget, it is raised again.
 
     Raises:
-        InputError: for dimensions above 6, a wrong number of steps, numbers too long for the budget, and different
-            patterns.
+        InputError: for dimensions above 6, a number of steps out of range, numbers too long for the budget, and
+            different patterns at the two eps.
 
     Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
@@ -277,7 +277,7 @@ def singularities(
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # of a larger computation, which ends as well
+            if isinstance(effort, Budget):  # a stage of a larger computation, which must end as well
                 raise
             stopped = True
             break
@@ -295,7 +295,7 @@ def singularities(
 def _map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
-    """The run for a composition whose maps are followed one by one; None if one of them is too large."""
+    """Return the run for a composition whose maps are followed one by one; None if one of the maps is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     followed = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return followed and replace(run, word=followed[0], hypersurfaces=tuple(followed[1]), stopped=limits.budget.is_spent)
@@ -308,11 +308,11 @@ class Patterns:
     Degrees drop below powers of the first one only where images of exceptional hypersurfaces lie in the indeterminacy
     locus; so a recurrence may change until the last pattern has settled. `lengths` are the different numbers of steps
     after which patterns have settled; `searched` is the number of steps for which unconfined hypersurfaces were
-    followed (None if all are confined); `some_confined` says whether others are confined (None: not known). `running`
-    is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the numerator
-    and the denominator of the generating function of the degrees, and is empty where it does not follow. `exceptional`
-    are the exceptional hypersurfaces `at` one of the eps that were tried. Steps are those of the map, except for the
-    hypersurfaces of a composition that is followed map by map (`word`).
+    followed (None if all are confined); `some_confined` says whether other hypersurfaces are confined (None: unknown).
+    `running` is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the
+    numerator and the denominator of the generating function of the degrees; it is empty if the patterns do not give
+    them. `exceptional` are the exceptional hypersurfaces, `at` one of the eps that were tried. Steps are steps of the
+    map, except for hypersurfaces of a composition that is followed map by map (`word`).
     """
 
     lengths: tuple[int, ...]
@@ -334,7 +334,7 @@ class Patterns:
 
     @property
     def fraction(self) -> Fraction:
-        """The generating function of the degrees, numerator and denominator, where it is known."""
+        """The numerator and denominator of the generating function of the degrees, which must be known."""
         numerator, denominator = self.series
         return fmpz_poly(list(numerator)), fmpz_poly(list(denominator))
 
@@ -354,13 +354,13 @@ class Patterns:
 
     @property
     def sentences(self) -> list[str]:
-        """A sentence on the singularity pattern of each exceptional hypersurface, where the degrees are derived."""
+        """A sentence on the singularity pattern of each exceptional hypersurface, if the degrees are derived."""
         at = f" at eps = {self.at}" if self.at else ""
         return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.exceptional, 1) if self.series]
 
     @property
     def word_text(self) -> str:
-        """A note on the steps in `sentences` if they are steps of single maps; else empty."""
+        """A note on the unit of steps in `sentences`; empty unless they are steps of single maps."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property
@@ -372,7 +372,7 @@ class Patterns:
 
     @property
     def text(self) -> str:
-        """One line: the longest pattern, and the number of steps for which the others were followed."""
+        """A line with the longest pattern and the number of steps for which unconfined ones were followed."""
         if self.running:
             return self.running
         longest = max(self.lengths, default=0)
@@ -395,7 +395,7 @@ class Patterns:
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
-    """The patterns from runs at one eps, or at two that represent every eps; `at`: the map depends on eps."""
+    """Combine the patterns of runs at one eps, or at two that represent every eps; `at`: the map depends on eps."""
     results = set()
     for run in runs:
         if not run.is_dominant:
@@ -416,10 +416,10 @@ def patterns(
     seed: int = 0,
     effort: int | Budget = 1,
 ) -> Patterns:
-    """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
+    """Return the patterns of a map at one exact eps (half the time step) or, if `eps` is None, at two.
 
-    Up to dimension 4 they are those of `singularities`; in higher dimensions, and for an eps too long for formulas,
-    random points represent hypersurfaces.
+    Up to dimension 4 they are the patterns of `singularities`. In higher dimensions, and for an eps with too many
+    digits for formulas, random points represent hypersurfaces.
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
@@ -464,12 +464,12 @@ def _digits(map_: MapFamily, eps: fmpq) -> int:
 
 
 def _most_digits(dim: int, budget: Budget) -> int:
-    """The largest number of digits for which the budget allows formulas, at least 50."""
+    """Return the largest number of digits for which the budget allows formulas, at least 50."""
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
-    """Whether `singularities` accepts a map and eps: by the dimension, and by the digits that the budget allows."""
+    """Return whether the dimension and the number of digits of map and eps are small enough for `singularities`."""
     map_ = as_map(system)
     return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, budget)
 
@@ -536,7 +536,7 @@ def _range(dim: int, steps: int | None, budget: Budget) -> Range:
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
-    """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
+    """Return the irreducible factors of det M(x), for Kahan maps det(I - eps f'(x)), in Q[x, eps], with multiplicities.
 
     Exact. None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
 
@@ -554,7 +554,7 @@ def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str,
 
 
 def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, ...]:
-    """Two rational numbers of small height, the same ones for the same map and seed; one for a map without eps."""
+    """Return two rational eps of small height, which depend on map and seed only; one for a map without eps."""
     if unsupported_reason := as_map(system).unsupported_reason:
         raise InputError(unsupported_reason)
     if not as_map(system).has_eps:
@@ -567,7 +567,7 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
 def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few random points.
 
-    True is proved. False is wrong only if a determinant that is not identically 0 vanishes at all of them.
+    True is proved. False is wrong only if the determinant vanishes at all these points but not identically.
     """
     rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):

@@ -1,11 +1,11 @@
-"""The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
+"""The polynomials of the hypersurfaces that a map, or a map of a composition, may contract.
 
-The exceptional hypersurfaces of a composition are preimages of those of its maps under the maps applied before, and
-have long polynomials. Map by map the polynomials are short. A curve through a hypersurface is mapped by one map of the
-composition in each step, first by the map that contracts the hypersurface.
+The exceptional hypersurfaces of a composition are preimages, under the maps applied before, of the exceptional
+hypersurfaces of its maps, and have long polynomials. The polynomials for single maps are short. So each step applies
+one map of the composition to a curve through a hypersurface, first the map that contracts the hypersurface.
 
-For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
-Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that those at one eps are their values.
+For generic eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
+Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that they give the factors at one eps.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
-_MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+_MAX_TERMS = 6_000  # of the Jacobian determinant; larger ones are not expanded
 _MAX_PRODUCTS = 300_000  # of terms, to expand the Jacobian determinant of the affine map
 
 
 @dataclass(frozen=True)
 class Word:
-    """The maps of a composition: the degrees of the first maps, and how often these are repeated."""
+    """The maps of a composition: the degrees of the maps of one period, and the number of periods."""
 
     degrees: tuple[int, ...]
     power: int
 
     @property
     def length(self) -> int:
-        """The number of maps that make a step."""
+        """The number of maps in one step of the composition."""
         return len(self.degrees) * self.power
 
     @property
@@ -58,9 +58,9 @@ class Word:
 
 
 def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
-    """The poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
+    """Return the poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
 
-    Where the determinant is too large the degree is None, and the list has only the poles and infinity.
+    If the determinant is too large, the degree is None, and the list has only the poles and infinity.
     """
     forms, _, denominator = map_
     by_text: dict[str, HypersurfaceForm] = {}
@@ -83,7 +83,7 @@ def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceF
 def followed_forms(
     map_: HomogeneousMap, forms: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
-    """The forms that a map contracts, and those in the common factor of the minors of its equation."""
+    """Return the forms whose zeros a map contracts, and the forms in the common factor of the minors."""
     contracted = [replace(form, stage=stage) for form in forms if form.multiplicity]
     common = [] if map_.factor.is_constant() else factored(map_.factor)
     return contracted, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in common]
@@ -92,10 +92,10 @@ def followed_forms(
 def followed_map_by_map(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
 ) -> tuple[Word, list[Hypersurface]] | None:
-    """The hypersurfaces that the maps of a composition contract, at one exact eps, with the `Word` of these maps.
+    """Return the hypersurfaces that the maps of a composition contract at one exact eps, and the `Word` of these maps.
 
-    Steps and limits are those of single maps, but the first steps are those of the composition. Hypersurfaces for which
-    the budget did not suffice are left out. None if the polynomials of one of the maps are too large.
+    Steps and limits count single maps, except for the `steps` of hypersurfaces, which count compositions. Hypersurfaces
+    for which the budget did not suffice are left out. None if the polynomials of one of the maps are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
@@ -124,28 +124,28 @@ def followed_map_by_map(
 
 
 def is_long(map_: Map) -> bool:
-    """Whether a composition is too long for the Jacobian determinant of its forms, unless degrees drop."""
+    """Return whether the Jacobian determinant of a composition is too large to expand, unless degrees drop."""
     degree = prod(equation.image_degree for equation in map_.equations)
     size = map_.dim + 1
     return len(map_.equations) > 1 and not _is_short(size, size * (degree - 1))
 
 
 def _is_short(size: int, degree: int) -> bool:
-    """Return whether a form in this number of variables, of this degree, has few enough terms to be expanded."""
+    """Return whether a form of degree `degree` in `size` variables has few enough terms to be expanded."""
     return comb(degree + size - 1, size - 1) <= _MAX_TERMS
 
 
 def period_of(equations: tuple[Equation, ...]) -> int:
-    """The number of maps after which a list of maps repeats itself, a divisor of its length."""
+    """Return the period of a list of maps, a divisor of its length."""
     maps = [(equation.exponents, equation.terms) for equation in equations]
     size = len(maps)
     return next(k for k in range(1, size + 1) if size % k == 0 and maps[k:] == maps[: size - k])
 
 
 def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | None:
-    """The irreducible factors of the Jacobian determinant of forms, with multiplicities; None where it is too large.
+    """Return the irreducible factors of the Jacobian determinant of forms with multiplicities; None for too large ones.
 
-    The determinant is not zero, and has this degree. Symbols may follow Z.
+    The determinant is not zero and has degree `degree`. In the ring of the forms symbols may follow Z.
     """
     size, context = len(forms), forms[0].context()
     zero, infinity = context.constant(0), context.gen(size - 1)
@@ -165,11 +165,11 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
 
 
 def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
-    """The factors of the Jacobian determinant of forms at Z = 1, with multiplicities; None where it is too large.
+    """Return the factors of the Jacobian determinant of forms at Z = 1, with multiplicities; None if it is too large.
 
-    There the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where y_i =
-    F_i/F_0, by Euler's relation. Denominators and contents of rows are factors of det dy/dx, so that only the rest is
-    expanded. Symbols may follow Z.
+    At Z = 1 the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where
+    y_i = F_i/F_0, by Euler's relation. Denominators and contents of the rows of dy/dx are factors that need not be
+    expanded. In the ring of the forms symbols may follow Z.
     """
     n, context = len(forms) - 1, forms[0].context()
     affine_point = [context.constant(1) if k == n else x for k, x in enumerate(context.gens())]
@@ -202,8 +202,8 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
-        # Shortest rows first: minors of the first rows are factors in all further products. The order changes the sign
-        # only, which no factor depends on.
+        # Shortest rows first, since minors of the first rows occur in all further products. The order changes only the
+        # sign of the determinant, which does not matter for its factors.
         rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
         determinant = kernel_minors(rows, counted_product, require_few)[-1]
     except TooLarge:
@@ -220,23 +220,23 @@ def is_infinity(factor: Any) -> bool:
 
 
 def affine(form: Any, map_: MapFamily) -> str:
-    """The form at Z = 1 in the variables of the system, as text."""
+    """Return the form at Z = 1 in the variables of the system, as text."""
     context = ring(map_.variables)
     return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))
 
 
 def name_of(form: Any, map_: MapFamily) -> str:
-    """The name of a form in output: its affine polynomial, or Z for infinity."""
+    """Return the name of a form in output: its affine polynomial, or Z for infinity."""
     return "Z" if is_infinity(form) else affine(form, map_)
 
 
 def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
-    """Add the polynomials over Q[eps] to hypersurfaces that a map contracts at one eps, where these are found.
+    """Add polynomials over Q[eps], if they are found, to hypersurfaces that a map contracts at one eps.
 
-    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. It is not found for expanded
-    compositions, if forms are too large, and if it is reducible at this eps.
+    Exact: the value of such a polynomial at this eps is a multiple of the polynomial of the hypersurface. None is found
+    for expanded compositions, if forms are too large, and if the value at this eps is reducible.
     """
-    polynomials: dict[int | None, dict[str, str]] = {}  # by factor of the map, then by polynomial at this eps
+    polynomials: dict[int | None, dict[str, str]] = {}  # keys: the stage, then the polynomial at this eps
     result = []
     for hypersurface in hypersurfaces:
         if hypersurface.stage not in polynomials:
@@ -247,7 +247,7 @@ def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) 
 
 
 def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
-    """Find the polynomials over Q[eps] of the hypersurfaces that a map contracts, from those at one eps."""
+    """Return the polynomials over Q[eps] of the hypersurfaces that a map may contract, by their values at one eps."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:
         return {}
@@ -276,9 +276,9 @@ def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[
 
 
 def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None) -> list[fmpq_mpoly]:
-    """The forms in (X : Z) over Q[eps], or at one eps, of the map with these rows of polynomials in x and eps.
+    """Return the forms in (X : Z) over Q[eps], or at one eps, of the map with these rows of polynomials in x and eps.
 
-    They have no common factor; their last variables are Z and eps.
+    The forms have no common factor; their last variables are Z and eps.
     """
     n = len(rows)
     context = ring((*(f"x{k + 1}" for k in range(n)), "Z", "eps"))

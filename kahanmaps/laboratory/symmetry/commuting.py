@@ -1,12 +1,12 @@
-"""Search for all quadratic systems g, of a given shape, whose Kahan map commutes with that of f for every eps.
+"""Search for all quadratic systems g of a given shape whose Kahan maps commute with the Kahan map of f for every eps.
 
 The search has three stages. First, the condition [f, g] = 0 gives a linear space of candidates. Second, the next terms
 of the commutator, in powers of eps, must vanish: these are polynomial equations on that space, solved over Q. Both
 conditions are necessary, so no solution is discarded. Third, every solution is certified as an identity in x and eps:
 proved, or supported at random points.
 
-A quadratic system in n variables over a number field K of degree m is one in n m variables over Q, and its Kahan map is
-that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among its rational g.
+A quadratic system f in n variables over a number field K of degree m is also a quadratic system in n m variables over
+Q, with the same Kahan map (docs/beyond.md). So the solutions g over K are among the rational solutions of this system.
 """
 
 from __future__ import annotations
@@ -53,19 +53,19 @@ from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
-ORDERS = (4, 6, 8)  # powers of eps in the commutator; the odd ones follow from lower ones
-MAX_MESSAGES = 6  # on equations that were not solved
-# By default all quadratic g are tried first, within the same units at every effort, so that all commands choose the
-# same shape; usually a few hundredths of these units suffice.
+ORDERS = (4, 6, 8)  # powers of eps in the commutator; equations at odd powers follow from lower ones
+MAX_MESSAGES = 6  # messages on equations that were not solved
+# By default all quadratic g are tried first. The limit of work for this does not depend on the effort, so that all
+# commands choose the same shape; usually a few hundredths of it suffice.
 QUICK_DIMENSION, QUICK_UNITS = 3, 1e6
 MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 
 @dataclass(frozen=True)
 class CommutingField(ResultPart):
-    """A system g that commutes with f, the matrix B if the shape is g = B f, and the finding on it.
+    """A system g whose Kahan map commutes with that of f, the matrix B if g = B f is required, and the verdict.
 
-    `trivial` is "0", "f" or "-f" if g is that, else empty.
+    `trivial` is "0", "f" or "-f" if g is one of these, else empty.
     """
 
     system: QuadraticSystem
@@ -89,7 +89,7 @@ class CommutingField(ResultPart):
 
 @dataclass(frozen=True)
 class CommutingFamily(ResultPart):
-    """A linear family of g that commute: `base` + sum t_i `directions[i]`, for all values of the parameters t."""
+    """A linear family of solutions g: `base` + sum t_i `directions[i]`, for all values of the parameters t."""
 
     base: CommutingField
     directions: tuple[CommutingField, ...]
@@ -116,9 +116,9 @@ class CommutingFamily(ResultPart):
 class CommutingSystems(PrintableResult):
     """The quadratic g whose Kahan maps commute with that of f; if `complete`, there are no others of this shape.
 
-    `dimension` is that of the space of g with [f, g] = 0; `irrational` describes solutions that are not rational;
-    `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True if f = 0, and
-    then no g is listed; `undecided` has a message on each open question.
+    `dimension` is the dimension of the space of all g with [f, g] = 0; `irrational` describes solutions that are not
+    rational; `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True for
+    f = 0, and then no g is listed; `undecided` has a message on each open question.
     """
 
     _parts, _noun = "nontrivial", ("commuting system", "commuting systems")
@@ -135,11 +135,11 @@ class CommutingSystems(PrintableResult):
     order: int = 2  # the highest power of eps whose equations were used
     undecided: list[str] = field(default_factory=list)
     root: str = ""  # the algebraic number in f, if there is one
-    note: str = ""  # on another shape that was tried first
+    note: str = ""  # on the quadratic shape, if it was tried first and given up
 
     @property
     def complete(self) -> bool:
-        """Whether all rational g of this shape that commute were found."""
+        """Whether all rational solutions g of this shape were found."""
         return not self.undecided
 
     @property
@@ -157,7 +157,7 @@ class CommutingSystems(PrintableResult):
 
     @property
     def verdict(self) -> Certainty:
-        """The weakest verdict on the solutions; undecided where the list may not be complete."""
+        """The weakest verdict on the solutions; undecided if the list may not be complete."""
         verdicts = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
         return combined([*verdicts, *([] if self.complete else [Certainty.UNDECIDED])])
 
@@ -190,24 +190,24 @@ def commuting_systems(
 ) -> CommutingSystems:
     """Find all rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
-    Exact over Q. A solution is proved by a lemma, or else supported at random points.
+    The candidates g are exact. That the maps commute is proved by a lemma, or else supported at random points.
 
     Args:
         system: f, a quadratic system over Q.
         shape: "linear" for g = B f with a constant matrix B; "quadratic" for any g of degree at most 2; None for
-            "quadratic" if the dimension is at most 3 and a short search finds all of them, else "linear" with a `note`.
+            "quadratic" if the dimension is at most 3 and a short search finds all g, else "linear" with a `note`.
         seed: the random seed.
         error_bits: a supported solution is wrong with a probability below 2^-error_bits.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message at each stage.
-        on_result: called with the solutions so far after each new one, for searches that may be interrupted.
+        on_result: called with the solutions so far after each new solution, for searches that may be interrupted.
         C: a matrix with C f' = f' C; only g with C g' = g' C are searched.
 
     Returns:
-        The solutions; anything too large to be searched is reported in `undecided`.
+        The solutions; `undecided` reports everything that is too large to be searched.
 
     Raises:
-        InputError: for another shape, or an `error_bits` that is not positive.
+        InputError: for an unknown shape, or an `error_bits` that is not positive.
 
     Source: petrera-suris-2016.
 
@@ -269,7 +269,7 @@ class _Search:
             result.dimension = len(result.basis) if len(result.basis) == self.space.dimension else None
             dimension = self.space.dimension
             everything = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
-            # If f is affine, the space may be large, and often all of it commutes: this is proved without equations.
+            # If f is affine, the space may be large, and often all its g commute: this is proved without equations.
             if (
                 result.dimension is not None
                 and f.degree <= 1
@@ -286,7 +286,7 @@ class _Search:
         zeros = [fmpq(0)] * (len(self.space.fields) - 1)
         trivial = [(fmpq(first), *zeros) for first in (0, 1, -1)]
         isolated = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
-        # g and -g follow each other in the list, as 1 and -1 times the same integers.
+        # Each -g directly follows g in the list.
         signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in isolated if p not in trivial}
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
@@ -310,7 +310,7 @@ class _Search:
         self.on_result(replace(result, **lists, undecided=[*result.undecided, UNFINISHED]))
 
     def _solve(self, part: SolutionComponent, level: int) -> None:
-        """Solve the equations of the order that belongs to `level` on a part of the space."""
+        """Solve the equations of order `ORDERS[level]` on a part of the space."""
         order, result = ORDERS[level], self.result
         self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
         result.order = max(result.order, order)
@@ -318,8 +318,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self.budget)
         equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
         gens = part.values[0].context().gens()
-        # New coordinates in which the equations have few unknowns each. Only at the first level: later parts have
-        # equations of their own, which would have to be transformed as well.
+        # New coordinates in which each equation has few unknowns. They are used at the first level only: later parts
+        # have further equations, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and level == 0:
             zero = gens[0].context().constant(0)
@@ -355,7 +355,7 @@ class _Search:
                 self._report_unsolved(component, solutions.reason)
 
     def _report_unsolved(self, part: SolutionComponent, reason: str) -> None:
-        """Report equations that were not solved: the first few, then only that there are more."""
+        """Report equations that were not solved: a message for each of the first few, then one for all others."""
         texts = [format_polynomial(p) for p in part.equations]
         shown = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
         message = f"equations for b1, ..., b{len(part.values)} were not solved over Q ({reason}): {shown}"
@@ -370,11 +370,11 @@ class _Search:
         if finding.verdict is Certainty.UNDECIDED:
             self.result.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
             return
-        # A family found later, at a higher order, may contain an earlier one.
+        # A family of a higher order, which is found later, may contain earlier families.
         kept = [k for k, known in enumerate(self.families) if not family.contains(known)]
         self.families = [*(self.families[k] for k in kept), family]
         self.result.families = [self.result.families[k] for k in kept]
-        # Reduced directions, and as the base the member with zeros at their pivots.
+        # Reduce the directions, and take as the base the member that is zero at their pivots.
         direction_matrix, _ = fmpq_mat([family.direction(i) for i in family.free]).rref()
         base = list(family.point)
         for row in direction_matrix.tolist():
@@ -406,9 +406,9 @@ def find_commuting(
     """Find all quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.
 
     `system` is f or its Kahan map, possibly with an algebraic number; the other arguments are those of
-    `commuting_systems`. Over a number field only g = B f are searched unless the shape is "quadratic"; their right-hand
-    sides contain the root, and B is not returned.
-    Raises InputError for other maps, and where `commuting_systems` does.
+    `commuting_systems`. Over a number field only g = B f are searched unless the shape is "quadratic"; the right-hand
+    sides of g then contain the root, and B is not returned.
+    Raises InputError for maps that are no Kahan maps, and in the cases in which `commuting_systems` raises it.
 
     >>> from kahanmaps.documents.inline import System
     >>> systems = find_commuting(System("x' = a*x^2; y' = y^2", a="root of t^2 - 2").map)
@@ -430,14 +430,14 @@ def find_commuting(
     gens = ring((*f.variables, GENERATOR)).gens()
     over_t = QuadraticSystem(tuple(p.compose(*gens, ctx=gens[0].context()) for p in f.rhs), (GENERATOR,))
     m, times_t = map_.root.degree, map_.root.number_field.generator.matrix
-    C = fmpq_mat(f.dim * m, f.dim * m)  # t times a point
+    C = fmpq_mat(f.dim * m, f.dim * m)  # the matrix of x -> t x over Q
     for k, i, j in itertools.product(range(f.dim), range(m), range(m)):
         C[k * m + i, k * m + j] = times_t[i, j]
     *x, a = ring((*f.variables, *f.symbols)).gens()
     rational_point = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
 
     def descend(G: QuadraticSystem) -> QuadraticSystem:
-        """Return the system over K for a system over Q; its values at points of Q^n determine it."""
+        """Return the system over K that a system over Q represents; values at points of Q^n determine it."""
         coordinates = [p.compose(*rational_point, ctx=a.context()) for p in G.rhs]
         rhs = (sum((coordinates[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
         return QuadraticSystem(tuple(rhs), f.symbols)
@@ -456,7 +456,7 @@ def find_commuting(
                 replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
                 for family in result.families
             ],
-            irrational=[],  # such solutions are not over the field either, but over its extensions
+            irrational=[],  # irrational solutions are defined over extensions of the field only
             root=str(map_.root),
         )
 

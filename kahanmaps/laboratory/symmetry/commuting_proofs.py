@@ -1,12 +1,12 @@
-"""Certify that the Kahan maps of f and of g, or of a linear family of g, commute: by a lemma, else at random points.
+"""Certify that the Kahan maps of f and of g, or of a linear family of g, commute: by a lemma, or at random points.
 
-The lemmas, besides the splitting lemma of checks/theorems.py; their hypotheses are verified exactly:
+The lemmas are the splitting lemma of checks/theorems.py and the following two; all hypotheses are verified exactly.
 
-affine       One of the fields is affine. Its Kahan map is affine, x -> P x + q, and commutes with the other map for
-             every eps if P g(x) = g(P x + q). Multiplied by det(I - eps B)^2 this is an identity of polynomials of
-             degree at most 2n in eps, so it holds if it does at 2n + 1 values of eps. It is linear in g.
-dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M = [[b, 2c], [-2a, -b]], linear in the
-             field; proportional fields have commuting maps.
+affine       One of the fields, with linear part B, is affine. Its Kahan map is affine, x -> P x + q, and commutes with
+             the map of the other field g for every eps if P g(x) = g(P x + q). Times det(I - eps B)^2 this is an
+             identity of degree at most 2n in eps, so it is tested at 2n + 1 values of eps. It is linear in g.
+dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M with M = [[b, 2c], [-2a, -b]]. Since M is
+             linear in the field, proportional fields have commuting maps.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionCo
 
 
 def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
-    """Return evidence by the lemma of affine maps if f or the only g is affine; None if neither is."""
+    """Return evidence by the lemma of affine maps if f or the only g is affine and the lemma applies; else None."""
     if f.degree <= 1:
         name, pairs = "f", [(f, g) for g in fields]
     elif len(fields) == 1 and fields[0].degree <= 1:
@@ -74,7 +74,7 @@ def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem])
         return None
     n, count = f.dim, 2 * f.dim + 1
     identity, holds = QQ.identity(n), True
-    for a, h in pairs:  # is the affine Kahan map of a a symmetry of h, at enough values of eps?
+    for a, h in pairs:  # test at enough values of eps whether the affine Kahan map of a is a symmetry of h
         checked, k = 0, 0
         while holds and checked < count:
             k += 1

@@ -1,12 +1,12 @@
 """The quadratic fields g whose flow commutes with that of f: [f, g] = f' g - g' f = 0, exact linear algebra over Q.
 
 If the Kahan maps of f and g commute for every eps, the bracket vanishes, since it is the first term of the commutator
-in eps. So every commuting system is in this space.
+in eps. So the space of these g contains every system whose Kahan map commutes with that of f.
 
-In this space further equations hold. At a fixed rational point x both maps are power series in eps whose coefficients
-are polynomials in the b of g = b_1 g_1 + ... + b_l g_l. So is the difference Phi_f(Phi_g(x)) - Phi_g(Phi_f(x)), and
-every coefficient of it is an equation for b that holds exactly. The first one, at eps^2, is the bracket. The Kahan map
-is the flow over the time h = 2 eps of the field f + h^2 f_2 + ..., f_2 = f'f'f/12 - f''(f, f)/6; where the bracket
+Further equations for a g = b_1 g_1 + ... + b_l g_l of this space follow. At a fixed rational point x both maps are
+power series in eps whose coefficients are polynomials in b, and so is the difference Phi_f(Phi_g(x)) -
+Phi_g(Phi_f(x)): each of its coefficients must vanish. The first coefficient, at eps^2, is the bracket. The Kahan map is
+the flow over the time h = 2 eps of the field f + h^2 f_2 + ..., f_2 = f'f'f/12 - f''(f, f)/6. So, if the bracket
 vanishes, the next equations, at eps^4, are cubic in b: [f_2, g] + [f, g_2] = 0.
 """
 
@@ -28,7 +28,7 @@ from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
-MAX_DIMENSION = 100  # of a space whose basis is kept and verified
+MAX_DIMENSION = 100  # of a space whose basis is stored and verified
 MAX_UNKNOWNS = 900  # a square matrix of this size takes seconds
 
 # A vector of power series in eps: series[k][i] is the coefficient of eps^k in coordinate i.
@@ -46,7 +46,7 @@ def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
 
 
 def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> QuadraticSystem:
-    """The system with these coefficients: the inverse of `coefficients_of`.
+    """Return the system with these coefficients; this is the inverse of `coefficients_of`.
 
     >>> print(system_of(["x"], [[fmpq(1), fmpq(0), fmpq(-3)]]))
     x' = x^2 - 3
@@ -56,7 +56,7 @@ def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> Quadr
 
 
 def combination(systems: Sequence[QuadraticSystem], weights: Sequence[Any], zero: Any) -> list[list[Any]]:
-    """The coefficients of sum weights[i] systems[i]; weights are numbers, or polynomials with `zero` in their ring.
+    """Return the coefficients of sum weights[i] systems[i]; `zero` is the 0 of the field or ring of the weights.
 
     >>> f = QuadraticSystem.from_text(["x"], ["x^2 - 1"])
     >>> combination([f, f], [fmpq(2), fmpq(1)], fmpq(0))
@@ -79,11 +79,11 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Return equations that hold for b if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
+    """Return polynomials in b that vanish if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
 
-    `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
-    integer points, until two consecutive points give no new equation or the `budget` is spent. Returns linearly
-    independent polynomials in b. Source: kahan-1993.
+    `weights` are polynomials in b. The result, exact and linearly independent, consists of coefficients of eps^2, ...,
+    eps^order of the commutator at small random integer points. Points are added until two successive ones give no new
+    equation or the `budget` is spent. Source: kahan-1993.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -110,14 +110,14 @@ class _SeriesMap:
     """The Kahan map of a field given by its coefficients (numbers, or polynomials in b), on power series in eps."""
 
     def __init__(self, rows: Sequence[Sequence[Any]], n: int) -> None:
-        # With 1 as a further coordinate all terms are quadratic.
+        # With 1 as an additional coordinate all terms are quadratic.
         pairs = [*itertools.combinations_with_replacement(range(n), 2), *((j, n) for j in range(n + 1))]
         self._terms = [[(c, j, k) for c, (j, k) in zip(row, pairs, strict=True) if c != 0] for row in rows]
 
     def step(self, y: Series) -> Series:
         """Return the image y + 2 eps v with v = g(y) + eps g'(y) v, computed order by order."""
-        # A further coordinate 1 makes g homogeneous. In eps g'(y) v only lower orders of v occur, so that v is computed
-        # without solving a linear system.
+        # An additional coordinate 1 makes g homogeneous. Each order of eps g'(y) v contains only lower orders of v, so
+        # that no linear system has to be solved.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
         terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
@@ -143,8 +143,8 @@ class _SeriesMap:
 class CommutingSpace:
     """A basis of all g with [f, g] = 0, f itself first; `matrices` are the B with g = B f (shape linear), else empty.
 
-    If the components of f are dependent, B is not unique, and one of several is given. If `dimension` exceeds the
-    number of fields, the space is too large: `dimension` is an upper bound, and f is the only field.
+    If the components of f are linearly dependent, B is not unique, and `matrices` has one of them. If `dimension`
+    exceeds the number of fields, the space is too large: `dimension` is then an upper bound, and f is the only field.
     """
 
     fields: tuple[QuadraticSystem, ...]
@@ -153,7 +153,7 @@ class CommutingSpace:
 
 
 def unknowns(system: QuadraticSystem, shape: str) -> int:
-    """The number of coefficients among which the space is computed."""
+    """Return the number of unknown coefficients of g in the linear equations for the space."""
     n = system.dim
     return n * len(_independent_components(system)) if shape == "linear" else n * (n + 1) * (n + 2) // 2
 
@@ -182,7 +182,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
         while len(rows) < row_count + 2 * n:
             point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
             value, jacobian = over_Q.value(point), over_Q.jacobian(point)
-            # For each unknown scalar function phi: phi(x) and its derivative along f.
+            # For each scalar function phi that is multiplied by an unknown: phi(x) and its derivative along f.
             if shape == "linear":
                 derivatives = (sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0)) for j in columns)
                 scalars = [*zip((value[j] for j in columns), derivatives, strict=True)]
@@ -191,7 +191,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                 scalars = [(point[j] * point[k], value[j] * point[k] + point[j] * value[k]) for j, k in pairs]
                 scalars += [*zip(point, value, strict=True), (fmpq(1), fmpq(0))]
             for i in range(n):
-                # the component i of f' (phi e_k) - e_k (grad phi . f), for all k and phi
+                # component i of f' (phi e_k) - e_k (grad phi . f) for all k and phi
                 rows.append(
                     [
                         jacobian[i, k] * phi - (derivative if i == k else 0)
@@ -226,7 +226,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                 combinations = nullspace(QQ, fmpq_mat(defects).transpose())
                 fields = [system_of(f.variables, combination(fields, w, fmpq(0))) for w in combinations]
                 matrices = [combination_of(w, matrices) for w in combinations] if matrices else []
-            # f in the place of one member of the basis, moved to the front.
+            # Replace one member of the basis by f, and move f to the front.
             flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
             (relation,) = nullspace(QQ, flat)
             replaced = max(k for k in range(len(fields)) if relation[k] != 0)
@@ -238,7 +238,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
 
 
 def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
-    """Whether f' g - g' f = 0, as polynomials.
+    """Return whether f' g - g' f = 0, as polynomials.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
     >>> bracket_vanishes(f, f), bracket_vanishes(f, QuadraticSystem.from_text(["x", "y"], ["x", "y"]))
@@ -251,7 +251,7 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
 
 
 def _independent_components(f: QuadraticSystem) -> list[int]:
-    """The first components of f that span all of them."""
+    """Return the indices of the first components of f that span all components."""
     reduced, count = fmpq_mat(coefficients_of(f)).transpose().rref()
     return [next(j for j in range(f.dim) if reduced[i, j] != 0) for i in range(count)]
 

@@ -1,10 +1,10 @@
 """Search for generalized permutation matrices S, with one entry in each row and column, as linear parts of symmetries.
 
-With (S x)_{p(i)} = s_i x_i the condition f(S x) = sign S f(x) is a set of equations between single coefficients. In
-scaled variables y_i = e_i x_i, e_i > 0, for which the logarithms of the coefficients have the least sum of squares, the
-numbers s_i are 1 or -1: S maps this scaling to another one with this property, and such a scaling is unique up to
-scalings that do not change f. So signed permutations are searched with the scaled coefficients, whose logarithms are
-rational combinations of those of coprime integers. Matrices S that are not rational in x are dropped.
+With (S x)_{p(i)} = s_i x_i the condition f(S x) = sign S f(x) is a set of equations between single coefficients. Take
+scaled variables y_i = e_i x_i, e_i > 0, for which the logarithms of the coefficients have the least sum of squares. In
+these the s_i are 1 or -1: S maps the scaling to one with the same property, and there is only one such scaling, up to
+scalings that do not change f. So the search is for signed permutations that preserve the scaled coefficients, whose
+logarithms are rational combinations of logarithms of coprime integers. An S that is not rational in x is dropped.
 
 The search is a backtracking over images of the variables, and drops a choice at the first equation that fails.
 """
@@ -23,25 +23,25 @@ from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 12
-MAX_FOUND = 1_000  # all permutations in dimension 6 are 720
+MAX_FOUND = 1_000  # in dimension 6 there are 720 permutations
 
 
-Table = dict[tuple[int, ...], fmpq]  # coefficients by the component and the variables
+Table = dict[tuple[int, ...], fmpq]  # keys: the component of f, then the variables of the monomial
 
 
 def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[list[fmpq_mat], bool]:
-    """Search for S with f_2(S x) = sign S f_2(x), where f_2 are the quadratic terms, or the linear ones.
+    """Search for S with f_2(S x) = sign S f_2(x), where f_2 are the quadratic terms, or for affine f the linear terms.
 
     Exact. If infinitely many S differ by scalings that do not change f_2, only the signed permutations for one scaling
-    of the variables are returned: for the given variables, if there are any. Returns the matrices, and whether these
-    are all: the search stops after 1000 matrices, and when the `budget` is spent.
+    of the variables are returned: for the given variables, if there are any. Returns the matrices, and whether the
+    list is complete: the search stops after 1000 matrices, and when the `budget` is spent.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "4*y^2 + 1"])
     >>> [S.tolist() for S in signed_permutations(f, 1, Budget())[0]]
     [[[1, 0], [0, 1]], [[0, 4], [1/4, 0]]]
     """
     matrices: list[fmpq_mat] = []
-    # A translation changes the linear terms where there are quadratic ones, and never those of highest degree.
+    # A translation never changes the terms of highest degree, but it changes the linear terms of a quadratic f.
     n, size = f.dim, 2 if f.degree <= 1 else 3
     forms = [f.B] if size == 2 else f.Q
     entries = (((i, j, k)[-size:], form[j, k]) for i, form in enumerate(forms) for j in range(n) for k in range(n))
@@ -61,12 +61,12 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
 
 
 def _balance(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[tuple[int, ...], int]]:
-    """Return coprime integers b, the exponents of the scales e_i in them, and the coefficients in y_i = e_i x_i.
+    """Return coprime integers b, the exponents of each b in the scales e_i, and the coefficients in y_i = e_i x_i.
 
-    A coefficient is represented by its sign times a number for its absolute value, which is irrational in general.
+    A coefficient in y is represented by its sign times an index of its absolute value, which is irrational in general.
     """
     base = _coprime_base(part for c in table.values() for part in (abs(c.p), c.q))
-    # log |c| + (row . log e) is that of the coefficient in y; e is the shortest solution of the normal equations.
+    # In y the coefficient has the logarithm log |c| + row . log e, with e the shortest least-squares solution.
     logarithms = [[fmpq(_exponent(c.p, b) - _exponent(c.q, b)) for b in base] for c in table.values()]
     rows = [[fmpq((index[0] == k) - index[1:].count(k)) for k in range(n)] for index in table]
     scales = [[fmpq(0)] * len(base) for _ in range(n)]
@@ -89,7 +89,7 @@ def _balance(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[t
 
 
 def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
-    """Return pairwise coprime integers > 1, no perfect powers, whose powers have all given ones as products."""
+    """Return pairwise coprime integers > 1, no perfect powers, such that all given ones are products of powers."""
     waiting, base = list(integers), list[fmpz]()
     while waiting:
         number = waiting.pop()
@@ -109,7 +109,7 @@ def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
 
 
 def _exponent(number: fmpz, b: fmpz) -> int:
-    """Return the multiplicity of b in a number."""
+    """Return the exponent of b in a number."""
     count = 0
     while number % b == 0:
         number, count = number // b, count + 1
@@ -119,9 +119,9 @@ def _exponent(number: fmpz, b: fmpz) -> int:
 def _signed_permutations_of(
     numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
-    """Yield the signed permutations that preserve a table of numbers, as images and signs; None over the budget."""
+    """Yield the signed permutations that preserve a table of numbers, as images and signs; None at the work limit."""
     size = len(next(iter(numbers), (0, 0)))
-    # The equations that contain a variable and no later one, each once; those that fail most often come first.
+    # For each variable the equations that contain it and no later variable. Those that fail most often come first.
     equations = [
         sorted(
             (index for index in product(range(last + 1), repeat=size) if max(index) == last and index[1] <= index[-1]),

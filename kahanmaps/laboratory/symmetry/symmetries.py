@@ -1,10 +1,10 @@
 """Linear and affine symmetries of a Kahan map, and its reversing symmetries.
 
 Kahan's method is equivariant under affine changes of variables. So an affine T(x) = S x + r with f(T(x)) = S f(x) is a
-symmetry, T Phi T^{-1} = Phi, and one with f(T(x)) = -S f(x) a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for
-every eps. Conversely, the term of first order in eps gives these equations. They are identities of polynomials of
-degree 2, and are verified exactly, coefficient by coefficient: every symmetry reported is proved. `searched` lists the
-searches that were completed.
+symmetry, T Phi T^{-1} = Phi, and a T with f(T(x)) = -S f(x) is a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for
+every eps. Conversely, the term of first order in eps of these relations gives the equations for f. The equations are
+identities of polynomials of degree 2, verified exactly for each coefficient: every reported symmetry is proved.
+`searched` lists the searches that were completed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
-MAX_LISTED = 200  # of each kind in the JSON
+MAX_LISTED = 200  # symmetries of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
 SIGNED, SCALED = "signed permutations", "signed permutations of scaled variables"
 MATRICES = "rational matrices"
@@ -39,7 +39,7 @@ MATRICES = "rational matrices"
 
 @dataclass(frozen=True)
 class Symmetry(ResultPart):
-    """An affine T(x) = S x + r with T Phi T^{-1} = Phi or, if it is `reversing`, Phi^{-1}; for every eps."""
+    """An affine T(x) = S x + r with T Phi T^{-1} = Phi or, if `reversing`, T Phi T^{-1} = Phi^{-1}, for every eps."""
 
     variables: tuple[str, ...]
     S: fmpq_mat
@@ -48,7 +48,7 @@ class Symmetry(ResultPart):
 
     @property
     def text(self) -> str:
-        """The action: (x, y) -> (y, -x)."""
+        """The action as text such as "(x, y) -> (y, -x)"."""
         return f"({', '.join(self.variables)}) -> ({', '.join(_affine_text(self.variables, self.S, self.r))})"
 
     @property
@@ -70,7 +70,7 @@ class Symmetry(ResultPart):
 class Infinitesimal(ResultPart):
     """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
 
-    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry if the weight is 0.
+    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps); for weight 0 each T_t is a symmetry.
     """
 
     variables: tuple[str, ...]
@@ -97,11 +97,11 @@ class Infinitesimal(ResultPart):
 class Symmetries(PrintableResult):
     """The result of `linear_symmetries`: the symmetries of a Kahan map, and the searches that were completed.
 
-    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None; `signed`
-    are all signed permutations (with a translation where needed), of the variables or of scaled ones (see
-    signed_permutations.py), `others` further linear symmetries. `generators` generate a group with `order` different
-    linear parts (None: not known): that of `signed` or, without infinitesimal symmetries, that of `signed` and
-    `others`; `group_of` says which.
+    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` is a field of weight 1 or None;
+    `signed` are all signed permutations (with a translation if needed) of the variables or of scaled variables (see
+    signed_permutations.py); `others` are further linear symmetries. `generators` generate the group of `signed` or,
+    without infinitesimal symmetries, of `signed` and `others`; `group_of` says which. It has `order` linear parts
+    (None: unknown).
     """
 
     _parts, _noun = "generators", ("generator", "generators")
@@ -127,7 +127,7 @@ class Symmetries(PrintableResult):
         """The number of elements of the group that take the map to its inverse."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
-        # f is not 0, so that no element is of both kinds; all of the group or half of it commutes with the map
+        # f is not 0, so that no element is of both kinds: the whole group or half of it commutes with the map
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
 
     @property
@@ -182,15 +182,15 @@ def linear_symmetries(
 ) -> Symmetries:
     """Find affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
-    The search covers the Lie algebra of affine symmetries, a scaling, and signed permutations, also of scaled
-    variables, with a translation where needed (dimension at most 12). In dimension at most 3 it covers all rational
+    The search covers the Lie algebra of affine symmetries, a scaling, and signed permutations of the variables or of
+    scaled variables, with a translation if needed (dimension at most 12). In dimension at most 3 it covers all rational
     matrices, if the Lie algebra has no linear element.
 
     Args:
         system: a quadratic system over Q.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message at each stage.
-        on_result: called once, with the result, to which the later stages add.
+        on_result: called once, with the result object, to which the later stages add symmetries.
 
     Returns:
         A `Symmetries`, exact and proved. Source: cmoq-2013.
@@ -235,7 +235,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
                 rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[place] = value
     table = list(rows.values()) or [[fmpq(0)] * len(columns)]
     count_work(200 + len(table) * len(columns) * (3 + len(columns) / 50))
-    # In echelon form from the right, with s last, the linear fields come first and are a basis of their own.
+    # In echelon form from the right, with s last, the linear fields come first and span all linear fields.
     basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
 
     def infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
@@ -243,7 +243,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
 
     symmetries.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
-    if f.is_homogeneous:  # prefer S = I
+    if f.is_homogeneous:  # S = I is a scaling, preferred to all others
         symmetries.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
@@ -276,14 +276,14 @@ def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
         )
         return
     symmetries.searched.append("signed permutations, with a translation: all")
-    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each element is of both kinds
+    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 all are symmetry and reversing
     if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
         symmetries.group_of = SCALED
     symmetries.generators = _generators(symmetries.signed)
 
 
 def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
-    """A minimal set of elements whose linear parts generate those of all, elements of high order first."""
+    """Return a minimal set of elements whose linear parts generate all linear parts, high orders first."""
 
     def order(matrix: fmpq_mat) -> int:
         power, count = matrix, 1
@@ -305,7 +305,7 @@ def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
 
 
 def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
-    """The finite group that the matrices generate."""
+    """Return the finite group that the matrices generate."""
     waiting = [QQ.identity(n)]
     group = {_key(waiting[0])}
     while waiting:
@@ -340,7 +340,7 @@ def _add_general(symmetries: Symmetries, budget: Budget) -> None:
         equations = matrix_equations(f, matrix, sign)
         solved = solve_system(equations, gens, budget)
         for component in solved.components:
-            # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
+            # All S of a family are singular, since a family of invertible S would give infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
             if not component.free and S.det() != 0 and _key(S) not in known_matrices:
                 symmetries.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
@@ -352,7 +352,7 @@ def _add_general(symmetries: Symmetries, budget: Budget) -> None:
             )
     if complete:
         symmetries.searched.append("rational matrices S, without a translation: all")
-    # Without infinitesimal symmetries the affine group is finite, and so is what its elements generate.
+    # Without infinitesimal symmetries the affine group is finite, and so are the groups that its elements generate.
     if complete and symmetries.others and symmetries.order is not None and not symmetries.infinitesimal:
         symmetries.generators = _generators([*symmetries.signed, *symmetries.others])
         symmetries.order, symmetries.group_of = len(_generated([t.S for t in symmetries.generators], n)), MATRICES
@@ -368,7 +368,7 @@ def _affine_text(variables: Sequence[str], S: fmpq_mat, r: Sequence[fmpq]) -> li
 
 
 def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: int) -> bool:
-    """Whether f(S x + r) = sign S f(x) for all x: sign 1 for a symmetry, -1 for a reversing one. Exact.
+    """Return whether f(S x + r) = sign S f(x) for all x: sign 1 for a symmetry, -1 for a reversing symmetry. Exact.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["y", "-x^2"])
     >>> is_symmetry(f, fmpq_mat([[1, 0], [0, -1]]), [fmpq(0)] * 2, -1)
@@ -400,7 +400,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
         return None
     (special,) = [v for v in solutions if v[-1] != 0]
     directions = [v for v in solutions if v[-1] == 0]
-    # f(r) = sign S c decides among them.
+    # Among the solutions r the condition f(r) = sign S c decides.
     parameters = ring([f"t{k + 1}" for k in range(len(directions) + 1)])
     gens = parameters.gens()
     r = [parameters.constant(special[k] / special[-1]) for k in range(n)]
@@ -418,8 +418,8 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
     """Return polynomials in the entries of S that vanish if S is invertible and f(S x) = sign S f(x) for all x.
 
-    `S` holds the generators of a ring, row by row. The equations contain the invariance of the divergence of f, which
-    follows from them if S is invertible and is linear in S.
+    `S` holds the generators of a ring, row by row. The equations include the invariance of the divergence of f, which
+    is linear in S and follows from the other equations if S is invertible.
 
     >>> s = ring(["s"]).gens()[0]
     >>> matrix_equations(QuadraticSystem.from_text(["x"], ["x^2"]), [[s]], 1)
@@ -442,7 +442,7 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
 
 
 def is_singular(part: SolutionComponent, n: int) -> bool:
-    """Return whether det S = 0 on the complete linear family of n x n matrices, given by its entries row by row.
+    """Return whether det S = 0 for all matrices S of a linear family of n x n matrices, given by entries row by row.
 
     >>> a = ring(["a"]).gens()[0]
     >>> is_singular(SolutionComponent((a, a, a, a)), 2), is_singular(SolutionComponent((a, a, a, -a)), 2)

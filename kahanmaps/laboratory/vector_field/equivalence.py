@@ -1,10 +1,10 @@
 """Search for a system of the catalogue that a vector field is affinely equivalent to: g(P x + q) = c P f(x).
 
 With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
-variables: the map of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables, scaled up to
-dimension 5, after a change to a frame that f determines (invariant hyperplanes, lines of fixed points), and in the
-plane all P. Parameters of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still
-exist.
+variables: the map of f at eps is the map of g at eps/c, in the variables y. In the plane all P are tried. In other
+dimensions P is a permutation of the variables, scaled up to dimension 5, after a change to a frame that f determines
+(invariant hyperplanes, lines of fixed points). Parameters of g are unknowns too. Every equivalence is verified exactly;
+if none is found, one may still exist.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 MAX_DIMENSION = 6  # 720 permutations
-MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher ones Groebner bases may take a minute
-MAX_ORDERS = 24  # of the permutations that the monomials allow, which may be all 720
+MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher dimensions Groebner bases may take a minute
+MAX_ORDERS = 24  # permutations that are tried; the monomials may allow all 720
 MAX_FRAMES = 6
-_MAX_DEPTH = 4  # unknowns that are set to numbers one after the other if there are infinitely many solutions
+_MAX_DEPTH = 4  # the number of unknowns that are set to numbers if there are infinitely many solutions
 
 Monomials = frozenset[tuple[int, ...]]
 
 
 @dataclass(frozen=True)
 class Equivalence(ResultPart):
-    """An affine equivalence with a system of the catalogue at these parameters: y = P x + q, and eps becomes eps/c."""
+    """An affine equivalence y = P x + q, eps -> eps/c with a system of the catalogue at given parameters."""
 
     name: str
     parameters: dict[str, fmpq]
@@ -52,11 +52,11 @@ class Equivalence(ResultPart):
     P: fmpq_mat
     q: tuple[fmpq, ...]
     c: fmpq
-    file: SystemFile | None = field(default=None, repr=False, compare=False)  # of f
+    file: SystemFile | None = field(default=None, repr=False, compare=False)  # the file of f
 
     @property
     def system(self) -> QuadraticSystem:
-        """The system g/c in the variables of f, whose map at eps is that of g at eps/c."""
+        """The system g/c in the variables of f; its map at eps is the map of g at eps/c."""
         return load(self.name, self.parameters).system.renamed(self.variables).scaled(1 / self.c)
 
     @property
@@ -86,7 +86,7 @@ def equivalent_system(
     """Search for a system of the catalogue that is affinely equivalent to the given one; None if none was found.
 
     Args:
-        system: a quadratic system; for a system of the catalogue itself, None is returned.
+        system: a quadratic system; for a system that is itself in the catalogue, None is returned.
         fixed: the fixed points of the system, if they are known; lines of fixed points give frames.
         effort: each increase by 1 doubles the work limit.
 
@@ -113,7 +113,7 @@ def equivalent_system(
         for g in catalogue:
             if sorted(map(len, monomials)) != sorted(map(len, g.monomials)):
                 continue
-            # The permutations that take the monomials of each right-hand side to those of g.
+            # The permutations that map the monomials of each right-hand side to monomials of g.
             permutations = list[tuple[int, ...]]()
             for order in itertools.permutations(range(f.dim)):
                 inverse = sorted(range(f.dim), key=order.__getitem__)
@@ -136,7 +136,7 @@ def equivalent_system(
 
 @dataclass(frozen=True)
 class _CatalogueSystem:
-    """A system of the catalogue with its parameters as symbols, and the quadratic monomials of each right-hand side."""
+    """A system of the catalogue with parameters as symbols, and the quadratic monomials of each right-hand side."""
 
     name: str
     system: QuadraticSystem
@@ -146,9 +146,9 @@ class _CatalogueSystem:
 
 @lru_cache(maxsize=MAX_DIMENSION)
 def _load_catalogue(dim: int) -> tuple[_CatalogueSystem, ...]:
-    """Return the systems of one dimension, few parameters first.
+    """Return the systems of one dimension, ordered by their number of parameters.
 
-    Systems with more than dim + 2 parameters are left out: nearly every system would be equivalent to one of these.
+    Systems with more than dim + 2 parameters are left out: nearly every system is equivalent to a member of these.
     """
     systems, dimensions = [], titles()
     for name in names():
@@ -184,7 +184,7 @@ def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
 
 
 def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
-    """Return the invertible matrices whose rows are n of the vectors."""
+    """Yield the invertible matrices whose rows are n of the vectors."""
     matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
     return (matrix for matrix in matrices if matrix.det() != 0)
 
@@ -199,19 +199,19 @@ def _solve_for_equivalence(
 ) -> Equivalence | None:
     """Solve g(P x + q) = c P f(x) for P = c T F, where F is the frame.
 
-    T is a permutation, scaled if `is_scaled`, or any matrix if `order` is None. With this P the quadratic terms do not
-    contain c and q, and are solved first.
+    T is a permutation, scaled if `is_scaled`, or any matrix if `order` is None. For this P the equations for the
+    quadratic terms do not contain c and q, and are solved first.
     """
     n = f.dim
     count_work(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
-    # Where there is a choice, unknowns are set to their defaults in this order.
+    # If there are infinitely many solutions, unknowns are set to their defaults in this order.
     scales = [f"t{i}{j}" for i, j in entries]
     unknowns = ring(["c", *(f"q{i}" for i in range(n)), *scales, *(f"a{k}" for k in g.defaults)])
     defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
     defaults += g.defaults.values()
     highest, lower = _equivalence_equations(f, g, frame, entries, unknowns)
-    # Without scaling and translation first: then the equations for the parameters are usually linear.
+    # First without scaling and translation: the equations for the parameters are then usually linear.
     default_equations = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     fixed_shift, fixed_scale = default_equations[: n + 1], default_equations[n + 1 :][: len(entries)]
     untranslated = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
@@ -240,7 +240,7 @@ def _equivalence_equations(
     entries: Sequence[tuple[int, int]],
     unknowns: fmpq_mpoly_ctx,
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
-    """Return the coefficients of g(P x + q) - c P f(x), those of degree 2 in x separately from the others.
+    """Return the coefficients of g(P x + q) - c P f(x): a list for degree 2 in x, and a list for lower degrees.
 
     The equations for the divergences are added: they follow from the others, and have lower degree in the unknowns.
     """

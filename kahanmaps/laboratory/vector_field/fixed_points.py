@@ -1,9 +1,9 @@
 """The equilibria of a vector field, which are the fixed points of its Kahan map, and the eigenvalues there.
 
-Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x): where f(x) = 0 the map has the derivative (I - eps f')^{-1} (I + eps f'),
-and an eigenvalue lambda of f' becomes the multiplier (1 + eps lambda)/(1 - eps lambda). Where det(I - eps f'(x)) = 0 an
-equilibrium is no fixed point: the equation does not determine its image. Everything is exact. Points that are not
-rational, and sets of positive dimension, are given by equations. Source: cmoq-2013.
+Since Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x), the map has the derivative (I - eps f')^{-1} (I + eps f') at a zero
+of f, and an eigenvalue lambda of f' gives the multiplier (1 + eps lambda)/(1 - eps lambda). An equilibrium at which
+det(I - eps f'(x)) = 0 is no fixed point: the equation of the map does not determine its image. Everything is exact.
+Points that are not rational, and sets of positive dimension, are given by equations. Source: cmoq-2013.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
-MAX_DIMENSION = 6  # above it Groebner bases of quadrics may take long, and they cannot be interrupted
+MAX_DIMENSION = 6  # in higher dimensions Groebner bases of quadrics may take long, and they cannot be interrupted
 _UNITS = 1e6  # for one Groebner basis at a given eps
 _KINDS = {1: "line", 2: "plane"}
 
 
 @dataclass(frozen=True)
 class FixedPoints(ResultPart):
-    """A point, or a set of points: `coordinates` in some of the variables, for which `equations` vanish.
+    """A set of fixed points: `coordinates` as functions of some of the variables, in which `equations` vanish.
 
-    `dimension` is that of the set, `count` the number of its points over the complex numbers, None if there are
-    infinitely many; `eigenvalues` is the characteristic polynomial of f' there, in `eigenvalue` and these variables.
+    `dimension` is the dimension of the set, `count` the number of its points over the complex numbers (None: infinitely
+    many); `eigenvalues` is the characteristic polynomial of f' there, in `eigenvalue` and these variables.
     """
 
     coordinates: tuple[fmpq_mpoly, ...]
@@ -53,7 +53,7 @@ class FixedPoints(ResultPart):
 
     @property
     def where(self) -> str:
-        """A phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
+        """A phrase: "fixed point (1, 0)", "line of fixed points (x, 0)", "2 fixed points (x, 1) with x^2 - 2 = 0"."""
         point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
         kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:
@@ -66,19 +66,19 @@ class FixedPoints(ResultPart):
 
     @property
     def eigenvalues_text(self) -> str:
-        """The characteristic polynomial in factors."""
+        """The factored characteristic polynomial of f'."""
         return format_product([(primitive_part(g)[1], int(k)) for g, k in self.eigenvalues.factor()[1]])
 
     @property
     def text(self) -> str:
-        """The set with the eigenvalues there."""
+        """A phrase for the set, with the eigenvalues of f' there."""
         return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
 
     def are_fixed_by_map(self, eps: fmpq | None) -> bool | None:
-        """Whether det(I - eps f') is not 0 at these points: True (at all), False (at none) or None (mixed or unknown).
+        """Whether det(I - eps f') is not 0: True (at all points), False (at no point) or None (mixed or unknown).
 
         Args:
-            eps: an exact number, or None for all but finitely many.
+            eps: an exact number, or None for all but finitely many eps.
 
         >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
         >>> [points.are_fixed_by_map(fmpq(1)) for points in fixed_points(pendulum).found]
@@ -107,7 +107,7 @@ class FixedPoints(ResultPart):
 
 @dataclass(frozen=True)
 class FixedPointSearch(ResultPart):
-    """All fixed points, rational ones first; `undecided` says why some may be missing, and is empty if none are."""
+    """All fixed points, rational ones first; `undecided` says why some may be missing, and is empty if none is."""
 
     found: tuple[FixedPoints, ...]
     undecided: str
@@ -166,10 +166,10 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
 
 
 def _points_of(system: QuadraticSystem, component: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
-    """The fixed points on one component, whose equations have this Groebner basis."""
+    """Return the fixed points on one component, whose equations have this Groebner basis."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     free = sorted({*component.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
-    # The dimension is the largest number of variables of which no power product is a leading monomial.
+    # The dimension is the largest number of variables such that no leading monomial contains only these.
     sizes = [
         len(subset)
         for size in range(len(free) + 1)

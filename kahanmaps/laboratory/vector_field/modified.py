@@ -5,11 +5,11 @@ field F = f + eps^2 F_2 + eps^4 F_4 + ..., with the derivation D = sum_k eps^k F
 
     sum_{j=1}^n 2^j/j! [eps^{n-j}] D^j x = 2 f'^{n-1} f,
 
-which gives F_{n-1} from the earlier ones; Kahan's method is symmetric, so odd ones are 0. In elementary differentials
-F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map, as a series in eps, is one of F. An integral I of the flow of f
-survives to eps^k if it can be continued: the equations f . grad I_2j = -sum_{i>0} F_2i . grad I_2(j-i) are linear, and
-are solved in polynomials.
-Sources: hairer-lubich-wanner-2006, chapter IX; cmoq-2013, where Kahan's method is a Runge-Kutta method.
+which gives F_{n-1} from F_0 = f, ..., F_{n-2}; Kahan's method is symmetric, so F_k = 0 for odd k. In elementary
+differentials F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map, as a series in eps, is an integral of F. An integral
+I = I_0 of the flow of f survives to eps^k if it has a continuation I + eps^2 I_2 + ... to this order: the linear
+equations f . grad I_2j = -sum_{i>0} F_2i . grad I_2(j-i) are solved in polynomials. Sources: hairer-lubich-wanner-2006,
+chapter IX; cmoq-2013, where Kahan's method is a Runge-Kutta method.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 LARGEST_ORDER = 12
-_MAX_UNKNOWNS = 1000  # coefficients of all corrections of an integral together
+_MAX_UNKNOWNS = 1000  # the number of coefficients of all corrections of an integral
 _EFFORT = -2  # of the search for integrals of the flow
 _SHOWN_TERMS = 60
 
@@ -48,8 +48,8 @@ class SurvivingIntegral:
     """An integral I of the flow of f, and its continuation I + eps^2 I_2 + ... as an integral of the modified field.
 
     `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives" (up to the requested order), "lost" (no
-    polynomial correction of degree at most `degree` exists at eps^(order + 2), for any choice of the earlier ones) or
-    "not examined" (the linear equations for the next correction are too large). All are exact.
+    polynomial correction of degree at most `degree` exists at eps^(order + 2), for any earlier corrections) or "not
+    examined" (the linear equations for the next correction are too large). All corrections are exact.
     """
 
     integral: fmpq_mpoly
@@ -60,7 +60,7 @@ class SurvivingIntegral:
 
     @property
     def sentence(self) -> str:
-        """What was proved, in words."""
+        """The result as a sentence."""
         if self.verdict == "survives":
             return f"survives to eps^{self.order}"
         after = f"survives to eps^{self.order}, " if self.order else ""
@@ -73,9 +73,9 @@ class SurvivingIntegral:
 class ModifiedField(ResultPart):
     """The result of `modified`: series in eps up to `order`, exact.
 
-    `fields[k]` is the coefficient of eps^k of the modified vector field, 0 for odd k. `hamiltonian[k]` is that of the
-    modified Hamiltonian, which the map and the modified field conserve (empty without a Hamiltonian). `integrals` are
-    the polynomial integrals of the flow that were known or found.
+    `fields[k]` is the coefficient of eps^k of the modified vector field, 0 for odd k. `hamiltonian[k]` is the
+    coefficient of eps^k of the modified Hamiltonian, which the map and the modified field conserve (empty without a
+    Hamiltonian). `integrals` are the known polynomial integrals of the flow.
     """
 
     file: SystemFile = field(repr=False)
@@ -96,7 +96,7 @@ class ModifiedField(ResultPart):
         }
 
     def lines(self) -> list[str]:
-        """Return the series and sentences as lines of cells separated by tabs; long polynomials are given by size."""
+        """Return the series and sentences as lines of cells separated by tabs; for long polynomials only their size."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):
@@ -134,7 +134,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         A `ModifiedField`, exact.
 
     Raises:
-        InputError: for other orders, and for systems that are not quadratic.
+        InputError: for an order that is odd or out of range, and for systems that are not quadratic.
 
     >>> result = modified("weierstrass", 2)
     >>> result.fields[2], result.hamiltonian[2]
@@ -189,7 +189,7 @@ def modified_hamiltonian(hamiltonian: CubicHamiltonian, order: int) -> tuple[fmp
     >>> modified_hamiltonian(load("harmonic").hamiltonian, 2)
     (1/2*x^2 + 1/2*y^2, 0, -2/3*x^2 - 2/3*y^2)
     """
-    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # f'^k f
+    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # `vector` is f'^k f
     for _ in range(order):
         series.append(fmpq(2, 3) * _derivative(vector, [hamiltonian.H])[0])
         vector = _derivative(vector, hamiltonian.system.rhs)
@@ -204,7 +204,7 @@ def _derivative(vector: Field, functions: Sequence[fmpq_mpoly]) -> Field:
 
 
 def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> list[fmpq_mpoly]:
-    """Return independent polynomial integrals of the flow: H, limits of declared integrals, and those of a search."""
+    """Return independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search."""
     context, candidates = ring(file.variables), []
     if file.hamiltonian is not None:
         candidates.append(file.hamiltonian.H)
@@ -215,7 +215,7 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))
     f, integrals, gradients = file.system.rhs, list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # generic enough: dependent gradients only leave one out
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
     for candidate in candidates:
         primitive = primitive_part(candidate - candidate[(0,) * file.dim])[1]
         slope = [evaluate(p, QQ, point) for p in gradient(primitive)]
@@ -229,14 +229,14 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
 def _continued(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
     """Return how far an integral of the flow can be continued by polynomials.
 
-    All corrections up to an order are unknowns of one linear system, since the next correction may require another
-    choice of the earlier ones, which are determined only up to integrals of the flow.
+    All corrections up to an order are unknowns of one linear system: corrections are determined only up to integrals of
+    the flow, and the next correction may exist for some choices only.
     """
     names = fields[0][0].context().names()
     context, top = ring(names), degree(integral)
     even = [tuple(p.project_to_context(context) for p in one) for one in fields[::2]]
     integral = integral.project_to_context(context)
-    # For homogeneous f and I so is each correction, since eps x is the only quantity of degree 0.
+    # For homogeneous f and I each correction is homogeneous, since eps x is the only quantity of degree 0.
     is_graded = all(is_homogeneous(p, 2) for p in even[0]) and is_homogeneous(integral, top)
     columns: list[tuple[int, fmpq_mpoly]] = []
     corrections: tuple[fmpq_mpoly, ...] = ()

@@ -1,6 +1,6 @@
-"""Affine integrals and invariant hyperplanes of the flow of a quadratic system: exactly, over Q.
+"""Affine integrals and invariant hyperplanes, exactly over Q, of the flow of a quadratic system.
 
-The Kahan map inherits both, an invariant hyperplane at each eps at which the map is defined on it (`under_map`). If
+The Kahan map inherits the integrals, and a hyperplane at each eps at which the map is defined on it (`under_map`). If
 v . f = 0, the map conserves v . x. If l = v . x + w satisfies l' = l L along the flow (an affine Darboux function: the
 hyperplane l = 0 is invariant, and L is the affine cofactor), the defining equation of the map gives
 
@@ -36,9 +36,9 @@ from kahanmaps.maps.kahan import KahanFamily, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
 
-# The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
+# The determinant has degree m (m + 3)/2 along a line for m variables. For m = 12 this is 90, and takes a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
-_LINE = 10**6  # bound of the random integers that define a line
+_LINE = 10**6  # bound of the modulus of the random integers that define a line
 _BUDGET = 20_000_000  # products of terms, for a determinant on a hyperplane
 
 
@@ -57,11 +57,11 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Affine Darboux functions, each one exact. `complete`: there are no others over Q; otherwise `reason` says why.
+    """Exact affine Darboux functions. `complete`: there are no others over Q; otherwise `reason` says why not.
 
-    Constants and the affine integrals (cofactor 0) are left out. The list is complete unless a random line is parallel
-    to an invariant hyperplane: its direction has random integers up to 10^6, so that for a given hyperplane this has a
-    probability below 10^-6.
+    Constants and the affine integrals (cofactor 0) are left out. A `complete` list is wrong only if the random line of
+    the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, the
+    probability of this is below 10^-6 for a given hyperplane.
     """
 
     functions: tuple[AffineDarboux, ...]
@@ -70,7 +70,7 @@ class AffineDarbouxList(ResultPart):
 
     @property
     def text(self) -> str:
-        """The number of functions, and whether there are others."""
+        """The number of functions, and whether the list is complete."""
         more = "no others" if self.complete else self.reason
         return f"{counted(len(self.functions), 'affine Darboux function')}, {more}"
 
@@ -100,8 +100,8 @@ def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
 class QuotientForms:
     """The linear forms modulo the affine integrals z = V x, in terms of the coordinates y = (x_i with i in `free`).
 
-    `section` is the n x m matrix S = dx/dy at fixed z: a form v becomes v S modulo the integrals, and the system for y
-    has the Jacobi matrix (rows `free` of f') S. `shift` is dx/dz, so that x = S y + shift z.
+    `section` is the n x m matrix S = dx/dy at fixed z. A form v is v S modulo the integrals, and the system for y has
+    the Jacobi matrix R S, where R consists of the rows `free` of f'. `shift` is dx/dz, so that x = S y + shift z.
     """
 
     integrals: tuple[tuple[fmpz, ...], ...]
@@ -117,7 +117,7 @@ class QuotientForms:
 def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
     """Return the linear forms of n variables modulo the independent forms `integrals`.
 
-    The free coordinates are the first ones that complete the integrals to a basis.
+    The free coordinates are the first coordinates that complete the integrals to a basis.
 
     >>> quotient_by([(fmpz(1), fmpz(1), fmpz(0))], 3).free
     (0, 2)
@@ -139,16 +139,16 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
 
 
 def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
-    """Find all invariant hyperplanes l = 0 over Q: affine l with l' = l L along the flow, L affine.
+    """Find all invariant hyperplanes l = 0 over Q, with l and L affine and l' = l L along the flow.
 
     Args:
         system: a quadratic system over Q.
         seed: the random seed of the line on which candidates are computed; the functions are exact for every seed.
 
     Returns:
-        An `AffineDarbouxList`. The list is not complete if the extactic determinant vanishes identically (there may be
-        infinitely many, as for x' = x, y' = y), or if more than 12 variables remain after the affine integrals are
-        eliminated: then it has only the l among the factors of the right-hand sides. Source: pereira-2001.
+        An `AffineDarbouxList`. It is not complete, and has only the l among the factors of the right-hand sides, in two
+        cases: the extactic determinant vanishes identically (there may be infinitely many l, as for x' = x, y' = y), or
+        more than 12 variables remain after the affine integrals are eliminated. Source: pereira-2001.
 
     >>> result = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
     >>> [(str(d.function), str(d.cofactor)) for d in result.functions], result.complete
@@ -171,8 +171,8 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     if system.digits > LONG_COEFFICIENTS:
         return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     over_Q = system.over(QQ)
-    # A line parallel to a hyperplane misses it. The seed depends on the system, so that nobody can choose a system with
-    # hyperplanes parallel to the line.
+    # A line parallel to a hyperplane does not meet it. The seed depends on the system, so that nobody can choose a
+    # system with hyperplanes parallel to the line.
     rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
     determinant_on_line = _determinant_along(over_Q, start, direction, quotient.free)
@@ -184,8 +184,8 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
         normals = nullspace(QQ, _taylor_rows(over_Q, x, quotient.free))
         if len(normals) > 1:
-            # The flow on the hyperplane is degenerate itself. The normal is a combination of these vectors that is a
-            # left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
+            # The Taylor coefficients do not determine the normal. It is a combination of these vectors that is a left
+            # eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
             basis = fmpq_mat([list(v) for v in normals])
             action = quotient.rows(over_Q.jacobian(x)) * quotient.section
             normals = []
@@ -218,7 +218,7 @@ def _determinant_along(
 ) -> fmpq_poly:
     """Interpolate the extactic determinant at start + t direction as a polynomial in t."""
     m = len(free)
-    count_work(1000 + 3 * m**5)  # the work of the whole search for hyperplanes, of which this is the main part
+    count_work(1000 + 3 * m**5)  # for the complete search for hyperplanes, whose main part is this determinant
     nodes = range(m * (m + 3) // 2 + 1)
     values = [
         _taylor_rows(over_Q, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes
@@ -238,7 +238,7 @@ def _rational_roots(polynomial: fmpq_poly) -> list[fmpq]:
 
 
 def _affine_darboux_factors(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]) -> tuple[AffineDarboux, ...]:
-    """Return the affine Darboux functions l among the factors of v . f, for v among `normals` (l' = l L = v . f)."""
+    """Return the affine Darboux functions among the factors of v . f, for all v in `normals`; l divides l' = v . f."""
     functions: dict[str, AffineDarboux] = {}
     for normal in normals:
         (component,) = linear_combinations(fmpq_mat([list(normal)]), system.rhs)
@@ -275,8 +275,8 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
 
     Returns:
         "invariant" if det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the restriction of the map to
-        the hyperplane is birational then. "undefined" if det(I - eps f') is 0 there; "contracted" if det(I + eps f')
-        is: the image of l = 0 is then of lower dimension. "undecided" if these determinants are too long to expand.
+        the hyperplane is birational then. "undefined" if det(I - eps f') is 0 there; "contracted" if det(I + eps f') is
+        0 there, so that the image of l = 0 has a lower dimension; "undecided" if they are too long to expand.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
     >>> x, y = system.rhs[0].context().gens()
@@ -292,7 +292,7 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
     point = [evaluate(x, QQ, free) for x in on_hyperplane]
     for outcome, signed_eps in (("undefined", eps), ("contracted", -eps)):
-        if KahanFamily(system).at(signed_eps).determinant(point) != 0:  # one point suffices: no need to expand
+        if KahanFamily(system).at(signed_eps).determinant(point) != 0:  # a nonzero value at one point suffices
             continue
         field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
         entries = [
@@ -309,6 +309,6 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
 
 
 def _coefficients(function: fmpq_mpoly) -> list[fmpq]:
-    """Return the coefficients of an affine function, those of the variables first."""
+    """Return the coefficients of an affine function: first of the variables, then the constant."""
     n = function.context().nvars()
     return [fmpq(function[tuple(int(i == j) for i in range(n))]) for j in range(n + 1)]

@@ -1,16 +1,15 @@
 """Candidates for the cofactors of discrete Darboux polynomials, and the search for polynomials with these cofactors.
 
-A discrete Darboux polynomial P of a map Phi satisfies P o Phi = C P with a rational function C, the cofactor. The zeros
-and poles of C lie on hypersurfaces that Phi contracts, and the Jacobi determinant vanishes or has poles there. For
-Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and the candidates are the products of
+A discrete Darboux polynomial P of a map Phi satisfies P o Phi = C P with a rational function C, the cofactor. The
+Jacobi determinant of Phi vanishes or has poles on the zeros and poles of C, which lie on hypersurfaces that Phi
+contracts. For Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and the candidates are the products of
 
     D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
-    l(x~)/l(x)                  for the affine l with l' = l L, which are Darboux polynomials themselves.
+    l(x~)/l(x)                  for the affine l with l' = l L along the flow, which are discrete Darboux polynomials.
 
 The cofactor of a polynomial that is even in eps satisfies C(x, eps) C(x~, -eps) = 1, and so do these products. For
-other maps the candidates are the products of the irreducible factors of det dPhi(x) and of 1/det M(x), each times a
-number that is the solution of an eigenvalue problem and changes with the scales of the variables.
-Source: celledoni-2019.
+other maps the candidates are the products of the irreducible factors of det dPhi(x) and of 1/det M(x), times a number
+that depends on the scaling of the variables; this number solves an eigenvalue problem. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -48,12 +47,12 @@ _SPARE = 8  # points beyond the number of unknowns
 _DETERMINANT_BUDGET = 20_000_000
 _DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
 _MAX_WORK = 4_000_000  # entries of matrices, about two seconds
-_MAX_DIMENSION = 16  # in higher dimension the determinant is not expanded: even a sparse one takes too long
+_MAX_DIMENSION = 16  # in higher dimension even a sparse determinant takes too long to expand
 
 
 @dataclass(frozen=True, eq=False)
 class Cofactor:
-    """A candidate cofactor: a function of x formed from a polynomial g in the variables, symbols and eps, by `kind`.
+    """A candidate cofactor: a function of x, given by its `kind` and a polynomial g in (variables, symbols, eps).
 
     "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps); "denominator": g(x~, eps)/g(x, eps).
     Without a polynomial the cofactor is det dPhi. `weight` approximates the least degree of a P with this cofactor.
@@ -65,7 +64,7 @@ class Cofactor:
     kind: str = "reversed"
 
     def fraction(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
-        """Return numerator and denominator of the value at a point, at these values of the symbols."""
+        """Return numerator and denominator of the cofactor at a point, for these values of the symbols."""
         if self.polynomial is None:
             return jacobian_determinant_fraction(map_, x, image)
         field, eps = map_.field, map_.eps
@@ -77,7 +76,7 @@ class Cofactor:
         return (g, field.one) if self.kind == "factor" else (field.one, g)
 
     def modular_fraction(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
-        """Return numerator and denominator of the value at a point modulo a prime."""
+        """Return numerator and denominator of the cofactor at a point modulo a prime."""
         if self.polynomial is None:
             return map_.determinant(x, image)
         residues = ([map_.map.field.convert(c) for c in entries] for entries in (x, image, map_.values))
@@ -96,7 +95,7 @@ DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
 def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
-    """Expand det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); None where it is too large."""
+    """Expand det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); return None if it is too large."""
     if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
         return None
     field = FunctionField(map_.names, _DETERMINANT_BUDGET)
@@ -112,7 +111,7 @@ def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
 def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     """Return cofactors from the irreducible factors over Q of det dPhi(x) and 1/det M(x).
 
-    Returns det dPhi alone where the determinants are too large to expand.
+    Returns det dPhi alone if the determinants are too large to expand.
     """
     n, D = map_.dim, determinant_polynomial(map_)
     field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
@@ -137,7 +136,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
 
 
 def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
-    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone if it is too large."""
+    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)), or det dPhi if it is too large."""
     n = map_.dim
     D = determinant_polynomial(map_)
     if D is None:
@@ -147,7 +146,7 @@ def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a function of eps
-        # D is 1 at eps = 0, so every factor is a number there. Divide by it to make the cofactor 1 at eps = 0.
+        # The determinant is 1 at eps = 0, so every factor is a number there. Divided by it, the cofactor is 1 there.
         constant = substitute(factor, {"eps": fmpq(0)})
         cofactors.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(cofactors, key=lambda cofactor: (cofactor.weight, cofactor.name)))
@@ -199,7 +198,7 @@ class Sample:
     map: ModularMap
     pairs: list[tuple[Point, Point]]
     cofactors: Sequence[Cofactor]
-    fractions: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: values by cofactor, then point
+    fractions: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: for each cofactor its values
 
     @property
     def up_to_numbers(self) -> bool:
@@ -212,7 +211,7 @@ class Sample:
         return cls(map_, list(map_.pairs(count)), cofactors)
 
     def values(self, product: CofactorProduct, count: int) -> list[tuple[int, int]]:
-        """Return numerator and denominator of a product at each of the first `count` points."""
+        """Return numerator and denominator of a product of cofactors at each of the first `count` points."""
         prime = self.map.prime
         values = [(1, 1)] * min(count, len(self.pairs))
         for k, (power, cofactor) in enumerate(zip(product.powers, self.cofactors, strict=True)):
@@ -232,8 +231,8 @@ def cofactor_space(
 ) -> DarbouxSpace:
     """Return the space of all P of degree at most `degree` with P(x~) = C(x) P(x); its basis may be empty.
 
-    With a `model`, the space modulo another prime, only the monomials of its elements are used. The sample must have
-    as many points as `points_needed` says.
+    A `model` is the space modulo another prime: only the monomials of its elements are then used. The sample must have
+    at least `points_needed` points.
     """
     places = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.places
     at_points, at_images = _values(sample, product, degree, places)
@@ -245,10 +244,10 @@ def cofactor_space(
 def cofactor_spaces(
     sample: Sample, product: CofactorProduct, degree: int, models: Sequence[DarbouxSpace] = ()
 ) -> list[tuple[int, DarbouxSpace]]:
-    """Return each number c with its space of P with P(x~) = c C(x) P(x), for C known up to a numerical factor.
+    """Return the numbers c with the space of all P with P(x~) = c C(x) P(x), for C known up to a numerical factor.
 
-    With `models` only monomials of their elements are used. Numbers c outside the field of the prime are left out. If
-    the cofactors of the sample are known exactly, only c = 1 is tried.
+    If there are `models`, only the monomials of their elements are used. Numbers c outside GF(p) are left out. If the
+    cofactors of the sample are known exactly, only c = 1 is tried.
     """
     prime, terms = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
     places = sorted({k for model in models for k in model.places}) if models else range(terms)
@@ -257,8 +256,8 @@ def cofactor_spaces(
         space = cofactor_space(sample, product, degree, merged)
         return [(1, space)] if space.basis else []
     # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must
-    # satisfy K P = 0 at the other points, and so must M P, M^2 P, ...: few of the equations K M^j P = 0 usually
-    # suffice.
+    # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
+    # usually suffice.
     count = len(places)
     at_points, at_images = _values(sample, product, degree, places)
     count_work(count**3 / 500)
@@ -294,7 +293,7 @@ def cofactor_spaces(
 def _values(
     sample: Sample, product: CofactorProduct, degree: int, places: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
-    """Return the rows C m(x) and m(x~) of the monomials m, both times the denominator of C, one row for each point."""
+    """Return C m(x) and m(x~) for all monomials m, both times the denominator of C, as one row for each point."""
     at_points, at_images, count = [], [], len(places) + _SPARE
     count_work(count * len(places) / 8)
     for (x, image), fraction in zip(sample.pairs[:count], sample.values(product, count), strict=True):
@@ -305,7 +304,7 @@ def _values(
 
 
 def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
-    """Return the number of points a sample needs for polynomials of this degree, or for the monomials of `models`.
+    """Return the number of points that are needed for all polynomials of a degree, or for the monomials of `models`.
 
     >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
     (18, 10)
@@ -317,7 +316,7 @@ def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
 def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofactor]:
     """Return the cofactors g(x~)/g(x), for integrals whose denominators are products of these polynomials g.
 
-    If there are too many polynomials, only the first ones are used.
+    If there are too many products of the g, only the first polynomials are used.
     """
     cofactors = list[Cofactor]()
     for g in polynomials:
@@ -336,7 +335,7 @@ class SearchStep:
     degree: int
     product: CofactorProduct | None
     text: str
-    two_point_basis: TwoPointBasis | None = None  # of "iterates"
+    two_point_basis: TwoPointBasis | None = None  # only for kind "iterates"
     up_to_numbers: bool = False  # whether the cofactors of the spaces are numerical multiples of the product
 
 
@@ -344,8 +343,9 @@ class SearchStep:
 class SpaceSearch:
     """The result of a search on one map: a list of spaces for each step.
 
-    The products in the steps refer to `cofactors`, which were tried up to `cofactor_degree`; `searched` are the degrees
-    of relations along orbits whose span was searched. `cut` says which cofactors the budget did not allow.
+    The products in the steps are products of the `cofactors`, for which polynomials up to `cofactor_degree` were tried;
+    `searched` are the degrees of relations along orbits whose span was searched. `cut` says which cofactors were left
+    out because the budget was spent.
     """
 
     steps: list[SearchStep] = field(default_factory=list)
@@ -362,7 +362,7 @@ class SpaceSearch:
 
     @property
     def tried(self) -> str:
-        """A phrase for the functions among which integrals were searched for."""
+        """A phrase for the functions that were searched for integrals."""
         phrases = []
         if self.cofactor_degree:
             phrases.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
@@ -388,13 +388,13 @@ def search_cofactors(
     """Search by increasing degree for spaces with a common cofactor whose ratios are new integrals.
 
     The search ends when `required` independent integrals are known, when it takes too much work, or when the `budget`
-    is spent. A space counts only if it gives an integral independent of those of the `known_spaces` and of earlier
-    spaces. The cofactors are products of the `cofactors`, or of the `denominators`; at last, if the `cofactors` are
-    known only up to a numerical factor, their products times any number.
+    is spent. A space is added only if it gives an integral independent of the integrals of the `known_spaces` and of
+    earlier spaces. The cofactors that are tried are products of the `cofactors`, then products of the `denominators`.
+    If the `cofactors` are known only up to a numerical factor, their products times any number come last.
 
-    To save unknowns: if P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its coordinates in a
-    basis of these relations are unknown. And Q is, up to a factor, the difference of relations along two orbits, which
-    excludes most products as denominators.
+    Two observations save unknowns. If P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its
+    coordinates in a basis of these relations are unknown. And Q is, up to a factor, the difference of relations along
+    two orbits, which excludes most products as denominators.
     """
     prime, dim, all_cofactors, work = map_.prime, map_.dim, [*cofactors, *denominators], 0
     result = SpaceSearch(cofactors=all_cofactors)
@@ -445,7 +445,7 @@ def search_cofactors(
                 for (a, b), before, after in zip(sample.values(product, count), at_points, at_images, strict=True)
             ]
             coordinates = null_space(equations, len(relations), prime)
-            # At a point of the orbit P = c Q, so the gradient of P/Q is that of P - c Q up to a factor.
+            # At a point of the orbit P = c Q, so the gradients of P/Q and of P - c Q are proportional.
             gradients = [
                 gradient_values(R, orbit.point, degree, prime)[1] for R in combine(coordinates, relations, prime)
             ]
@@ -459,8 +459,8 @@ def search_cofactors(
                 spaces.append(space)
                 result.add(SearchStep("cofactor", degree, product, product.origin(all_cofactors)), [space])
         result = replace(result, cofactor_degree=degree)
-    # Factors of determinants are cofactors up to numbers. The loop above tried the number 1 only: a third of the work,
-    # and often enough.
+    # Factors of determinants are cofactors up to numbers. The preceding loop tried only the number 1, which often
+    # suffices, and takes a third of the work.
     if all(cofactor.kind == "reversed" for cofactor in cofactors):
         return result
     sample = Sample.of(map_, all_cofactors, points_needed(dim, max_degree))
@@ -488,7 +488,7 @@ def search_cofactors(
 
 
 def _is_spanned(polynomial: nmod_mpoly, places: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
-    """Whether a polynomial is in the span of the rows of an echelon form; `rows` has each row by its pivot."""
+    """Return whether a polynomial is in the span of the rows of an echelon form; the keys of `rows` are pivots."""
     remainder = {places[exponents]: int(c) for exponents, c in polynomial.terms()}
     count_work(5 + 2 * len(remainder))
     while remainder:

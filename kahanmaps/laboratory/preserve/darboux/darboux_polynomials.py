@@ -1,7 +1,7 @@
 """The search for discrete Darboux polynomials of a map: P of bounded degree with P(x~) = C(x) P(x), for many C.
 
-C runs through the products of the cofactors in cofactors.py, times any number if these are known only up to a numerical
-factor. A space of such P is listed unless products of elements of other spaces span it. Source: celledoni-2019.
+C runs through products of the cofactors of cofactors.py, times any number if these are known only up to a number. A
+space is listed unless products of elements of others span it. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ ScaledProduct = tuple[CofactorProduct, int]  # a product of cofactors and its nu
 class DarbouxPolynomials(LatexDisplay, ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
-    For a flow it is K in P' = K P. The verdict on the identity for all P is proved (expanded) or supported.
+    For a flow `cofactor` is K in P' = K P. The verdict on the identity for all P is proved (expanded) or supported.
     """
 
     cofactor: str
@@ -109,10 +109,10 @@ def darboux_polynomials(
     progress: Callable[[str], None] = lambda _: None,
     on_result: Callable[[DarbouxSearch], None] = lambda _: None,
 ) -> DarbouxSearch:
-    """Search for the discrete Darboux polynomials of degree at most `max_degree` with a cofactor of the usual form.
+    """Search for the discrete Darboux polynomials of degree at most `max_degree` whose cofactors are products.
 
-    The cofactors are the products of those in cofactors.py; for maps other than Kahan maps these products times any
-    number, which may contain the symbols and eps.
+    The cofactors are the products of the factors in cofactors.py; for maps other than Kahan maps, these products times
+    any number, which may depend on the symbols and eps.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
@@ -124,8 +124,8 @@ def darboux_polynomials(
             (flow_polynomials.py).
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
-        progress: called with the cofactor that is tried.
-        on_result: called with the spaces so far after each new one, for searches that may be interrupted.
+        progress: called with each cofactor before it is tried.
+        on_result: called with the spaces so far after each new space, for searches that may be interrupted.
 
     Returns:
         A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space spanned by
@@ -147,7 +147,7 @@ def darboux_polynomials(
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     budget, cofactors = budget_for("Darboux polynomials", effort), laboratory.cofactors()
     spaces = list[DarbouxPolynomials]()
-    # With a defect the image lies on a hypersurface, and every multiple of its equation would have the cofactor 0.
+    # With a defect the image may lie on a hypersurface, and all multiples of its equation have the cofactor 0.
     reason = laboratory.defect
     if flow:
         assert laboratory.field is not None
@@ -184,8 +184,8 @@ def darboux_polynomials(
             basis = [vector for vector in space.basis if any(vector[1:])]  # without constants, which have C = 1
             if basis:
                 nonconstant[C] = DarbouxSpace(space.dim, space.degree, basis)
-        # Different products of cofactors may be the same function. If products span the space of one of them, the equal
-        # spaces of the others are left out as well.
+        # Different products of cofactors may be the same function, and have equal spaces. If products of elements span
+        # one of these spaces, all of them are left out.
         listed = [space for C, space in nonconstant.items() if _is_spanned_by_products(nonconstant, C, map_.prime)]
         for C, space in nonconstant.items():
             if space not in listed:
@@ -203,7 +203,7 @@ def darboux_polynomials(
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
-    """Whether products P Q of elements of other spaces, whose cofactors multiply to `C`, span the space of `C`."""
+    """Return whether products P Q of elements of other spaces with cofactors of product `C` span the space of `C`."""
     space, (product, c) = spaces[C], C
     others = {(key[0].powers, key[1]): other for key, other in spaces.items() if key != C}
     rows = []
@@ -223,13 +223,13 @@ def _closed_form(
     spaces: Sequence[DarbouxSpace],
     budget: Budget,
 ) -> DarbouxPolynomials | str:
-    """Return the first of the spaces in closed form, or the reason why there is none.
+    """Return formulas for the first of the spaces, or the reason why there are none.
 
-    The cofactors of the other spaces are that of the first times a number.
+    The cofactors of the spaces differ by numerical factors.
     """
     text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
-    # Interpolating all spaces at once distinguishes those with the same zero pattern. If that fails, try the first
-    # alone: the others may be conjugate over an extension of Q and have no formula.
+    # Interpolating all spaces together distinguishes spaces with the same zero pattern. If that fails, try the first
+    # space alone: the other spaces may be conjugate over an extension of Q and have no formula.
     for group in [spaces, spaces[:1]][len(spaces) == 1 :]:
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
         search = SpaceSearch([step], [list(group)], cofactors)
@@ -241,7 +241,7 @@ def _closed_form(
     polynomials = tuple(P for P in bases[0] if not P.is_constant())
 
     def number(map_: ModularMap) -> list[int]:
-        """Return the quotient of the cofactor by the product."""
+        """Return the number by which the product is multiplied in the cofactor."""
         sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
         [(numerator, denominator)], [pair] = sample.values(product, 1), sample.pairs
         arguments = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)

@@ -5,9 +5,9 @@ along the orbits on which P/Q = c. The search reverses this:
 
 1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials, which contains P and Q.
 2. Let w_a be a basis of W. The antisymmetric matrices A with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x
-   form a linear space. For every space U with a common cofactor it contains all antisymmetric matrices on U.
-3. The matrices E with E A = A E^T for all these A are scalars on each U, so the U are eigenspaces of a random E. If the
-   sum of the spaces U is not direct, the search looks for the A of rank 2, by the vanishing of their 4 x 4 Pfaffians.
+   form a linear space. It contains all antisymmetric matrices on U for every space U with a common cofactor.
+3. The matrices E with E A = A E^T for all these A are scalars on each U, so each U is an eigenspace of a random E. If
+   the sum of the spaces U is not direct, the search looks for matrices A of rank 2, whose 4 x 4 Pfaffians vanish.
 
 Multiples of known spaces of lower degree form a subspace W_T, which is split off first. A matrix A that comes from
 multiples has entries on W_T only. The entries of A between a complement of W_T and W_T are the corrections that turn
@@ -21,8 +21,8 @@ polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. Along 
 relations as monomials do, and the same null spaces give the combinations with a common cofactor.
 
 If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
-be integrals, but ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are (~: one step later). For the values
-of F along an orbit lie in a plane, and these minors are its Pluecker coordinates. Source: petrera-suris-2018.
+be integrals, but the ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are integrals (F~ is F one step
+later). For the values of F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span
 
 _SPARE = 8  # points beyond the number of unknowns
 _MAX_FORMS = 12
-# Bounds of dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
+# Bounds of s = dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
 TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
 
@@ -64,9 +64,9 @@ class DarbouxSpace:
     """A space of polynomials of degree at most `degree` with one common cofactor, modulo a prime.
 
     `basis` has coefficient vectors on `exponents_up_to(dim, degree)`; ratios of two elements are integrals. The
-    coefficient of the largest monomial of each element is 1. If the dimension is 2, the basis consists of the sparsest
-    elements, by degree, then by number of terms; otherwise it is the reduced echelon basis for descending monomials.
-    The first element is the natural denominator.
+    coefficient of the largest monomial of each element is 1. If the dimension is 2, the basis has the two sparsest
+    elements, ordered by degree, then by number of terms; if not, it is the reduced echelon basis for descending
+    monomials. The first element is the denominator of integrals.
     """
 
     dim: int
@@ -77,7 +77,7 @@ class DarbouxSpace:
     def spanned_by(
         cls, dim: int, degree: int, vectors: Vectors, prime: int, places: Sequence[int] | None = None
     ) -> DarbouxSpace:
-        """Return the span of vectors modulo a prime, given on all monomials or on those with the indices `places`."""
+        """Return the span of vectors modulo a prime; their entries belong to all monomials, or to those in `places`."""
         if places is not None:
             full_rows = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
             for row, vector in zip(full_rows, vectors, strict=True):
@@ -105,19 +105,19 @@ class DarbouxSpace:
         return tuple(tuple(bool(entry) for entry in vector) for vector in self.basis)
 
     def multiples(self, degree: int, prime: int) -> Vectors:
-        """Return a basis of the products with all monomials, up to a degree."""
+        """Return a basis of the products of the elements with monomials, up to a degree."""
         factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
         rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
         return echelon([row for row in rows if row is not None], prime)
 
 
 def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
-    """Return the two sparsest elements of a pencil, among those in which a monomial of the pencil is missing."""
+    """Return the two sparsest elements of a pencil, among the elements that lack a monomial of the pencil."""
     degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
     P, Q = basis
     count_work(len(P) + 2 * len(degrees))
     occurring = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
-    zeros: dict[int | None, set[int]] = {}  # the missing monomials of each special member, by its parameter
+    zeros: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
     for k in occurring:
         zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
     supports = [([k for k in occurring if k not in missing], min(missing)) for missing in zeros.values()]
@@ -134,15 +134,15 @@ def darboux_spaces(
 ) -> list[DarbouxSpace] | None:
     """Find the spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
 
-    Returns None, without a search, if the relations span more than `largest` dimensions. Relations may remain that
-    belong to no space: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
+    Returns None, without a search, if the relations span more than `largest` dimensions. There may be relations that no
+    space explains: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
     """
     prime = map_.prime
     span = span_of_relations(map_, degree, 2 * LARGEST_SPAN)
     if len(span) > 2 * LARGEST_SPAN:
         return None
     multiples = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
-    # `complement` completes the multiples of known spaces to a basis of the sum.
+    # `complement` completes the multiples of known spaces to a basis of the sum of multiples and span.
     stacked = [*multiples, *span]
     independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
     complement = [stacked[k] for k in independent if k >= len(multiples)]
@@ -174,7 +174,7 @@ def darboux_spaces(
 
 
 def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple[nmod_mat, nmod_mat]:
-    """Return the values of the polynomials at random points and at their images, one row for each point."""
+    """Return the values of the polynomials at random points and at the images of these, one row for each point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
     at_points, at_images = (
@@ -185,7 +185,7 @@ def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple
 
 
 def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
-    """Whether all ratios of the polynomials are conserved at random points."""
+    """Return whether all ratios of the polynomials are conserved at random points."""
     u, v = _values(map_, basis, degree, 6)
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
@@ -193,12 +193,12 @@ def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
 def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
     """Compute the spaces with a common cofactor from the matrices A on complement + multiples.
 
-    The projections of the spaces to the complement are eigenspaces of a random E with E A = A E^T, where A stands for
-    the block on the complement of each of the matrices.
+    The projections of the spaces to the complement are eigenspaces of a random E with E B = B E^T for the block B, on
+    the complement, of every A.
     """
     k, size, rng = len(complement), len(complement) + len(multiples), random.Random(prime)
-    # The columns of the blocks on the complement span the projections of the spaces. Take an echelon basis b_i of this
-    # span: then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
+    # The columns of the blocks on the complement span the projections of the spaces. With an echelon basis b_i of this
+    # span a block is sum A'_ij b_i b_j^T, where A' consists of the entries of the block at the pivots.
     count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
     n, pivot_columns = len(coordinates), pivots(coordinates)
@@ -210,7 +210,7 @@ def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors
         blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_FORMS)]
     rows = []
     count_work(n**3 + n**4 / 100)
-    for A in blocks[:2]:  # two A leave few E with E A = A E^T; the other A are applied to these
+    for A in blocks[:2]:  # two A leave few E with E A = A E^T, which are then restricted by the other A
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -229,7 +229,7 @@ def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors
     count_work(10 + 2 * n**3)
     for factor, _ in E.charpoly().factor()[1]:
         if factor.degree() != 1:
-            continue  # these spaces are conjugate over an extension of the field
+            continue  # the spaces of this factor are conjugate over an extension of the field
         root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
         shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
         eigenvectors = null_space(shifted, n, prime)
@@ -242,7 +242,7 @@ def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors
 
 
 def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
-    """Return the row space of the matrix of rank 2 among the combinations of few matrices, if there is exactly one.
+    """Return the row space of the combination sum c_s A_s of rank 2 of few matrices A_s, if there is exactly one.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
     symmetric matrices that all these forms annihilate are the multiples of c c^T.
@@ -269,7 +269,7 @@ def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> 
                 + B[0, 3] * A[1, 2]
             )
 
-        # entry (s, t) of c c^T is c_s c_t: its factor is the polar form, half of it on the diagonal
+        # entry (s, t) of c c^T is c_s c_t; its coefficient is the polar form, and half of it on the diagonal
         half = (prime + 1) // 2
         rows.append([pfaffian(compressed[s], compressed[t]) * (half if s == t else 1) % prime for s, t in pairs])
     common = null_space(rows, len(pairs), prime)
@@ -285,14 +285,14 @@ def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> 
 
 
 def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
-    """Add to each vector of `block`, a basis of the projection of a space to the complement, its part in the multiples.
+    """Complete a basis `block` of the projection of a space to the complement by components in the multiples.
 
-    Returns coordinates on complement + multiples, or None if the matrices do not determine these parts.
+    Returns coordinates on complement + multiples, or None if the matrices do not determine these components.
     """
     if size == k:
         return block
-    # Take the combinations of the A whose block on the complement belongs to this space: its columns are combinations
-    # of the vectors of `block`.
+    # Take the combinations of the A whose blocks on the complement belong to this space: the columns of such blocks are
+    # combinations of the vectors of `block`.
     block_pivots = pivots(block)
     others = [i for i in range(k) if i not in block_pivots]
     conditions = []
@@ -338,10 +338,10 @@ def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) ->
 
 
 class TwoPointBasis(NamedTuple):
-    """A basis of bilinear forms in x and its k-th iterate.
+    """A basis of bilinear forms in (1, x) and (1, y), where y is the k-th iterate of x.
 
-    `shift` is k; `sign` is 1 for symmetric forms and -1 for Wronskians; `rank` is the dimension, 1 or 2, of the span of
-    the values of a space of functions along an orbit.
+    `shift` is k; `sign` is 1 for symmetric forms and -1 for Wronskians. `rank` is 1 or 2: the dimension of the span of
+    the values that the functions of a space have along an orbit.
     """
 
     shift: int
@@ -350,7 +350,7 @@ class TwoPointBasis(NamedTuple):
 
     @property
     def text(self) -> str:
-        """A phrase on the origin of integrals among these functions."""
+        """A phrase on the origin of integrals that are formed from these functions."""
         if self.shift == 0:
             return "relations of degree 2 along orbits on levels of the affine integrals"
         kind = "bilinear relations" if self.sign > 0 else "relations of Wronskians"
@@ -370,7 +370,7 @@ TWO_POINT_BASES = (
 
 @cache
 def pairs_of(dim: int) -> tuple[tuple[int, int], ...]:
-    """Return for each monomial of degree at most 2 the indices i <= j of its factors in (1, x)."""
+    """Return, for each monomial of degree at most 2, the indices i <= j of its two factors in (1, x)."""
     pairs = []
     for exponent in exponents_up_to(dim, TWO_POINT_DEGREE):
         factors = [k for k, e in enumerate(exponent, 1) for _ in range(e)]
@@ -383,14 +383,14 @@ class TwoPointMap(ModularMap):
     """A map modulo a prime that gives monomials of degree at most 2 the values of a `TwoPointBasis`."""
 
     def __init__(self, base: ModularMap, two_point_basis: TwoPointBasis) -> None:
-        # The same map and random generator; only the values of monomials differ.
+        # The map and random generator are those of `base`; only the values of monomials differ.
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.two_point_basis = base.rng, base.map, two_point_basis
 
     def _values(self, x: Point, y: Point) -> list[int]:
         p, sign, X, Y = self.prime, self.two_point_basis.sign, (1, *x), (1, *y)
         count_work(len(pairs_of(self.dim)) / 2)
-        # The Wronskian of a square is 0. Random numbers instead of zeros keep it out of all relations.
+        # The Wronskian that stands for a square is 0. Random numbers replace it, so that no relation contains it.
         return [
             self.rng.randrange(p) if sign < 0 and i == j else (X[i] * Y[j] + sign * X[j] * Y[i]) % p
             for i, j in pairs_of(self.dim)
@@ -399,7 +399,7 @@ class TwoPointMap(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return the values along an orbit, its first point, and its period if it closes."""
+        """Return the values along an orbit, its first point, and its period (None if the orbit does not close)."""
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         closed = len(points) < count + shift
         shifted = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
@@ -410,7 +410,7 @@ class TwoPointMap(ModularMap):
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values at a point and one step later, times the two `factors`."""
+        """Return the values at a point and at its image, times the two `factors`."""
         points = [x, image]
         while len(points) < self.two_point_basis.shift + 2:
             after = self.step(points[-1])
@@ -424,7 +424,7 @@ class TwoPointMap(ModularMap):
 def two_point_spaces(map_: ModularMap, basis: TwoPointBasis) -> list[DarbouxSpace]:
     """Find the spaces of functions of two points with a common cofactor.
 
-    For rank 2 this is the one space of all functions that occur in relations along orbits.
+    For rank 2 the result is a single space, of all functions that occur in relations along orbits.
     """
     two_point_map = TwoPointMap(map_, basis)
     if basis.rank == 1:
@@ -438,7 +438,7 @@ def two_point_spaces(map_: ModularMap, basis: TwoPointBasis) -> list[DarbouxSpac
 def bases_with_spaces(
     map_: ModularMap, bases: Sequence[TwoPointBasis] = TWO_POINT_BASES
 ) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
-    """Return the bases of forms that have spaces, with the spaces: of rank 1 or, if there are none, of rank 2."""
+    """Return the bases that have spaces, with their spaces: those of rank 1 or, if there are none, those of rank 2."""
     pairs = []
     for basis in bases:
         for candidate in (basis, basis._replace(rank=2)):

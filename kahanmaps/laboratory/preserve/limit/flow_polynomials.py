@@ -3,22 +3,22 @@
 The cofactor K is not given. Expand the monomials up to a degree along a solution, and write their Taylor coefficients
 into a matrix, one order in each row. If the solution starts on P = 0, every row is orthogonal to the coefficients of P:
 the matrix has a smaller rank there than at random points, and P divides its minors, the extactic determinants
-(pereira-2001). These are interpolated on a random line modulo a prime. On the line a P of degree d has d zeros, with
-conjugate zeros in one irreducible factor, and P vanishes along the solutions from all of them. So, for each choice of
-factors whose degrees add up to d, the search computes the space of polynomials that vanish along the solutions from
-their zeros; P lies in one of these spaces. Several lines give smaller spaces, by intersection. If all spaces are 0,
-there is no P. If a space has dimension 1, its element P is lifted to Q, and an exact division shows whether P divides f
-. grad P.
+(pereira-2001). The minors are interpolated on a random line modulo a prime. On the line a P of degree d has d zeros,
+with conjugate zeros in one irreducible factor, and P vanishes along the solutions from all these zeros. So, for each
+choice of factors of the minors whose degrees add up to d, the search computes the space of polynomials that vanish
+along the solutions from the zeros of the factors; P lies in one of these spaces. Several lines give smaller spaces, by
+intersection. If all spaces are 0, there is no P. If a space has dimension 1, its element P is lifted to Q, and an exact
+division shows whether P divides f . grad P.
 
 Lifting uses Newton's iteration: P and K modulo p solve f . grad P = K P, usually as a simple solution, so that they are
-determined modulo powers of p. If the coefficients are residues of rational numbers there, P is found. If they are
-residues of algebraic numbers, P is one of several conjugate polynomials, and their product has a higher degree.
-Polynomials for which neither holds are combined with those modulo the next prime. A degree is settled once every
-polynomial modulo some prime is lifted or irrational.
+determined modulo powers of p. If the coefficients modulo a power are residues of simple rational numbers, P is lifted.
+If they are residues of algebraic numbers, P is one of several conjugate polynomials, whose product has a higher degree.
+All other P are combined with polynomials modulo the next prime. A degree is settled once every polynomial modulo some
+prime is lifted or irrational.
 
 Weights w of the variables form a grading if all terms x^a of all x_i' have the same w . a - w_i. Then the cofactor K of
 a P is homogeneous, and it is the cofactor of every homogeneous part of P. The quotients of these parts are integrals,
-so a P that belongs to no integral is homogeneous in every grading. Hence the monomials of each weight are searched.
+so a P that belongs to no integral is homogeneous in every grading. Hence each search uses the monomials of one weight.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ from kahanmaps.laboratory.modular_points import ModularFlow, Point, Values, expo
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.systems.polynomial import PolynomialField
 
-_DEFAULT_MONOMIALS = 21  # bound for the default degree, which takes about a second
-_MAX_MONOMIALS = 56  # bound for a requested degree: a line takes a minute
+_DEFAULT_MONOMIALS = 21  # bound of the number of monomials for the default degree; a search takes about a second
+_MAX_MONOMIALS = 56  # bound of the number of monomials for a requested degree; a line takes a minute
 _MAX_LISTED = 20_000  # monomials up to a degree, before they are grouped by weight
 _SPARE = 8  # orders of a series beyond the number of monomials
-_MAX_CHOICES = 400  # of zeros on a line, and of pairs of choices
+_MAX_CHOICES = 400  # choices of zeros on a line, and pairs of choices on two lines
 _PRIMES = 12  # the first one usually suffices
 _PRECISION = 24  # exponent of a prime power, which has 1,464 bits
 _MAX_CONJUGATES = 8
@@ -63,8 +63,8 @@ class FlowPolynomials:
     """Darboux polynomials of a vector field, irreducible over Q and not integrals, each exact, short ones first.
 
     Members P - c Q of the pencil of an integral P/Q are left out unless they are factors of right-hand sides. There are
-    no others of degree at most `degree` (measured on lines modulo primes); symbols count for the degree. `reason` says
-    why higher requested degrees are not settled, for example because a polynomial modulo primes was not lifted to Q.
+    no other polynomials of degree at most `degree`, in variables and symbols (measured on lines modulo primes).
+    `reason` says why higher requested degrees are not settled, for example because a polynomial was not lifted to Q.
     """
 
     functions: tuple[fmpq_mpoly, ...]
@@ -79,8 +79,8 @@ def flow_polynomials(
 
     Args:
         field: the vector field x' = f(x), exact. A symbol s counts as a variable with s' = 0.
-        max_degree: the largest degree of the polynomials in variables and symbols; by default up to 4, as long as there
-            are at most 21 monomials (of one weight, if the field has gradings).
+        max_degree: the largest degree of the polynomials in variables and symbols; by default the largest one up to 4
+            with at most 21 monomials (of one weight, if the field has gradings).
         budget: the work limit; None means no limit.
         seed: the random seed of lines and primes.
 
@@ -107,8 +107,8 @@ def flow_polynomials(
     budget = budget or Budget()
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known: dict[str, fmpq_mpoly] = {}
-    # Factors of the right-hand sides come first: a common factor of all is a set of fixed points, which the search
-    # cannot see, and if there are infinitely many polynomials, as for x' = x, y' = y, formulas need these.
+    # Factors of the right-hand sides come first: the search does not find a common factor of all, whose zeros are fixed
+    # points; and if there are infinitely many P, as for x' = x, y' = y, formulas need these factors.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known.setdefault(str(P), P)
@@ -144,9 +144,9 @@ def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
 
 
 def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
-    """Return the possible supports of an irreducible polynomial of this degree, as lists of indices of monomials.
+    """Return the possible supports of an irreducible polynomial of a degree, as lists of indices of monomials.
 
-    The monomials of a support have one weight in each grading, no common variable, and one of them has the full degree.
+    The monomials of a support have one weight in each grading, no common variable, and one of them has this degree.
     """
     exponents, by_weight = exponents_up_to(n, degree), dict[tuple[int, ...], list[int]]()
     for k, exponent in enumerate(exponents):
@@ -161,7 +161,7 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
 
 @dataclass
 class _Search:
-    """The search for polynomials of one degree with given monomials; `known` has those found so far, by text."""
+    """The search for polynomials of one degree with given monomials; `known` has the results so far, by text."""
 
     field: PolynomialField
     degree: int
@@ -174,10 +174,10 @@ class _Search:
         self.monomials = [exponents[k] for k in self.support]
 
     def run(self, primes: list[int], budget: Budget) -> str:
-        """Add the polynomials to `known`; return why there may be others, or "" if there are none.
+        """Add the polynomials to `known`; return why there may be further polynomials, or "" if there are none.
 
-        The next search begins with the prime that settles this one: factors over extensions of Q that have no residues
-        modulo this prime then do not reappear in products.
+        The next search begins with the prime that settles this one: modulo this prime no conjugate polynomials exist
+        whose products would reappear in a higher degree.
         """
         reason = "lines modulo primes leave others possible"
         combined: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
@@ -191,7 +191,7 @@ class _Search:
             vectors, is_complete = self._modulo(flow, budget)
             missing = list[list[int]]()
             for vector in vectors:
-                if not self._lifts(vector, prime):  # a higher power decides: rational, or with conjugates
+                if not self._lifts(vector, prime):  # rational or conjugate, decided modulo a power
                     residues, modulus = self._newton(vector, prime), prime**_PRECISION
                     is_known = residues and self._lifts(residues, modulus)
                     if not is_known and not any(_is_irrational(c, modulus) for c in residues):
@@ -215,7 +215,7 @@ class _Search:
         return reason
 
     def _modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
-        """Return coefficients of monic polynomials modulo the prime of a flow, and whether these are all."""
+        """Return coefficients of monic polynomials modulo the prime of a flow, and whether there are no others."""
         common: list[Vectors] = []
         for k in range(_LINES):
             spaces = _Line(flow, self.degree, self.support, self.known.values()).spaces()
@@ -244,7 +244,7 @@ class _Search:
         if darboux_cofactor(self.field, P) is None:
             return False
         # Test that P is special: along the solution from a zero of P, modulo a new prime, more polynomials vanish than
-        # along a generic solution. Otherwise P may be an arbitrary member of a pencil, since every residue of its
+        # along a generic solution. If not, P may be an arbitrary member of a pencil, since every residue of its
         # parameter lifts: for example a product of conjugate lines of two special members, x^2 + y^2 - 1 + 2 i y.
         is_special = None
         while is_special is None:
@@ -294,7 +294,7 @@ class _Search:
             residual = flow_derivative(P) - combination(K_coefficients, cofactor) * P
             if any(int(c.p) % modulus for c in residual.coeffs()):
                 return []
-            count_work(len(terms) * sum(map(len, f)))  # without `solve`, which counts its own work
+            count_work(len(terms) * sum(map(len, f)))  # `solve` counts its own work
             correction = solve(columns, residual / -modulus)
             if correction is None:
                 return []
@@ -306,7 +306,7 @@ class _Search:
 
 
 def _is_irrational(residue: int, modulus: int) -> bool:
-    """Whether this is the residue of a root of an irreducible polynomial of degree 2 to 8 with small coefficients.
+    """Return whether a residue is a root of an irreducible polynomial of degree 2 to 8 with small coefficients.
 
     >>> p = 7**60
     >>> root = 3  # of x^2 - 2 modulo 7
@@ -321,7 +321,7 @@ def _is_irrational(residue: int, modulus: int) -> bool:
         rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
         count_work(50 * degree**3)
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
-        # For a random residue the entries have about 1/(degree + 1) of the bits of the modulus.
+        # For a random residue the entries of the shortest vector have about 1/(degree + 1) of the bits of the modulus.
         if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
             factors = [factor for factor, _ in fmpz_poly(shortest).factor()[1] if factor(residue) % modulus == 0]
             return bool(factors) and all(factor.degree() > 1 for factor in factors)
@@ -337,8 +337,8 @@ def _monic(vector: Sequence[int], prime: int) -> list[int]:
 class _Line:
     """A random line x = start + t slope, and the special points on it.
 
-    A point is special if more polynomials with the monomials of the `support` vanish along its solution than along a
-    generic one. Zeros of the `known` polynomials are left out.
+    A point is special if more polynomials with monomials in the `support` vanish along the solution from the point than
+    along a generic solution. Zeros of the `known` polynomials are left out.
     """
 
     def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], known: Iterable[fmpq_mpoly]) -> None:
@@ -355,7 +355,7 @@ class _Line:
         """Return, for each special factor of a polynomial in t, its degree and its space.
 
         The space consists of the polynomials that vanish along the solutions from the zeros of the factor. A factor is
-        special if this space is larger than for as many random points, where products of I - c with integrals I vanish.
+        special if this space is larger than for equally many random points, where products of integrals I - c vanish.
         """
         points = []
         count_work(max(0, int(on_line.degree())) ** 2)
@@ -367,7 +367,7 @@ class _Line:
         return points
 
     def _generic_dimension(self, points: int) -> int:
-        """Return the dimension of the space of polynomials that vanish along the solutions from random points."""
+        """Return the dimension of the space of polynomials that vanish along solutions from `points` random points."""
         if points not in self._generic_dimensions:
             rows = [row for _ in range(points) for row in self._rows(None)]
             self._generic_dimensions[points] = len(null_space(rows, self.count, self.flow.prime))
@@ -406,13 +406,13 @@ class _Line:
         return spaces
 
     def _rows(self, x: Point | None) -> Sequence[Values]:
-        """Return the Taylor coefficients of the monomials along the solution from a point, or from a random one."""
+        """Return the Taylor coefficients of the monomials along the solution from a point (None: a random point)."""
         return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE, self.support)
 
     def _conjugates(self, factor: nmod_poly) -> Sequence[Values]:
         """Return the Taylor coefficients at a zero of an irreducible polynomial in t, expanded in powers of the zero.
 
-        They are polynomials in t, interpolated from values at nodes with Lagrange polynomials modulo `factor`.
+        These are polynomials in t, interpolated from values at nodes with Lagrange polynomials modulo `factor`.
         """
         p, flow, orders = self.flow.prime, self.flow, self.count + _SPARE
         if factor.degree() == 1:
@@ -433,15 +433,15 @@ class _Line:
         """Return the common factor, on the line, of the minors of the matrix of Taylor coefficients.
 
         The minors have as many rows as the rank at random points; the first rows are independent there. Replacing the
-        last row by the next one gives the derivative of the minor along the flow, and the common factor of both
-        contains the invariant factors (and multiple ones). Columns are combined at random; if there are more columns
-        than the rank, differently for the two minors, so that their common factor on a random line is that of all.
+        last row by the next one gives the derivative of a minor along the flow; the common factor of minor and
+        derivative contains all invariant factors (and multiple ones). Columns are combined at random. If there are more
+        columns than the rank, the two minors use different combinations, and share the factor common to all minors.
         """
         p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
         mixes = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
         if size < self.count:
             mixes[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
-        # The i-th derivative of a monomial has a degree higher by i (deg f - 1).
+        # The i-th derivative of a monomial has the degree of the monomial plus i (deg f - 1).
         step = max(0, flow.degree - 1)
         degree_bound = sum(self.degree + order * step for order in range(size)) + step
         values: list[tuple[int, ...]] = []

@@ -1,11 +1,11 @@
 """Limits of integrals of a map as eps -> 0: the integrals of its flow that the map conserves, deforms or loses.
 
 An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...), and its leading term I_0 is
-an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals,
-R(I_0, J_0, ...) = 0 with a polynomial R, then R(I, J, ...) is an integral of the map that tends to 0 with eps: it is
-divided by a power of eps and replaces I. (If I_0 is constant, R contains I alone.) If all integrals of the map are
-functions of integrals with independent leading terms I_0, then an integral of the flow that is not a function of these
-I_0 is not a limit of integrals of the map.
+an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals by a relation
+R(I_0, J_0, ...) = 0, R a polynomial, then R(I, J, ...) is an integral of the map that tends to 0 with eps. Divided by a
+power of eps it replaces I. (If I_0 is constant, R contains only I.) If all integrals of the map are functions of
+integrals with independent leading terms I_0, then an integral of the flow that is not a function of these I_0 is not a
+limit of integrals of the map.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from kahanmaps.maps.kahan import KahanFamily
 _BUDGET = 2_000_000  # products of terms, for the arithmetic with integrals
 _MAX_ROUNDS = 5  # combinations of an integral with others
 _MAX_UNKNOWNS = 60  # coefficients of a relation between leading terms
-_SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # of an integral of the flow, and of the second term of a series
+_SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # monomials of an integral of the flow, and of the second term of a series
 _DENSITY_DEGREE = 4
 _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dimension; 3 in higher dimension
 
@@ -56,10 +56,10 @@ _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dime
 class Limit:
     """An integral of the flow that the map conserves or deforms: `combination` = `leading` + eps^order `second` + ....
 
-    `combination` is a function of eps and of integrals of the map, by their names; `second` is None if the series has
-    no further term. f . grad leading = 0 is proved; `conserved` is the verdict on the map conserving `leading` itself.
-    If the phase space consists of several successive points, `on_solutions` is True and there is only the leading term,
-    at points of one solution.
+    `combination` is a function of eps and of the names of integrals of the map; `second` is None if the series has no
+    further term. f . grad leading = 0 is proved; `conserved` is the verdict on `leading` being an integral of the map.
+    If a point of the phase space consists of several successive points, `on_solutions` is True, and `leading` is the
+    leading term at points of one solution, without further terms.
     """
 
     name: str
@@ -98,10 +98,10 @@ class FlowAndMap:
 
     The known integrals of the flow are `limits`, to which integrals of the map tend, and `other_integrals`; together
     they are independent. The map has `count` integrals; for `without_limit` of them no limit is known. `search` is the
-    search for integrals of the flow, None if the limits are already the largest possible number. `density` is a phi of
-    the flow; `density_search` is the search for it, None if the limit of a density of the map is one. `polynomials` are
-    the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to `polynomials_degree` there
-    are no others (measured); 0 means that there was no search. `polynomials_reason` says why the next degree is open.
+    search for integrals of the flow, or None if there are already as many limits as possible. `density` is a density of
+    the flow; `density_search` is the search for it, or None if it is the limit of a density of the map. `polynomials`
+    are the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to `polynomials_degree`
+    there are no others (measured; 0: no search). `polynomials_reason` says why the next degree is open.
     """
 
     limits: tuple[Limit, ...]
@@ -137,7 +137,7 @@ class FlowAndMap:
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))
         names = ", ".join(F.name for F in self.other_integrals)
         shown = counted(self.count, "integral") if self.count else "no integral"
-        shown += " free of n" if self.map_search.time_dependent else ""  # time-dependent ones contain the step n
+        shown += " free of n" if self.map_search.time_dependent else ""  # time-dependent integrals contain the step n
         if self.lost:
             which = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
@@ -208,12 +208,12 @@ def flow_and_map(
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> FlowAndMap | None:
-    """Compare the integrals of a Kahan map, or of a polarized one, with those of its differential equation.
+    """Compare the integrals of a Kahan map, or of a polarized map, with the integrals of its differential equation.
 
     Args:
         search: the integrals of the map, for every eps.
-        densities: the densities of the map, if known: the limit of one of them is preferred to a density that a search
-            finds.
+        densities: the densities of the map, if known. A limit of one of them that is a density of the flow replaces a
+            density that the search finds.
         flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
             integrals of the map are already the largest possible number.
         known: the number of integrals that the map is known to have, if `search` shows fewer.
@@ -221,7 +221,7 @@ def flow_and_map(
         progress: called with a sentence at each stage of the search.
 
     Returns:
-        The comparison, exact except for statements marked as measured; None for other maps and at a single eps.
+        The comparison, exact except for statements marked as measured. None for other maps, or at a single eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -284,7 +284,7 @@ def with_limit(comparison: FlowAndMap, densities: DensitySearch | None) -> FlowA
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
-    """Compute the independent integrals of the flow that integrals of the map tend to."""
+    """Compute the independent integrals of the flow to which integrals of the map tend."""
     n, symbols = search.file.dim, search.symbols
     field = FunctionField(laboratory.map.names, _BUDGET)
     labels = [integral.name + "(x)" * (integral.name in symbols) for integral in search.integrals]
@@ -328,12 +328,12 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
 
 
 def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
-    """Compute the integrals of the flow that integrals of a polarized map tend to.
+    """Compute the integrals of the flow to which integrals of a polarized map tend.
 
     A point of such a map consists of several successive points x, x_1, ... of a method of order 2.
 
     Along a smooth solution x_k = x + h_k f + h_k^2/2 f'f + O(eps^3) with h_k = 2 k eps. So the terms of numerator and
-    denominator up to eps^2 are known, and an integral has a limit if its leading terms are among these.
+    denominator up to eps^2 are known, and a limit is known if the leading terms are among these.
     """
     field, n = laboratory.field, laboratory.map.dim
     assert field is not None
@@ -356,7 +356,7 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
             for polynomial in (integral.function.numerator, integral.function.denominator)
         )
         try:
-            # A constant leading term says nothing: subtract it and take the next term, once.
+            # A constant leading term is no integral: subtract it, and take the next term instead.
             for _ in range(2):
                 order, content, leading = _leading(Function(functions, P, Q))
                 if not (leading.is_polynomial and leading.numerator.is_constant()):
@@ -386,7 +386,7 @@ def _truncate_at_third_order(P: fmpq_mpoly) -> fmpq_mpoly:
 
 
 class _NoLimit(KahanmapsError):
-    """No combination of an integral with others was found whose limit is independent of the limits of the others."""
+    """Raised if no combination of an integral with other integrals has a limit independent of their limits."""
 
 
 def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
@@ -410,7 +410,7 @@ def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
 def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fmpq_mpoly:
     """Find a polynomial relation of least degree between the functions and the symbols. Raises _NoLimit.
 
-    It is only known to vanish at random points: the caller has to verify it.
+    The relation is only known to hold at random points: the caller has to verify it.
     """
     rng = random.Random("relation")
     count = len(functions) + symbols
@@ -439,7 +439,7 @@ def _polynomials(
     polynomials = {str(P): P for P in known if degree_in(P, n) > 1}
     for function in functions:
         for part, other in permutations((function.numerator, function.denominator)):
-            # An irreducible P of the same degree as Q is not special: every member of the pencil P - c Q would do.
+            # An irreducible P of the same degree as Q is no more special than any other member P - c Q of the pencil.
             factors = irreducible_factors(part)
             is_generic = [k for _, k in factors] == [1] and degree_in(part, n) == degree_in(other, n)
             for factor, _ in [] if is_generic else factors:

@@ -2,7 +2,7 @@
 
 C is a Casimir if P grad C = 0. For C = prod I_i^k_i this says sum k_i P grad I_i / I_i = 0; for a polynomial in the I_i
 it is a linear relation among multiples of the P grad I_i. At random points modulo a prime these are linear equations
-for the exponents k or the coefficients, which may contain eps and the symbols. The candidates are still to be verified.
+for the exponents k, or for coefficients that may contain eps and the symbols. The candidates are not verified here.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def casimir_candidates(
 
     Yields:
         Products of powers, polynomials of degree at most 2, then quotients of affine functions. They are Casimirs
-        modulo a prime, and need not be independent: with a Casimir C also a power or a polynomial of C may occur.
+        modulo a prime, and need not be independent: powers and polynomials of another candidate may occur.
     """
     names = [integral.name for integral in integrals]
     if set(names) & {*laboratory.symbols, "eps"}:
@@ -128,7 +128,7 @@ def _fractions(
     """Yield quotients of affine functions of the integrals that are Casimirs.
 
     With J = (1, I_1, ...) the quotient (u.J)/(v.J) is a Casimir if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
-    w = u ^ v: linear equations for w. Any two independent rows of w are combinations of u and v.
+    w = u ^ v. These equations are linear in w, and any two independent rows of w span the same plane as u and v.
     """
     count = len(integrals)
     if comb(count + 2, 2) > _MAX_TERMS:
@@ -164,7 +164,7 @@ def _linear_relations(
 ) -> Sequence[fmpq_mpoly]:
     """Interpolate the linear relations among columns, as polynomials in the integrals with the monomials `powers`.
 
-    `columns` computes one column for each monomial from the result of `_hamiltonian_fields` at a point, and a prime.
+    `columns` computes one column for each monomial, from the result of `_hamiltonian_fields` at a point and the prime.
     Coefficients of the relations may contain eps and the symbols.
     """
     count, degree = len(integrals), max(map(sum, powers))
@@ -192,7 +192,7 @@ def _hamiltonian_fields(
 ) -> tuple[list[int], list[list[int]]]:
     """Return the values of the integrals at a random point, and P times their gradients.
 
-    Raises NoPoint where a value is 0 or does not exist.
+    Raises NoPoint if a value is 0 or undefined.
     """
     field = GF(map_.prime)
     x = [field.convert(c) for c in (*map_.random_point(), *map_.values)]

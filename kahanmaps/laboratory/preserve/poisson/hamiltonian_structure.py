@@ -1,8 +1,8 @@
-"""Hamiltonian structures of a quadratic system with a constant matrix: f = J grad H with skew J, exactly, over Q.
+"""Hamiltonian structures f = J grad H of a quadratic system with a constant skew matrix J: exactly, over Q.
 
-With K = J^{-1} the condition is that K f is a gradient, so that K f'(x) is symmetric for all x: linear equations for K.
-A degenerate J has a kernel, and its vectors v give affine integrals v . x. If the kernel consists of all affine
-integrals, the equations are linear as well: with coordinates (y, z) = T x, where z are the integrals, they say
+With K = J^{-1} the condition is that K f is a gradient: K f'(x) is symmetric for all x, which gives linear equations
+for K. If J is degenerate, the vectors v of its kernel give affine integrals v . x. If the kernel consists of all affine
+integrals, the equations are linear as well: in coordinates (y, z) = T x, where z are the integrals, they say
 f_y = K^{-1} grad_y H with z as parameters.
 
 By cmoq-2013 the Kahan map of such a system conserves the modified Hamiltonian
@@ -44,7 +44,7 @@ from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
-MAX_DIMENSION = 30  # n (n - 1)/2 unknowns: a few seconds for 435 of them
+MAX_DIMENSION = 30  # of the phase space: 435 unknowns n (n - 1)/2, which take a few seconds
 _MAX_GRID = 2000  # points at which a Pfaffian must vanish to be identically 0
 
 
@@ -53,9 +53,9 @@ class ConstantStructures(PrintableResult):
     """The result of `constant_structures`; every form, function and matrix is exact.
 
     forms: a basis of the skew K for which K f is a gradient (invertible or not), with coprime integer entries.
-    functions: for each form the H of degree at most 3 with grad H = K f and H(0) = 0; the flow conserves it.
-    hamiltonian: H and J with f = J grad H, if there are any; the gradients of `casimirs` span the kernel of J.
-    reason: why `hamiltonian` is None, else empty; `proved` says whether its absence is proved.
+    functions: for each form K the H of degree at most 3 with grad H = K f and H(0) = 0; the flow conserves H.
+    hamiltonian: H and J with f = J grad H, or None; the gradients of `casimirs` span the kernel of J.
+    reason: why `hamiltonian` is None, else empty; `proved` says whether it is proved that there is none.
     """
 
     system: QuadraticSystem
@@ -84,8 +84,8 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
         seed: the random seed; it selects the combination of forms if several are possible.
 
     Returns:
-        A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J of few terms, then a J
-        whose kernel is the space of all affine integrals. Proper subspaces of this space are not tried as kernels.
+        A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J with few nonzero entries,
+        then a J whose kernel is the space of all affine integrals. Proper subspaces are not tried as kernels.
 
     Raises:
         InputError: for a dimension above 30.
@@ -121,7 +121,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
     elif (n - len(integrals)) % 2:
         reason += f", and the {counted(len(integrals), 'affine integral')} would give J a kernel of dimension "
         reason += f"{len(integrals)}, impossible for a skew {n} x {n} matrix"
-        # With one integral the kernel is its span or 0; with more there are proper subspaces, which are not tried.
+        # With one integral the kernel is its span or 0; more integrals have proper subspaces, which are not tried.
         proved = proved and len(integrals) == 1
     else:
         quotient = quotient_by(integrals, n)
@@ -132,7 +132,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
             casimirs = linear_combinations(rows, ring(system.variables).gens())
             return ConstantStructures(system, forms, functions, H, casimirs, "", True)
         reason += ", and none has the affine integrals as its kernel"
-        # With two integrals and even n the kernel is the whole span or 0; with three it may be a line, not tried.
+        # With two integrals and even n the kernel is their span or 0; with three it may be a plane, not tried.
         proved = proved and decided and len(integrals) <= 2
     return ConstantStructures(system, forms, functions, None, (), reason, proved)
 
@@ -143,7 +143,7 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
     count_work(n**4 + 5 * n**3)
     over_Q = system.over(QQ)
     units = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
-    # K f'(x) must be symmetric. One random point first, since it leaves few forms; then the origin and each direction.
+    # K f'(x) must be symmetric, first at a random point, which leaves few K, then at the origin and in each direction.
     jacobians = [over_Q.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), over_Q.B]
     jacobians += [over_Q.hessian_times(unit) for unit in units]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
@@ -166,7 +166,7 @@ def _skew(m: int, upper: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
-    """Write the system as J grad H with J = S K^{-1} S^T, scaled to coprime integers, the first one positive."""
+    """Write the system as J grad H with J = S K^{-1} S^T, scaled to coprime integers whose first is positive."""
     J = quotient.section * K.inv() * quotient.section.transpose()
     entries = tuple(J.entries())
     factor = next(
@@ -178,8 +178,8 @@ def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) 
 def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
     """Return the H with grad_y H = K f_y and H = 0 for y = 0.
 
-    It is the integral of y . K f_y along the segment from x - S y, where y = 0, to x. The integrand is a polynomial of
-    degree 2 in the parameter, so Simpson's rule is exact.
+    H(x) is the integral of y . K f_y along the segment from x - S y, where y = 0, to x. The integrand is a polynomial
+    of degree 2 in the parameter of the segment, so Simpson's rule is exact.
     """
     context = ring(system.variables)
     gens = context.gens()
@@ -199,7 +199,7 @@ def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fm
 def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[fmpq_mat | None, bool]:
     """Find a simple invertible combination of skew m x m matrices, m even.
 
-    Returns the matrix, or None if there is none, and whether the answer is proved.
+    Returns the matrix, or None if there is no such matrix, and whether the answer is proved.
     """
     if m == 0:
         return fmpq_mat(0, 0), True
@@ -214,8 +214,8 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     for _ in range(3):
         generic = combination_of([rng.randrange(field.characteristic) for _ in modular], modular)
         if int(generic.det()):
-            # Simple combinations first. The search ends, since the Pfaffian is a nonzero polynomial and random integers
-            # of growing size come last.
+            # Simple combinations come first, then random ones of growing size. The search ends, since the Pfaffian is a
+            # nonzero polynomial.
             n = len(forms)
             random_weights = ([rng.randint(-(size // 10), size // 10) for _ in range(n)] for size in count(10))
             weights = chain([[int(j == i) for j in range(n)] for i in range(n)], [[1] * n], random_weights)
@@ -241,13 +241,13 @@ class InheritedIntegrals:
 
     @property
     def text(self) -> str:
-        """The numbers of integrals as a phrase; empty without any."""
+        """The numbers of integrals as a phrase; empty if there are no integrals."""
         affine, modified = len(self.quotient.integrals), len(self.forms)
         phrases = [counted(affine, "affine integral")] if affine else []
         return " and ".join([*phrases, counted(modified, "modified Hamiltonian")] if modified else phrases)
 
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
-        """Return covectors with the same span as the gradients of all these integrals at a point.
+        """Return covectors with the same span as the gradients of all inherited integrals at a point.
 
         `map_` is the map of the system modulo a prime that divides none of its denominators. At an indeterminacy point
         of the map only the affine integrals are included.
@@ -285,7 +285,7 @@ class InheritedIntegrals:
         return rank(self.gradients(map_, map_.random_point()), map_.prime)
 
     def hamiltonian(self, k: int) -> fmpq_mpoly:
-        """Return the H that belongs to the k-th form."""
+        """Return the function H of the k-th form."""
         return hamiltonian_function(self.system, self.quotient, self.forms[k])
 
     def modified(self, k: int, field: Field, eps: Any, x: tuple[Any, ...]) -> Any:
@@ -300,10 +300,10 @@ def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedI
 
     Args:
         system: a quadratic system over Q.
-        seed: the random seed of a point at which the linear equations for K are reduced first.
+        seed: the random seed of a point at which the linear equations for K are solved first.
 
     Returns:
-        The `InheritedIntegrals`: all affine ones and, up to dimension 30, a basis of the K. Source: cmoq-2013.
+        The `InheritedIntegrals`: all affine integrals and, up to dimension 30, a basis of all K. Source: cmoq-2013.
 
     >>> from kahanmaps.documents.catalog import load
     >>> inherited = inherited_integrals(load("volterra_periodic_3").system)

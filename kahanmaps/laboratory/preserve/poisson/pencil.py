@@ -2,15 +2,15 @@
 
 The computation runs modulo a prime, with a residue for eps, in random projective coordinates. Take the curve of the
 pencil through a random point, and its component C through this point: C is irreducible over GF(p) and smooth at the
-point, hence irreducible over the algebraic closure. If curves of the pencil have several components, these components
-form a pencil as well, which is used instead. Two such curves of degree d meet in the base points only, and outside of
-the base points both are smooth, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives the intersection
-number at each base point. If it may exceed the square of the multiplicity m, the point is blown up, and so are the
-points infinitely near to it, until the curves are separated. Then (hartshorne-1977, V.3)
+point, hence irreducible over the algebraic closure. If curves of the pencil have several components, the pencil of
+these components replaces the given one. Two generic curves of degree d of the pencil meet only in the base points, and
+are smooth outside of these, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives the intersection number
+at each base point. If this number may exceed the square of the multiplicity m, the base point is blown up, and so are
+the base points infinitely near to it, until the curves are separated. Then (hartshorne-1977, V.3)
 
     sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
 
-There is no result if the first equation fails, or if two primes disagree.
+There is no result if the first equation fails, or if the results for two primes differ.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from kahanmaps.laboratory.singular.jets import modulo
 
 MAX_DEGREE = 12
 _TRIES = 3
-_BITS = 31  # of primes: python-flint cannot sort factors with larger coefficients
+_BITS = 31  # of primes; python-flint does not sort factors with larger coefficients
 # The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the
 # curves: diller-favre-2001.
 GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
@@ -46,7 +46,7 @@ _Local = dict[tuple[int, int], Any]  # a truncated power series in x, y at a poi
 
 @dataclass(frozen=True)
 class BasePoints:
-    """The number of base points of one multiplicity, and how many of them are infinitely near to others."""
+    """The number of base points of one multiplicity, and how many of them are infinitely near points."""
 
     multiplicity: int
     count: int
@@ -65,9 +65,9 @@ class BasePoints:
 
 @dataclass(frozen=True)
 class Pencil:
-    """The curves I = c of a planar map for generic c (measured), where I is the integral of this name.
+    """The curves I = c of a planar map for generic c (measured); `integral` is the name of I.
 
-    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of components.
+    `components` is the number of components of a curve; `degree`, `genus` and `base_points` belong to one component.
     """
 
     integral: str
@@ -99,7 +99,7 @@ class Pencil:
         return ""
 
     def contradiction(self, growth: Growth) -> str:
-        """Return a sentence on why this growth of the degrees is impossible; empty where it is possible."""
+        """Return a sentence on why this growth of the degrees is impossible; empty if the growth is possible."""
         grows = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
         possible = not grows or growth is GROWTH_ON.get(self.genus)
         return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
@@ -119,7 +119,7 @@ def pencil_of(
         integral: a function that is not constant, in two variables and eps.
         eps: half the time step, an exact number; None: a random residue replaces it.
         seed: the random seed.
-        effort: each increase by 1 doubles the work limit, at which the computation is given up.
+        effort: each increase by 1 doubles the work limit.
 
     Returns:
         The `Pencil`; None if the degree is above 12, the work limit was reached, or a consistency check failed.
@@ -151,7 +151,7 @@ def pencil_of(
 
 
 class _Unclear(Exception):
-    """The curves are not generic, or the work limit was reached."""
+    """Raised if the curves are not generic, or if the work limit is reached."""
 
 
 def _require(condition: bool) -> None:
@@ -180,7 +180,7 @@ class _Reduced:
             for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
         )
         P, Q = (sum((X[i] * Y[j] * Z[degree - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
-        curves: list[nmod_mpoly] = []  # each the component through a random point of the curve of the pencil through it
+        curves: list[nmod_mpoly] = []  # the components through three random points
         for _ in range(3):
             point = [self._random(), self._random()]
             member = P * int(Q(*point)) - Q * int(P(*point))
@@ -212,7 +212,7 @@ class _Reduced:
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
         for factor, intersection in nmod_poly(eliminant, self.prime).factor()[1]:
-            if intersection < 4:  # less than 2^2: a chain of simple points, each infinitely near to the preceding one
+            if intersection < 4:  # less than 2^2: a simple point, followed by simple points infinitely near to it
                 self._add_simple(int(factor.degree()), int(intersection), near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
@@ -229,7 +229,7 @@ class _Reduced:
             b = -common[k - 1] / K(k)
             _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
             max_intersection = int(intersection)
-            f, g = (  # F(x + a, y + b) without terms of a degree above the bound
+            f, g = (  # F(x + a, y + b) without terms of degree above the bound
                 _nonzero(
                     ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
                     for (i, j), c in ((exponents, K(int(c))) for exponents, c in F.terms())
@@ -245,9 +245,9 @@ class _Reduced:
         self.points[1, True] += conjugates * (chain - 1)
 
     def _resolve(self, K: Any, f: _Local, g: _Local, max_intersection: int, *, exact: bool, near: bool) -> None:
-        """Count the common point of two curves over K, if it is one, and their common points infinitely near to it.
+        """Count the origin and the points infinitely near to it, as far as they are common points of two curves over K.
 
-        The intersection number is at most `max_intersection`, or equal to it if `exact`; this bounds degrees.
+        The intersection number is at most `max_intersection`, and equal to it if `exact`; it bounds the degrees needed.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())

@@ -1,12 +1,12 @@
-"""The search for Poisson tensors that a map preserves: skew P(x) with dPhi P(x) dPhi^T = P(x~), polynomial entries.
+"""The search for Poisson tensors that a map preserves: skew P(x), polynomial in x, with dPhi P(x) dPhi^T = P(x~).
 
 At a random point modulo a prime this law gives n (n - 1)/2 linear equations for the coefficients of P, so that all P up
 to a degree form one null space. A tensor is represented by the bivector sum P_ij d_i d_j, a polynomial in x and in new
-variables d_i, so that its coefficients are interpolated as functions of eps and the symbols like those of any
-polynomial. With a common denominator psi the unknown is B = psi P: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
+variables d_i, so that its coefficients are interpolated, as functions of eps and the symbols, like the coefficients of
+any polynomial. With a common denominator psi the unknown is B = psi P: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
 
-The Jacobi identity is not linear in P. If several tensors satisfy it, one identity for their sum, with a symbol as the
-factor of each, decides whether all combinations are Poisson tensors.
+The Jacobi identity is not linear in P. If several tensors satisfy it, one identity for their sum, in which each tensor
+is multiplied by a symbol, decides whether all combinations are Poisson tensors.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 2000
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
-_SPARE_POINTS = 8  # beyond those that determine the unknowns
+_SPARE_POINTS = 8  # points beyond those that determine the unknowns
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
-_MAX_INTEGRALS = 12  # the number of integrals of which all subsets are tested for involution
+_MAX_INTEGRALS = 12  # the largest number of integrals for which all subsets are tested for involution
 _MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
 
 Exponents = tuple[int, ...]
@@ -70,9 +70,9 @@ Exponents = tuple[int, ...]
 class FoundTensor(LatexDisplay, ResultPart):
     """A tensor that the map preserves, with the verdicts on its invariance and on the Jacobi identity (`jacobi`).
 
-    `rank` is the rank at random points. `casimirs` names the known integrals that are Casimirs and, if there are more
-    Casimirs among functions of the integrals, formulas such as I1/I2. `in_involution` names a largest set of integrals
-    in involution; `involution` is the verdict on their brackets, None without any.
+    `rank` is the rank at random points. `casimirs` has the names of the known integrals that are Casimirs, and formulas
+    such as I1/I2 for further Casimirs among functions of the integrals. `in_involution` has the names of a largest set
+    of integrals in involution; `involution` is the verdict on their brackets, None without such integrals.
     """
 
     name: str
@@ -106,7 +106,7 @@ class FoundTensor(LatexDisplay, ResultPart):
 
     @property
     def statement(self) -> str:
-        """The further properties of the tensor as a phrase: rank, Jacobi identity, Casimirs, involution."""
+        """A phrase with the rank, the verdict on the Jacobi identity, the Casimirs and the integrals in involution."""
         phrases = [f"rank {self.rank}"]
         if self.jacobi.holds:
             phrases.append(f"a Poisson tensor ({self.jacobi})")
@@ -143,8 +143,8 @@ class FoundTensor(LatexDisplay, ResultPart):
 class PoissonSearch(Search):
     """The result of `find_poisson`: tensors up to `degree`, and the reason if there are none.
 
-    All tensors up to the degree are combinations of these and of products of polynomial integrals with tensors of lower
-    degree. `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None if not tested.
+    All tensors up to the degree are combinations of the listed ones and of products of polynomial integrals with
+    tensors of lower degree. `pencil` is the verdict on their combinations being Poisson tensors; None: not tested.
     """
 
     _parts, _noun = "tensors", ("tensor", "tensors")
@@ -209,20 +209,20 @@ def find_poisson(
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
-        denominator: a function of the variables and eps by which the entries are divided. None: no denominator; if
-            there is no such tensor, and this is little work, the factors of a density are tried.
-        integrals: the integrals whose brackets are computed; None: they are searched for, if there is a tensor.
+        denominator: a function of the variables and eps by which the entries are divided. None: entries are
+            polynomials; without such a tensor the factors of a density are tried, if this is little work.
+        integrals: the integrals whose brackets are computed; None: if there is a tensor, integrals are searched for.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
-        on_result: called with the tensors so far after each new one, for searches that may be interrupted.
+        on_result: called with the tensors so far after each new tensor, for searches that may be interrupted.
 
     Returns:
         A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
-        other tensors are left out. That there is none up to a degree is measured.
+        other tensors are left out. The absence of tensors up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, eps = 0, a negative degree, and a denominator that vanishes at this eps.
+        InputError: for unknown symbols, eps = 0, a negative degree, or a denominator that vanishes at this eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> result = find_poisson(load("lotka_volterra"))
@@ -257,7 +257,7 @@ def find_poisson(
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
-        # The stages: all tensors; log-canonical ones; tensors over a density; verification; brackets.
+        # The stages: all tensors; log-canonical tensors; density as denominator; verification; brackets.
         stages = budget.share([3, 1, 2, 2, 3])
         candidate_tensors, reason = _tensors(laboratory, degree, denominator, next(stages))
         log_canonical_budget, density_budget = next(stages), next(stages)
@@ -265,7 +265,7 @@ def find_poisson(
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             candidate_tensors, _ = _tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
         if not candidate_tensors and denominator is None:
-            # Try the product of the factors of a known density as denominator, and raise the degree by its degree.
+            # Try the product of the factors of a known density as denominator; its degree is added to the degree.
             density = None
             with suppress(NoPoint):
                 density = products_of(
@@ -285,7 +285,7 @@ def find_poisson(
         for k, tensor in enumerate(candidate_tensors, 1):
             progress(f"verifying tensor {k} of {len(candidate_tensors)}")
             law = transformation_identity(laboratory.map, tensor, laboratory.eps)
-            # In high dimension the law is too long to expand, so no budget is given to it.
+            # In high dimension the identity is too long to expand, so its budget is 0.
             verdict, evidence = _verdict(laboratory, law, budget if dim <= MAX_DIMENSION else Budget(0))
             if not verdict.holds:
                 continue
@@ -316,7 +316,7 @@ def find_poisson(
 
 
 def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], budget: Budget) -> PoissonSearch:
-    """Add to each tensor its Casimirs and the integrals in involution, among known integrals."""
+    """Add to each tensor its Casimirs and a set of integrals in involution, from the known integrals."""
     tensors = result.tensors
     if tensors and integrals:
         laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
@@ -334,7 +334,7 @@ def _tensors(
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[MatrixPoissonTensor], str]:
-    """Compute a basis of the tensors over the denominator in closed form, on these monomials.
+    """Compute formulas for a basis of the tensors with a denominator and with these monomials of the bivector.
 
     Returns the tensors and an empty text, or no tensors and the reason.
     """
@@ -357,7 +357,7 @@ def _tensors(
     )
     if closed_forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {closed_forms.reason}"
-    # Leave out tensors in the span of the earlier ones and of products of a polynomial integral with a tensor.
+    # Leave out tensors in the span of earlier tensors and of products of polynomial integrals with tensors.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
     places, rows = places_of(2 * n, degree), list[list[int]]()
@@ -402,11 +402,11 @@ def tensor_space(
 ) -> DarbouxSpace:
     """Compute all bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
 
-    They are polynomials in x and the d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
+    Bivectors are polynomials in x and d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
     places, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
-    unknowns = []  # for each monomial x^a d_i d_j: its index, the index of the pair (i, j), and that of x^a
+    unknowns = []  # for each monomial x^a d_i d_j the indices of the monomial, of the pair (i, j) and of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
         for m, exponent in enumerate(exponents_up_to(n, degree)):
@@ -414,7 +414,7 @@ def tensor_space(
                 unknowns.append((places[(*exponent, *directions)], p, m))
 
     def factor(x: Point) -> int:
-        """Return the value of the denominator at a point, or 1. Raises NoPoint where its own denominator is 0."""
+        """Return the value of `denominator` at a point (None: 1). Raises NoPoint at a pole of this function."""
         if denominator is None:
             return 1
         field = GF(prime)
@@ -450,7 +450,7 @@ def _at(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
 def _with_brackets(
     laboratory: Laboratory, found_tensor: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> FoundTensor:
-    """Add to the tensor its Casimirs, and the integrals that are in involution."""
+    """Add to the tensor its Casimirs, and a largest set of integrals in involution."""
     tensor, map_ = found_tensor.tensor, laboratory.maps[0]
     field, casimir_gradients = GF(map_.prime), Independent(map_)
     P = _at(tensor, map_, casimir_gradients.point)
@@ -489,14 +489,14 @@ def _with_brackets(
 
 
 def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
-    """Certify an identity; it is not expanded if the budget is spent."""
+    """Certify an identity, without an expansion if the budget is spent."""
     return certified(identity, laboratory.seed, expands=not budget.is_spent)
 
 
 def _brackets(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, functions: Sequence[RationalFunction], of_variables: bool
 ) -> Identity:
-    """Return the identity that the brackets of the functions vanish; `of_variables`: brackets with all variables."""
+    """Return the identity {F, G} = 0 for all functions F, G or, if `of_variables`, {F, x_i} = 0 for all variables."""
     n = tensor.dim
 
     def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
@@ -520,7 +520,7 @@ def _brackets(
 
 
 def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
-    """Return the sum of the tensors, each times a symbol of its own."""
+    """Return the sum of the tensors, each multiplied by a different symbol."""
     names = tensors[0].rows[0][0].names
     prefix = "c"
     while any(name.startswith(prefix) for name in names):
