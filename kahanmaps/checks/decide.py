@@ -251,8 +251,8 @@ def log2_error(equation: CoefficientSize, pole_degree: int, conjugates: int = 1)
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
-    at most `conjugates`, p is drawn from the primes at which the generator has a root. At least half as many of these
-    are assumed as Chebotarev's density predicts; a prime divides a nonzero coefficient only if it divides its norm.
+    at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many
+    are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides the norm.
     """
     if max(equation.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or poles

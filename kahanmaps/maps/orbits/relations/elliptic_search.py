@@ -115,8 +115,8 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
     count, lag, coordinates = sections.points, sections.lag, sections.coordinates
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
-    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. It
-    # suffices to take g = 1 (the last coordinate) and a linear form without common zeros. `checks` annihilates it.
+    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
+    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g. `checks` annihilate this span.
     values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
     sums = matrix(values[: sections.rows], prime)
     checks = kernel(*sums.transpose().rref())
