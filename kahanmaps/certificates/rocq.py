@@ -582,9 +582,9 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
 
     Args:
         claims: the statements to be proved, each in a section of its own.
-        header: the lines of the comment at the beginning.
+        header: the lines of the initial comment.
     """
-    # The text of a comment must not end the comment, or begin another one or a string.
+    # Nothing in a comment may end it, or begin another one or a string.
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
