@@ -23,9 +23,9 @@ from lazy_loader import attach_stub
 from kahanmaps.hints import missing_name
 from kahanmaps.version import __version__ as __version__
 
-# The list of public names is what type checkers read: __init__.pyi.
+# Type checkers read the public names from __init__.pyi.
 _load, _, _NAMES = attach_stub(__name__, __file__)
-_COMMANDS = {  # functions that are also called like their commands
+_COMMANDS = {  # functions that have the name of a command
     "cycles": "cycle_census",
     "degrees": "degree_growth",
     "find_density": "find_densities",
@@ -36,7 +36,7 @@ _COMMANDS = {  # functions that are also called like their commands
     "map": "map_at",
     "portrait": "plot_orbits",
 }
-# `import *` leaves the builtin `map` alone.
+# `import *` does not import `km.map`, which would hide Python's `map`.
 __all__ = sorted({*_NAMES, *_COMMANDS} - {"map", "map_at", "plot_orbits"})
 
 

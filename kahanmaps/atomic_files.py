@@ -17,8 +17,8 @@ from typing import IO, Any
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     """Open a temporary file that replaces `path` at the end of the block, or is removed if the block raises.
 
-    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced; all
-    content is written to it at the end. Raises OSError that names `path`.
+    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: its
+    content is written at the end of the block. Raises OSError that names `path`.
     """
     with named(path):
         if os.path.exists(path) and not os.path.isfile(path):
@@ -68,7 +68,7 @@ def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
 
 @contextmanager
 def named(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Add the name of the file to an OSError in the block; that of a full disk has none."""
+    """Add the name of the file to an OSError raised in the block; Python's error for a full disk names no file."""
     try:
         yield
     except OSError as error:
@@ -77,23 +77,23 @@ def named(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file atomically. Raises OSError where it cannot be written."""
+    """Write a file atomically. Raises OSError if it cannot be written."""
     with atomic_write(path) as stream:
         stream.write(content)
 
 
 def sync(stream: IO[Any]) -> None:
-    """Flush a stream to the disk, where it is a regular file."""
+    """Flush a stream and write its file to the disk; pipes and devices are only flushed."""
     stream.flush()
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         os.fsync(stream.fileno())
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """Resolve symbolic links; raise OSError where they form a cycle or no file can have this name."""
+    """Resolve symbolic links. Raises OSError if they form a cycle, or if no file can have this name."""
     try:
         target = os.path.realpath(path)
-    except ValueError:  # a zero byte in it
+    except ValueError:  # the name contains a zero byte
         raise OSError(errno.EINVAL, os.strerror(errno.EINVAL), os.fspath(path)) from None
     if os.path.islink(target):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))

@@ -1,7 +1,7 @@
 """Base classes of values that can be printed and displayed: `__str__`, `_repr_html_` and `_repr_latex_`.
 
-The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes themselves contain
-none of these modules. They are imported by name on first use: this is the only file that imports from a higher layer.
+The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes themselves need not
+import these files. They are imported by name on first use: this is the only file that imports from a higher layer.
 """
 
 from __future__ import annotations
@@ -46,21 +46,21 @@ class WithoutTruthValue:
 
 
 class Certified:
-    """Base class of results: what they prove about a map has a certificate, or the error says why not."""
+    """Base class of results with certificates: proofs that other programs can check."""
 
     __slots__ = ()
 
     def certificate(self, checker: str) -> str:
-        """Write a proof of what is proved here about a map, for every eps, that another program checks.
+        """Write a proof, checked by another program, of what this result proves about a map for every eps.
 
         Args:
             checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
 
         Returns:
-            The text of the script, exact, as that of `km.certificate`, with the same attributes.
+            The exact text of the script, a str with the same attributes as the result of `km.certificate`.
 
         Raises:
-            InputError: why there is no certificate, as for results at one eps, or for what is measured.
+            InputError: if there is no certificate, with the reason; for example, eps is fixed or the result measured.
 
         >>> from kahanmaps.checks.conserve import check_integrals
         >>> check_integrals("euler_top").findings[0].certificate("gp").splitlines()[-1]
@@ -73,8 +73,8 @@ class Certified:
 class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
     """Base class of results that `print` shows as the output of their command.
 
-    A result with parts is a sequence of them: `_parts` is the name of the attribute, `_noun` the word for one part and
-    for several.
+    A result with parts is a sequence of them: `_parts` is the name of the attribute that holds them, `_noun` the word
+    for a part, in the singular and the plural.
     """
 
     __slots__ = ()
@@ -87,13 +87,13 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "__repr__" not in vars(cls):
-            cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
+            cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # a dataclass prints all its fields
 
     def __repr__(self) -> str:
         """Return the class name with the number of parts and their verdicts, or with the first line of the text."""
         if self._noun[0]:
             verdicts = sorted({str(part.verdict) for part in self if hasattr(part, "verdict")})
-            if hasattr(self, "verdict"):  # of all parts together
+            if hasattr(self, "verdict"):  # the verdict of all parts together
                 verdicts = [str(self.verdict)]
             number = f"{len(self) or 'no'} {self._noun[len(self) > 1]}"
             return f"<{type(self).__name__}: {', '.join([number, *verdicts])}>"
@@ -117,18 +117,18 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
         return self._sequence()[index]
 
     def to_dict(self) -> Any:
-        """Return plain data, as `to_json` does: `json.dump(result.to_dict(), file)` writes them."""
+        """Return the result as plain data, like `to_json`: `json.dump(result.to_dict(), file)` writes it."""
         return self.to_json()  # type: ignore[attr-defined]
 
     def to_pandas(self) -> Any:
-        """Return `rows()` as a DataFrame. Raises InputError where pandas is not installed or the result is no table."""
+        """Return `rows()` as a DataFrame. Raises InputError if pandas is not installed or the result is no table."""
         if not hasattr(self, "rows"):
             raise InputError(f"a {type(self).__name__} is not a table: use print")
         return data_frame(self.rows())
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """Return rows as a DataFrame. Raises InputError where pandas is not installed."""
+    """Return rows as a DataFrame. Raises InputError if pandas is not installed."""
     try:
         pandas = import_module("pandas")
     except ImportError as error:
@@ -140,14 +140,14 @@ _TEXTS = ("text", "sentence", "summary", "claim", "reason", "rhs")
 
 
 class ResultPart(AttributeHints, Certified):
-    """Base class of the parts of results, which are shown by the first of the attributes `_TEXTS` that they have."""
+    """Base class of the parts of results. A part is shown by the first attribute listed in `_TEXTS` that it has."""
 
     __slots__ = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "__repr__" not in vars(cls):
-            cls.__repr__ = ResultPart.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
+            cls.__repr__ = ResultPart.__repr__  # type: ignore[method-assign]  # a dataclass prints all its fields
 
     def __repr__(self) -> str:
         value = next(getattr(self, name) for name in _TEXTS if hasattr(self, name))
@@ -155,7 +155,7 @@ class ResultPart(AttributeHints, Certified):
         return f"<{type(self).__name__}: {shorten(text.partition(chr(10))[0], 100)}>"
 
     def to_dict(self) -> Any:
-        """Return plain data, as `to_json` does."""
+        """Return the part as plain data, like `to_json`."""
         return self.to_json()  # type: ignore[attr-defined]
 
 
@@ -173,7 +173,7 @@ class LatexDisplay(AttributeHints):
         return latex(self).removeprefix(r"$\displaystyle ").removesuffix("$")
 
     def to_sympy(self) -> Any:
-        """Return the formula of SymPy, exactly: for a system or a map, the right-hand sides or images by variable."""
+        """Return the exact formula in SymPy; for a system or a map, a dict from variables to formulas."""
         return import_module("kahanmaps.languages.to_sympy").sympy_form(self)
 
     _sympy_ = to_sympy  # `sympy.sympify(value)` calls it
@@ -186,7 +186,7 @@ def latex(value: object) -> str:
 
 
 def shorten(text: str, width: int) -> str:
-    """Shorten a long text to its two ends and its length: 12345...67890 (1234 chars)."""
+    """Shorten a long text to its first and last characters, and give its length: 12345...67890 (1234 chars)."""
     if len(text) <= width:
         return text
     keep = max(4, (width - 18) // 2)
@@ -195,19 +195,19 @@ def shorten(text: str, width: int) -> str:
 
 @singledispatch
 def html_form(value: object) -> str:
-    """Return the value as HTML; the files of kahanmaps.display register a function for each class."""
+    """Return the value as HTML; each class has a function for this, registered in kahanmaps.display."""
     raise TypeError(f"no HTML is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
 @singledispatch
 def text_form(value: object) -> str:
-    """Return the text that `print` shows; the files of kahanmaps.display register a function for each class."""
+    """Return the text that `print` shows; each class has a function for this, registered in kahanmaps.display."""
     return object.__repr__(value)
 
 
 @singledispatch
 def latex_form(value: object) -> str:
-    """Return the value as LaTeX; the files of kahanmaps.display register a function for each class."""
+    """Return the value as LaTeX; each class has a function for this, registered in kahanmaps.display."""
     raise TypeError(f"no LaTeX is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
@@ -215,8 +215,8 @@ _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
 
 
 def _load_displays(value: object) -> None:
-    """Import the file of kahanmaps.display for this class: named after the folder of the class, or as in `_FILES`."""
-    for base in type(value).__mro__:  # subclasses defined by a user are displayed like ours
+    """Import the file of kahanmaps.display with the name of the class's folder, or the name given in `_FILES`."""
+    for base in type(value).__mro__:  # a user's subclass is displayed like its base class
         top, *folders = base.__module__.split(".")
         if top in ("kahanmaps", "flint"):
             is_formula = top == "flint" or folders[0] == "algebra"

@@ -3,7 +3,7 @@
 An exception means that a request cannot be fulfilled. Events in the course of an orbit or a check, such as a singular
 point or an exhausted digit budget, are statuses, not exceptions.
 
-Each exception is also a built-in one, so that `except ValueError` in a script works.
+Each exception is also a Python one, so that `except ValueError` in a script works.
 """
 
 from __future__ import annotations
@@ -16,31 +16,31 @@ from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
 _MISTAKES_SHOWN = 50
-# The disk is full or broken, or another resource of the machine is exhausted.
+# Codes of the operating system for a full or broken disk, or for another exhausted resource.
 _MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
-# Messages of the dynamic linker and of libraries that are loaded with too little memory.
+# Messages of the dynamic linker, and of libraries loaded with too little memory.
 _NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
-_MAX_WORD, _MAX_LINE, _MAX_LINES = 300, 1000, 200  # characters of a word and a line, lines of a message
+_MAX_WORD, _MAX_LINE, _MAX_LINES = 300, 1000, 200  # characters in a word, characters in a line, lines in a message
 
 
 class KahanmapsError(Exception):
-    """Base class of the exceptions of kahanmaps. The message is `bounded`."""
+    """Base class of the exceptions of kahanmaps. Long messages are shortened by `bounded`."""
 
     def __str__(self) -> str:
         return bounded(super().__str__())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default an exception is unpickled by a call with its message only; some of these take more arguments.
+        # By default an exception is unpickled by a call with its message only; some subclasses need more arguments.
         return _restore_error, (type(self), self.args), self.__dict__
 
 
 def _restore_error(kind: type[KahanmapsError], args: tuple[Any, ...]) -> KahanmapsError:
-    """Restore a pickled exception, without its attributes."""
+    """Restore a pickled exception without calling its constructor; its attributes are not restored."""
     return kind.__new__(kind, *args)
 
 
 class InputError(KahanmapsError, ValueError):
-    """An invalid value: the message says what was found, what was expected and what to do."""
+    """An invalid value; the message names the value, what was expected, and what to do."""
 
 
 class InexactNumber(InputError, TypeError):
@@ -65,7 +65,7 @@ class UnknownName(ExpressionError):
 
 
 class SystemFileError(InputError):
-    """A system file with mistakes, all reported together with their keys.
+    """A system file with mistakes, which are all reported together, each with its key in the file.
 
     Attributes: `where` (the file), `mistakes` (pairs of key path and sentence).
     """
@@ -82,7 +82,7 @@ class SystemFileError(InputError):
 
 
 class HypothesisError(InputError):
-    """The given objects do not belong to the commuting family (A not skew-Hamiltonian, or H not in its space)."""
+    """The objects do not belong to the commuting family: A is not skew-Hamiltonian, or H is not in its space."""
 
 
 class BadPrime(InputError):
@@ -115,12 +115,12 @@ class UnknownCurve(KahanmapsError):
 
 
 def _caret(text: str, column: int, width: int = 72) -> str:
-    """Return the part of `text` around `column`, with a caret under the character."""
+    """Return the part of `text` around `column`, and below it a caret under the character at `column`."""
     start = max(0, column - width // 2)
     end = min(len(text), start + width)
     before = "..." if start > 0 else ""
     after = "..." if end < len(text) else ""
-    # One cell per character, so that the caret is aligned; this also removes escape sequences.
+    # Print every character in one cell, so that the caret is aligned; escape sequences are removed as well.
     piece = "".join(c if c.isprintable() else " " for c in text[start:end])
     return f"  {before}{piece}{after}\n  {' ' * (len(before) + column - start)}^"
 
@@ -131,7 +131,7 @@ def show(value: Any, width: int = 60) -> str:
     >>> show(True), show("two"), show({"a": 1})
     ('true', "'two'", "{'a': 1}")
     """
-    if isinstance(value, date | time):  # of which datetime is one
+    if isinstance(value, date | time):  # datetime is a subclass of date
         return value.isoformat()
     try:
         text = str(value).lower() if isinstance(value, bool) else repr(value)
@@ -150,7 +150,7 @@ def quoted(text: str, width: int = 40) -> str:
 
 
 def printable(text: str) -> str:
-    """Escape the control characters of a text except line ends and tabs.
+    """Escape the control characters of a text; line ends and tabs remain.
 
     >>> len(printable(chr(27) + "[31m")) - len("[31m")
     4
@@ -159,9 +159,9 @@ def printable(text: str) -> str:
 
 
 def bounded(message: str) -> str:
-    """Shorten very long words and lines of a message, and give their lengths.
+    """Shorten very long words and lines of a message, and add their lengths.
 
-    User input is shortened where messages are made; this is the last resort.
+    Values of the user are already shortened where messages are written; this function catches the remaining cases.
 
     >>> len(bounded("there is no file " + "x" * 200_000))
     317
@@ -177,7 +177,7 @@ def bounded(message: str) -> str:
 
 
 def _cut(text: str, max_length: int) -> str:
-    """Shorten a text to `max_length` characters, mostly from its beginning, with its length."""
+    """Shorten a text to `max_length` characters, mostly from its beginning, and add its length."""
     if len(text) <= max_length:
         return text
     length = f" ({len(text)} characters)"
@@ -187,9 +187,9 @@ def _cut(text: str, max_length: int) -> str:
 
 @contextmanager
 def reading(name: object) -> Iterator[None]:
-    """Add the name of the source that is being read to an unexpected exception.
+    """Add the name of the source that is being read to an unexpected exception raised in the block.
 
-    The source may be damaged in an unforeseen way, and the exception alone would suggest a bug.
+    The source may be damaged in an unforeseen way, while the exception without its name would suggest a bug.
     """
     try:
         yield
@@ -205,7 +205,7 @@ def note_source(error: BaseException, name: object) -> None:
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Whether an exception means that memory is exhausted, including a library that could not be loaded for this."""
+    """Whether an exception means that memory is exhausted; it may come from a library that could not be loaded."""
     if isinstance(error, MemoryError):
         return True
     if isinstance(error, OSError) and error.errno == ENOMEM:
@@ -214,7 +214,7 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def is_of_the_machine(error: OSError) -> bool:
-    """Whether the error is due to the state of the machine, and the same request may succeed later or elsewhere."""
+    """Whether the error is due to the state of the machine, so that the same request may succeed later or elsewhere."""
     return error.errno in _MACHINE_ERRORS
 
 
@@ -224,7 +224,7 @@ def counted(number: int, word: str) -> str:
 
 
 def suggestion(value: Any, known: Sequence[str]) -> str:
-    """Return a hint at similar known names, or an empty text.
+    """Return a hint that suggests similar known names, or an empty text.
 
     >>> suggestion("alhpa", ["alpha", "beta"])
     '; did you mean alpha?'

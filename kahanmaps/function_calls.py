@@ -1,7 +1,7 @@
-"""Calls of the public functions: wrong arguments are reported in words, and notebooks show progress.
+"""Calls of the public functions: wrong arguments are explained in a message, and notebooks show progress.
 
-`public_function` wraps a function of `import kahanmaps`; the signature, annotations and docstring stay those of the
-function, and no argument is changed.
+`public_function` wraps a function of `import kahanmaps`. Its signature, annotations and docstring do not change, and no
+argument is changed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.errors import InputError, suggestion
 from kahanmaps.hard_stop import TimeLimit
 
-_BEFORE_PROGRESS, _BETWEEN_UPDATES = 2.0, 0.5  # seconds
+_BEFORE_PROGRESS, _BETWEEN_UPDATES = 2.0, 0.5  # seconds before the first message, and between two messages
 _ARGUMENT_HINTS = {
     **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
     **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
@@ -64,7 +64,7 @@ class CallError(InputError, TypeError):
 
 
 def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Return the public version of a function, under its public name, with checks of its arguments."""
+    """Return the public version of a function under its public name `name`; it checks its arguments."""
     signature = inspect.signature(function)
     kinds = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
     takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())
@@ -76,15 +76,15 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
         except TypeError as error:
             raise CallError(_wrong_call(name, signature, kwargs, takes_options, error)) from None
         for argument, value in given.items():
-            if kinds[argument].startswith("bool"):  # any other value would count as one
+            if kinds[argument].startswith("bool"):  # any other value would count as true or false
                 _require_kind(argument, value, kinds[argument])
         try:
-            # Somebody waits for the answer: a notebook, or a prompt of Python.
+            # A person waits for the answer in a notebook or at a Python prompt.
             is_interactive = threading.current_thread() is threading.main_thread()
             is_interactive = is_interactive and (hasattr(sys, "ps1") or _in_notebook())
             return call_interactively(given, args, kwargs) if is_interactive else function(*args, **kwargs)
         except TypeError as error:
-            if not isinstance(error, InputError):  # the function did not check it
+            if not isinstance(error, InputError):  # the function did not check this argument
                 for argument, value in given.items():
                     _require_kind(argument, value, kinds[argument])
             raise
@@ -105,21 +105,21 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
                     raise KeyboardInterrupt from None
                 if hasattr(results[-1], "interrupt"):
                     results[-1].interrupt()
-                return results[-1]  # what was found until then
+                return results[-1]  # the results obtained before the interrupt
 
-    # By this name it is pickled: an attribute of `kahanmaps`.
+    # Pickle finds the function by this name, as an attribute of `kahanmaps`.
     call.__module__, call.__qualname__ = "kahanmaps", name
     return call
 
 
 class CallableModule(ModuleType):
-    """A subpackage with the name of a command, which can be called like the command: its function `command`."""
+    """A subpackage with the name of a command; calling it calls its function `command`, as the command does."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         return public_function(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        # Importing a submodule sets it as an attribute; a function of the same name keeps the name.
+        # Importing a submodule sets it as an attribute; a function of the same name must not be overwritten.
         if not (isinstance(value, ModuleType) and isinstance(vars(self).get(name), FunctionType)):
             super().__setattr__(name, value)
 
@@ -143,7 +143,7 @@ def _wrong_call(
 
 
 def _require_kind(name: str, value: Any, annotation: str) -> None:
-    """Raise InputError for a value that is no integer, number, truth value or text where the annotation says so."""
+    """Raise InputError for a value that is not the integer, number, truth value or text that `annotation` requires."""
     plain = annotation.removesuffix(" | None")
     if (value is None and plain != annotation) or plain not in ("int", "bool", "str", "float"):
         return
@@ -151,7 +151,7 @@ def _require_kind(name: str, value: Any, annotation: str) -> None:
         integer(value, name)
     elif plain == "float" and not (isinstance(value, int | float) and not isinstance(value, bool)):
         raise InputError(f"found {name} = {value!r}, expected a number")
-    elif plain in ("bool", "str") and type(value).__name__ not in (plain, f"{plain}_"):  # with those of numpy
+    elif plain in ("bool", "str") and type(value).__name__ not in (plain, f"{plain}_"):  # bool_ and str_ of numpy
         expected = "True or False" if plain == "bool" else "a text"
         raise InputError(f"found {name} = {value!r}, expected {expected}")
 
@@ -164,9 +164,9 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
-    """Within the block let Ctrl-C, or the button of a notebook, end a search like a time limit: its results are kept.
+    """Within the block, let Ctrl-C or a notebook's stop button end a search like a time limit, keeping its results.
 
-    A second interrupt is raised as usual. A handler that the caller has installed stays in place.
+    A second interrupt raises KeyboardInterrupt. An interrupt handler installed by the caller is not replaced.
     """
     interrupts: list[bool] = []
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -187,7 +187,7 @@ def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
-    """Show the last message below a cell of a notebook, from two seconds on to the end of the block."""
+    """Show the last message below a notebook cell, from two seconds after the start until the block ends."""
     if not _in_notebook():
         yield lambda _: None
         return
@@ -198,7 +198,7 @@ def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
     def show() -> None:
         if is_done.wait(_BEFORE_PROGRESS):
             return
-        with suppress(Exception):  # a display that fails must not fail the search
+        with suppress(Exception):  # an error of the display must not end the search
             handle = ipython.display(ipython.HTML(_bar(messages[-1])), display_id=True)
             while not is_done.wait(_BETWEEN_UPDATES):
                 handle.update(ipython.HTML(_bar(messages[-1])))

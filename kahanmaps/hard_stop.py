@@ -1,4 +1,4 @@
-"""A time limit by the wall clock, which abandons the running computation. No result depends on a clock otherwise."""
+"""A time limit by the wall clock, which interrupts a computation; no other result of kahanmaps depends on a clock."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _REPEAT_SECONDS = 1.0
 
 
 class TimeLimit(KeyboardInterrupt):
-    """A `time_limit` has expired. Like Ctrl-C, it interrupts the computation at any place."""
+    """The limit set by `time_limit` has expired; like Ctrl-C, this exception interrupts the computation anywhere."""
 
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Raise TimeLimit within the block after this number of seconds; None means no limit.
 
-    `seconds` is positive. Completed work is kept, and the running computation is lost. The block gets a function that
-    returns whether the limit has expired. Raises InputError for other limits, in other threads than the main one, and
-    on Windows.
+    `seconds` is positive. Completed work remains, and the interrupted computation is lost. The block gets a function
+    that returns whether the limit has expired. Raises InputError for an invalid limit, outside the main thread, and on
+    Windows.
 
     >>> with time_limit(60) as is_over:
     ...     print(is_over())
@@ -52,7 +52,7 @@ def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
         return
     signal.signal(signal.SIGALRM, stop)
     try:
-        # Repeated: an exception raised within a callback of a compiler is lost.
+        # The alarm is repeated, because an exception raised within a callback of a compiler is lost.
         signal.setitimer(signal.ITIMER_REAL, seconds, _REPEAT_SECONDS)
         yield lambda: bool(over)
     finally:

@@ -1,7 +1,7 @@
 """Hints for names that do not exist: what to type instead.
 
-Words of SciPy, SymPy and diffrax, and names of earlier releases, are listed in `HINTS`; other names are compared with
-the existing ones.
+`HINTS` lists terms of SciPy, SymPy and diffrax, and names of earlier releases. Other names are compared with the names
+that exist.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _ORBIT = "km.orbit(system, x0, eps, steps), in floating point with exact=False"
 _SYSTEM = 'km.System("x\' = y; y\' = x^2"), km.System({"x": "y", "y": "x^2"}) or km.load("euler_top")'
 _INTEGRALS = "km.find_integrals(system), or km.check_integrals(system, formula) for a claim"
 
-# What to type instead of a name; system, map, orbit and result stand for values of the user.
+# What to type instead of a name; system, map, orbit and result stand for the user's values.
 HINTS = {
     **dict.fromkeys(("parse", "parse_equations", "from_string", "from_sympy", "from_dict", "system", "ode"), _SYSTEM),
     **dict.fromkeys(("ODE", "QuadraticField", "VectorField", "vector_field", "from_text", "from_latex"), _SYSTEM),
@@ -89,11 +89,11 @@ HINTS = {
 
 
 class MissingName(InputError, AttributeError):
-    """A name that does not exist; the message says which one does."""
+    """A name that does not exist; the message gives an existing one."""
 
 
 def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
-    """Return the error for a missing attribute, with what to type instead.
+    """Return the error for a missing attribute; its message says what to type instead.
 
     >>> print(missing_name("module 'kahanmaps'", "equilibria", []))
     module 'kahanmaps' has no attribute 'equilibria': type km.fixed_points(system)
@@ -109,16 +109,16 @@ def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
 
 
 class AttributeHints:
-    """Base class of values whose missing attributes are answered with the name of an existing one."""
+    """Base class of values: the error for a missing attribute suggests an existing one."""
 
     __slots__ = ()
 
-    if not TYPE_CHECKING:  # or every attribute would pass the type checker
+    if not TYPE_CHECKING:  # a type checker that sees __getattr__ accepts every attribute
 
         def __getattr__(self, name: str) -> Any:
             if name[:1] == "_" or (
                 name.startswith("is_") and name not in HINTS
-            ):  # protocols of Python, NumPy, SymPy and IPython
+            ):  # names that Python, NumPy, SymPy and IPython look up by themselves
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             known = (other for other in dir(type(self)) if other[0] != "_")
             raise missing_name(f"{type(self).__name__!r} object", name, [*known, *getattr(self, "__dict__", ())])

@@ -1,6 +1,6 @@
 """The names of the library that the command line uses, imported on first use so that --help is fast.
 
-They are listed with their modules in internals.pyi, which type checkers read as well.
+The names and their modules are listed in internals.pyi, which type checkers read as well.
 """
 
 import sys
@@ -12,8 +12,8 @@ _load, __dir__, __all__ = attach_stub("kahanmaps", __file__)
 
 
 def __getattr__(name: str) -> Any:
-    # Some versions of lazy-loader store what they load in the package as well. There it would replace public functions,
-    # which report wrong arguments in words, and make private names public.
+    # Some versions of lazy-loader also store what they load in the package. There it would replace public functions,
+    # which explain wrong arguments, and would make private names public.
     public = vars(sys.modules["kahanmaps"])
     is_stored, stored = name in public, public.get(name)
     value = _load(name)

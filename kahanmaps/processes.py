@@ -13,7 +13,7 @@ def processors() -> int:
     """Return the number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not every system has this function
         return os.cpu_count() or 1
 
 
@@ -23,5 +23,5 @@ def end_with_parent(parent: int) -> None:
         import ctypes
 
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # the parent ended before this call
+    if os.getppid() != parent:  # the parent had already ended
         os._exit(1)

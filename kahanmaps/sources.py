@@ -1,8 +1,8 @@
 """The references cited in docstrings, catalogue files and evidence, by key.
 
-Definitions, propositions, lemmas and theorems of petrera-suris-2016 share one numbering: commutativity is Theorem
-9, the integrals Theorem 11, the Poisson structure Theorem 12. Displayed equations are cited by their label in the
-source text.
+Definitions, propositions, lemmas and theorems of petrera-suris-2016 share one numbering: Theorem 9 is commutativity,
+Theorem 11 the integrals, Theorem 12 the Poisson structure. Displayed equations are cited by their label in the LaTeX
+source.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ SOURCES: dict[str, str] = {
 
 
 def source(key: str) -> str:
-    """Return the full reference for a key.
+    """Return the full reference for a citation key.
 
     >>> source("kahan-1993")
     'W. Kahan. Unconventional numerical methods for trajectory calculations. Lecture notes, 1993'

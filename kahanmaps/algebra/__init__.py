@@ -1,1 +1,1 @@
-"""Exact fields, matrices, polynomials and their text: nothing here knows of differential equations."""
+"""Exact fields, matrices, polynomials, and their conversion to and from text, independent of differential equations."""

@@ -1,10 +1,10 @@
-"""Bounds for degrees and coefficients as a field: a computation with field operations over it bounds its own result.
+"""Bounds for degrees and coefficients as a field: to bound the result of a computation, run it over this field.
 
 An element represents a rational function N / (s D_1^k_1 D_2^k_2 ...). N is a polynomial with integer coefficients, of
-which only the `CoefficientSize` is stored; s is a positive integer; D_1, D_2, ... are the divisors of the computation,
-with their sizes. Sums are taken over a common denominator. A matrix has one bound for all its entries, and a linear
-system is solved by Cramer's rule. Evaluating a claim over this field gives bounds for the degree and the coefficients
-of the polynomial equation that is equivalent to it (`bound_of`).
+which only the `CoefficientSize` is stored; s is a positive integer; D_1, D_2, ... are the divisors that occur in the
+computation, also stored by their sizes. Sums are taken over a common denominator. A matrix has one bound for all its
+entries, and a linear system is solved by Cramer's rule. Evaluating a claim over this field bounds the degree and the
+coefficients of the polynomial equation that is equivalent to the claim (`bound_of`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from kahanmaps.errors import InputError
 class CoefficientSize:
     """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute values of its coefficients.
 
-    This sum is submultiplicative and subadditive, so that bounds can be computed operation by operation.
+    This sum is subadditive and submultiplicative, so that bounds can be computed operation by operation.
 
     >>> CoefficientSize(2, 1.0) * CoefficientSize(3, 0.5)
     CoefficientSize(degree=5, bits=1.5)
@@ -59,8 +59,8 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
     """Bound the polynomial equations equivalent to equality of pairs of elements, or matrices, over `field`.
 
     Returns:
-        A bound for each polynomial that vanishes if the pairs are equal, and the degree of the product of everything
-        that must not be zero: of the divisors, and of the elements compared with zero.
+        A bound for all polynomials that vanish if and only if the pairs are equal, and the degree of the product of
+        all polynomials that must not be zero: the divisors, and the elements compared with zero.
     """
     equation = ONE
     for pair in pairs:
@@ -70,7 +70,7 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
 
 
 class BoundField(Field):
-    """The field of bounds: `variable()` is a variable, `polynomial(...)` any polynomial of at most that size."""
+    """The field of bounds. `variable()` bounds a variable, `polynomial(...)` every polynomial of at most that size."""
 
     name = "bounds"
     characteristic = 0
@@ -92,18 +92,18 @@ class BoundField(Field):
         return Bound(self, CoefficientSize(1, 0.0), 1, {})
 
     def polynomial(self, degree: int, bits: float) -> Bound:
-        """Return the bound of integer polynomials of this degree whose |coefficients| have a sum of at most 2^bits."""
+        """Bound the integer polynomials of degree at most `degree` whose |coefficients| sum to at most 2^bits."""
         return Bound(self, CoefficientSize(degree, bits), 1, {})
 
     @property
     def pole_degree(self) -> int:
-        """The degree of the product of everything that must not be zero."""
+        """The degree of the product of all polynomials that must not be zero."""
         return sum(size.degree for size in self._denominators)
 
     def denominator(self, owner: Any, size: CoefficientSize) -> int:
-        """Return the index of the denominator that belongs to the object `owner`; the same object has the same index.
+        """Return the index of the denominator of the object `owner`; the same object always has the same index.
 
-        The common bound of the entries of a matrix gets a new index each time, since it represents different entries.
+        A common bound of the entries of a matrix gets a new index in each call, since it represents different entries.
         """
         if isinstance(owner, Bound) and owner.is_common:
             self._denominators.append(size)
@@ -143,7 +143,7 @@ class BoundField(Field):
         return self.variable()
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> BoundMatrix:
-        """Return the matrix with a common bound of these entries."""
+        """Return the matrix whose entries all have the common bound of these entries."""
         # Most entries are the same object, so remove duplicates first.
         elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
         scale, denominator = 1, dict[int, int]()
@@ -155,7 +155,7 @@ class BoundField(Field):
         return BoundMatrix(self, rows, columns, Bound(self, numerator, scale, denominator))
 
     def is_zero(self, element: Any) -> bool:
-        """Return False: an element compared with zero is assumed to be nonzero, and counts as a denominator."""
+        """Return False: an element compared with zero is assumed nonzero, and its numerator counts as a divisor."""
         self.denominator(element, element.numerator)
         return False
 
@@ -180,7 +180,7 @@ class Bound(Element):
         self.is_common = False
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of the numerator over a larger denominator."""
+        """Return the size of the numerator over a larger denominator, a multiple of the present one."""
         missing = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
         return self.numerator * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
 
@@ -260,7 +260,7 @@ class BoundMatrix:
         return Bound(self.field, self._minor(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
-        """Bound the solution by Cramer's rule: with entries N/d it is d adj(N) right / det N."""
+        """Bound the solution by Cramer's rule: for a matrix N/d the solution is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         index = self.field.denominator(self, self._minor(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
@@ -285,10 +285,10 @@ def log2(value: fmpz | int) -> float:
 
 
 def _lcm(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the least common multiple of two products of powers of denominators: exponents by denominator."""
+    """Return the least common multiple of two products of powers of denominators, as exponents by denominator."""
     return {index: max(left.get(index, 0), right.get(index, 0)) for index in {*left, *right}}
 
 
 def _product(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the product of two products of powers of denominators: exponents by denominator."""
+    """Return the product of two products of powers of denominators, as exponents by denominator."""
     return {index: left.get(index, 0) + right.get(index, 0) for index in {*left, *right}}

@@ -1,8 +1,8 @@
 """Random seeds that depend on the claim: random choices are drawn from a hash of the claim and the user's seed.
 
-A seed alone is public, and anyone who knows the primes and points in advance can write a false claim that passes at all
-of them, as with primality tests at fixed bases (albrecht-2018). If the claim is hashed as well, the points are known
-only after the claim is written, and change with each of its letters (fiat-shamir-1987). docs/mathematics.md explains
+If only a seed is hashed, anyone knows the primes and points in advance and can write a false claim that passes at all
+of them, as for primality tests with fixed bases (albrecht-2018). If the claim is hashed as well, the points are known
+only once the claim is written, and change with each of its characters (fiat-shamir-1987). docs/mathematics.md explains
 what an error bound then means: the hash is modeled as a random function (bellare-rogaway-1993), an assumption
 (canetti-2004).
 """
@@ -30,10 +30,10 @@ def derive_seed(seed: int, *subject: Any) -> int:
             lists of these.
 
     Returns:
-        An integer, the SHA-256 hash of these data.
+        An integer, the SHA-256 hash of the seed and the subject.
 
     Raises:
-        TypeError: for data of another type, whose text might not determine them.
+        TypeError: for data of another type, whose text might not determine the value.
 
     Source: fiat-shamir-1987.
 
@@ -48,7 +48,7 @@ def derive_seed(seed: int, *subject: Any) -> int:
 
 
 def _encode(part: Any) -> str:
-    """Return text that differs for different data; each piece starts with its length, so that pieces cannot merge."""
+    """Return text that differs for different data; each part starts with its length, so that parts cannot merge."""
     if isinstance(part, int):
         part = fmpz(part)  # str() of a Python int is limited to 4300 digits
     if part is None or isinstance(part, str | fmpz | fmpq):
@@ -67,7 +67,7 @@ def _encode(part: Any) -> str:
 
 
 def random_prime_field(rng: random.Random) -> PrimeField:
-    """Return GF(p) for a prime drawn uniformly from [2^62, 2^63), the largest that fit into nmod."""
+    """Return GF(p) for a prime p drawn uniformly from [2^62, 2^63), the largest primes that fit into FLINT's nmod."""
     while True:
         candidate = rng.getrandbits(PRIME_BITS) | (1 << PRIME_BITS)
         if candidate % 2 and fmpz(candidate).is_prime():

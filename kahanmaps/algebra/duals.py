@@ -1,8 +1,8 @@
 """Dual numbers K[d]/(d^2) over any field K: exact derivatives of computations with field operations.
 
-f(x + d v) = f(x) + d f'(x) v, so the slope is the derivative at x in direction v. K may be a ring of dual numbers
-itself: the slope of the slope of f((x + v d) + (w + 0 d) e) is then the second derivative. Matrices are M0 + d M1 with
-two matrices over K, so that products and linear systems are computed by FLINT if K has FLINT matrices.
+f(x + d v) = f(x) + d f'(x) v, so the slope (the coefficient of d) is the derivative at x in direction v. K may itself
+be a ring of dual numbers: the slope of the slope of f((x + v d) + (w + 0 d) e) is then the second derivative. A matrix
+M0 + d M1 is stored as two matrices over K; FLINT computes products and linear systems if K has FLINT matrices.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from kahanmaps.errors import InputError, PrecisionLost, SingularMatrix
 class DualField(Field):
     """The dual numbers over `base`. Elements are `Dual`, matrices `DualMatrix`.
 
-    It implements the protocol of a field, but is not a field: an element is invertible only if its value is, and an
-    element with value 0 need not be zero. `convert` accepts what `base` accepts, and returns constants.
+    It implements the protocol of a field, but is not a field: value + d slope is invertible only if its value is, and
+    an element with value 0 need not be zero. `convert` accepts what `base` accepts, and returns constants (slope 0).
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> x = DualField(QQ).dual(3, 1)
@@ -107,7 +107,7 @@ class Dual(Element):
         return Dual(self.field, self.value * other.value, self.value * other.slope + self.slope * other.value)
 
     def _over(self, other: Dual) -> Dual:
-        if self.field.base.is_zero(other.value):  # FLINT's balls divide by zero without an error
+        if self.field.base.is_zero(other.value):  # balls of FLINT divide by zero without an error
             raise ZeroDivisionError("division by a dual number with value 0")
         value = self.value / other.value
         return Dual(self.field, value, (self.slope - value * other.slope) / other.value)
@@ -117,7 +117,7 @@ class Dual(Element):
 
 
 class DualMatrix:
-    """The matrix value + d slope from two matrices of one size over the base of `field`."""
+    """The matrix value + d slope; `value` and `slope` are matrices of one size over the base of `field`."""
 
     def __init__(self, field: DualField, value: Any, slope: Any) -> None:
         if (value.nrows(), value.ncols()) != (slope.nrows(), slope.ncols()):
@@ -174,9 +174,9 @@ class DualMatrix:
         return self.__mul__(other)
 
     def det(self) -> Dual:
-        """Compute det M0 (1 + d tr(M0^{-1} M1)), or the slope column by column if M0 has no inverse."""
+        """Compute det M0 (1 + d tr(M0^{-1} M1)); if M0 has no inverse, compute the slope column by column."""
         value = self.value.det()
-        if isinstance(self.value, EntryMatrix):  # there a linear system is slower than further determinants
+        if isinstance(self.value, EntryMatrix):  # solving is slower than computing more determinants here
             return Dual(self.field, value, self._slope_of_det())
         try:
             ratio = solve(self.value, self.slope)
@@ -185,7 +185,7 @@ class DualMatrix:
         return Dual(self.field, value, value * trace(ratio))
 
     def _slope_of_det(self) -> Any:
-        """Return the sum over all columns of det M0 with this column replaced by that of M1; valid for every M0."""
+        """Return the sum over all j of det M0 with column j replaced by column j of M1; valid for every M0."""
         n, total = self.nrows(), self.field.base.zero
         value, slope = self.value.entries(), self.slope.entries()
         for k in range(n):

@@ -1,6 +1,6 @@
-"""Elliptic curves Y^2 = x^3 + a2 x^2 + a4 x + a6: group law, and over Q orders, canonical heights and rotation numbers.
+"""Elliptic curves Y^2 = x^3 + a2 x^2 + a4 x + a6: the group law, and orders, canonical heights and rotation numbers.
 
-Points are pairs (x, Y); None is the zero.
+Points are pairs (x, Y); None is the point at infinity, the zero of the group. Orders and heights are for points over Q.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from kahanmaps.errors import PrecisionLost
 
 AffinePoint = tuple[Any, Any]
 
-MAX_BITS = 1 << 15  # of the balls in which heights and rotation numbers are computed
-_ACCURACY = 1e-15  # of rotation numbers and heights
-_HEIGHT_TERMS = 40  # of the series for a height, whose terms decrease like 4^-n
+MAX_BITS = 1 << 15  # maximal precision of the balls in which heights and rotation numbers are computed
+_ACCURACY = 1e-15  # requested accuracy of rotation numbers and heights
+_HEIGHT_TERMS = 40  # terms of the series for a height; they decrease like 4^-n
 _EXACT_TERMS = 4
 _MAX_TORSION = 12  # the largest order of a rational torsion point (mazur-1977)
-_SMOOTH_BITS = 20  # of primes that are found to reduce the coefficients of a model
+_SMOOTH_BITS = 20  # maximal size of the primes by which the coefficients of a model are reduced
 
 
 class EllipticCurve:
@@ -54,7 +54,7 @@ class EllipticCurve:
         return x, slope * (P[0] - x) - P[1]
 
     def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
-        """n P for n >= 0."""
+        """Return n P for n >= 0."""
         multiple: AffinePoint | None = by_doublings(self.add, None, n, P)
         return multiple
 
@@ -72,7 +72,7 @@ class EllipticCurve:
     def order(self, P: AffinePoint) -> int | None:
         """Return the order of a point over Q; None if it is infinite.
 
-        By Mazur's theorem it is infinite if it is larger than 12.
+        By Mazur's theorem an order larger than 12 is infinite.
         """
         multiple: AffinePoint | None = P
         for n in range(1, _MAX_TORSION + 1):
@@ -82,9 +82,9 @@ class EllipticCurve:
         return None
 
     def short_model(self, P: AffinePoint) -> tuple[EllipticCurve, AffinePoint]:
-        """Return an isomorphic curve Y^2 = x^3 + A x + B over Q with small integers A, B, and the image of a point.
+        """Return an isomorphic curve Y^2 = x^3 + A x + B over Q with small integers A, B, and the image of P on it.
 
-        It is minimal among these, unless the coefficients have common powers of large primes.
+        A and B are minimal unless they have common powers of large primes.
         """
         third = self.a2 / 3
         A, B, x, y = self.a4 - self.a2 * third, (2 * third * third - self.a4) * third + self.a6, P[0] + third, P[1]
@@ -98,7 +98,7 @@ class EllipticCurve:
 
 
 def _candidates(number: fmpz) -> list[fmpz]:
-    """Return the small prime factors of a number, and a cofactor with its roots, each greater than 1."""
+    """Return the small prime factors of a number, its cofactor, and the roots of the cofactor, each greater than 1."""
     if number == 0:
         return []
     factors = [abs(factor) for factor, _ in number.factor_smooth(_SMOOTH_BITS)]
@@ -107,7 +107,7 @@ def _candidates(number: fmpz) -> list[fmpz]:
 
 
 def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
-    """Return n P for n >= 0 in the group with this sum and zero."""
+    """Return n P for n >= 0 in the group with addition `add` and zero element `zero`."""
     total = zero
     for bit in bin(n)[2:]:
         total = add(total, total)
@@ -117,12 +117,12 @@ def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> A
 
 
 def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
-    """Return the canonical height of a point over Q, half of that of its x-coordinate, as a ball.
+    """Return the canonical height of a point over Q as a ball, normalized to half the height of its x-coordinate.
 
-    The height is computed by Tate's series. In a doubling, the height of x differs from 4 times that of P by a bounded
-    amount: its archimedean part is a real number, the other parts come from the common factor of two forms of degree 4.
-    This factor divides the resultant R of the forms, so that coordinates modulo a power of R determine it. The
-    remainder is bounded by the sizes of the forms and of R.
+    The height is computed by Tate's series. In a doubling, the height of x differs from 4 times its former value by a
+    bounded amount. The archimedean part of this amount is a real number, the other parts come from the common factor of
+    two forms of degree 4. This factor divides the resultant R of the forms, so that coordinates modulo a power of R
+    determine it. The remainder of the series is bounded by the sizes of the forms and of R.
 
     Raises PrecisionLost if 32768 bits do not suffice.
 
@@ -145,11 +145,11 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
         )
 
     def factors(terms: int, modulus: fmpz | None) -> list[fmpz]:
-        """The common factors in the first doublings; fewer than `terms` if the modulus does not determine them."""
+        """The common factors in the first doublings; fewer than `terms` if the modulus determines only some of them."""
         X, Z, commons = x.p, x.q, list[fmpz]()
         while len(commons) < terms and (modulus is None or modulus % resultant == 0):
             X, Z = doubled(X, Z)
-            common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
+            common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
             X, Z = X // common, Z // common
             if modulus is not None:
                 modulus //= common
@@ -157,13 +157,13 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
             commons.append(common)
         return commons
 
-    # The factors are usually much smaller than R, and as large as the first ones, for which no modulus is needed.
+    # The common factors are usually much smaller than R, and as large as the first ones, which need no modulus.
     usual = reduce(fmpz.lcm, factors(_EXACT_TERMS, None))
     commons = factors(_HEIGHT_TERMS, resultant * usual**_HEIGHT_TERMS)
     if len(commons) < _HEIGHT_TERMS:
         commons = factors(_HEIGHT_TERMS, resultant ** (_HEIGHT_TERMS + 1))
-    # log R <= log |forms| + log of the cofactors of R = f F + g G, minors of a matrix with eight rows: they bound the
-    # terms from below. The sums of the coefficients bound them from above.
+    # R = f F + g G for the forms F, G with cofactors f, g (minors of a matrix with eight rows). So log R <= log |forms|
+    # + log |cofactors|, which bounds the terms from below. The sums of the coefficients bound them from above.
     largest = max(abs(c) for c in (fmpz(4), 2 * b4, 2 * b6, b8, b2, b6)) + 1
     bound = resultant.bit_length() + 8 * (largest.bit_length() + 3)
     for bits in (1 << 9, 1 << 12, MAX_BITS):
@@ -175,7 +175,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
                 real = doubled(*real)
                 sizes.append(abs(real[0]).max(abs(real[1])))
                 real = (real[0] / sizes[-1], real[1] / sizes[-1])
-        with RR(128).working():  # the sum converges, only the doublings lose digits
+        with RR(128).working():  # summing needs few bits: only the doublings lose digits
             total, scale = first.log(), arb(1)
             for size, common in zip(sizes, commons, strict=True):
                 scale /= 4
@@ -187,16 +187,16 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
 
 
 def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
-    """Return the roots of the cubic polynomial with arb coefficients: the largest real one first.
+    """Return the roots of the cubic polynomial with arb coefficients; the first is the largest real root.
 
-    With `has_oval`, a positive discriminant, they are real and in decreasing order; otherwise two are conjugate.
+    With `has_oval` (positive discriminant) all are real and in decreasing order; otherwise two are complex conjugate.
     """
     third, A, B = _depressed(curve)
     s = B * B / 4 + A * A * A / 27
     if has_oval:  # Viete's formula
         size, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
         return [acb(size * (angle - 2 * k * arb.pi() / 3).cos() - third) for k in range(3)]
-    # Cardano's formula, with the cube root that does not cancel.
+    # Cardano's formula, with the one of the two cube roots that suffers no cancellation.
     cube = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
     u = -((-cube).root(3)) if cube < 0 else cube.root(3)
     v = -A / (3 * u)
@@ -221,13 +221,13 @@ def _depressed(curve: EllipticCurve) -> tuple[Any, Any, Any]:
 
 
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
-    """Return the rotation number of the translation by P on the real curve, in (0, 1/2] up to sign, and 1 or 2.
+    """Return the rotation number in (0, 1/2] (up to sign) of the translation by P on the real curve, and 1 or 2.
 
-    If the translation exchanges two real components, the number is that of its square, and the second result is 2.
+    If the translation exchanges two real components, the number is that of the squared translation, and 2 is returned.
 
     Args:
-        curve, P: with coefficients and coordinates in arb.
-        has_oval: whether the polynomial has three real roots: a positive discriminant.
+        curve, P: the curve and the point, with coefficients and coordinates in arb.
+        has_oval: whether the cubic polynomial has three real roots, i.e. a positive discriminant.
     """
     a, b, c = (-root for root in real_roots(curve, has_oval))
     steps, x = 1, P[0]

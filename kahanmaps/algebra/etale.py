@@ -1,8 +1,8 @@
 """The algebra Q[t]/chi for a squarefree chi: computation with all roots of chi at once, without a splitting field.
 
 An identity holds for the class of t if and only if it holds for every root of chi in any field. The algebra is a
-product of fields, one for each irreducible factor of chi; an element that vanishes in some but not all of them is a
-zero divisor, neither zero nor invertible.
+product of fields, one for each irreducible factor of chi. An element that is zero in some but not all of these fields
+is a zero divisor, neither zero nor invertible.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from kahanmaps.algebra.matrices import EntryMatrix, trace
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
-# For longer coefficients (in bits) a quotient uses a linear system instead of Euclid's algorithm, and a product uses
-# `_product` instead of FLINT, if there are few coefficients.
+# For coefficients with more bits, a quotient is computed by a linear system instead of Euclid's algorithm, and a
+# product of polynomials with few coefficients by `_product` instead of FLINT.
 _LONG, _LONG_PRODUCT = 2000, 8000
 _MAX_COEFFICIENTS = 6
 
@@ -104,7 +104,7 @@ class EtaleAlgebra(Field):
 
 
 class EtaleElement(Element):
-    """The class of `polynomial`, which is reduced modulo chi."""
+    """The class of `polynomial` modulo chi, stored as the reduced polynomial."""
 
     __slots__ = ("polynomial",)
 
@@ -134,7 +134,7 @@ class EtaleElement(Element):
 
     def _times(self, other: EtaleElement) -> EtaleElement:
         first, second = self.polynomial, other.polynomial
-        # Check the length of one coefficient only: in the rare case that others differ, the product is a bit slower.
+        # Only one coefficient is measured: if the others have another length, the product is merely slower.
         is_long = first[0].p.bit_length() > _LONG_PRODUCT and second[0].p.bit_length() > _LONG_PRODUCT
         product = _product(first, second) if is_long and self.field.degree <= _MAX_COEFFICIENTS else first * second
         return EtaleElement(self.field, product % self.field.chi)
@@ -160,11 +160,11 @@ class EtaleElement(Element):
 def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
     """Multiply polynomials with few long coefficients.
 
-    FLINT multiplies all pairs of coefficients, with two products for each pair i < j; by
+    FLINT multiplies all pairs of coefficients, which takes two products for each pair i < j. By
 
         a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j
 
-    one product for each pair suffices (Karatsuba).
+    one product suffices for each pair (Karatsuba).
     """
     count = max(first.length(), second.length())
     a, b = ([numerator[k] for k in range(count)] for numerator in (first.numer(), second.numer()))
@@ -178,7 +178,7 @@ def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
 
 
 class EtaleMatrix(EntryMatrix):
-    """A matrix over an `EtaleAlgebra`. No elimination: a pivot that is not zero may be a zero divisor."""
+    """A matrix over an `EtaleAlgebra`. Elimination is not used: a nonzero pivot may be a zero divisor."""
 
     def det(self) -> EtaleElement:
         """Compute the determinant by the Faddeev-LeVerrier recursion, which divides by integers only."""

@@ -1,10 +1,10 @@
 """The fields of numbers: the rationals QQ, the prime fields GF(p), real balls RR(bits) and complex balls CC(bits).
 
-They and the fields in duals.py, etale.py, functions.py and bounds.py implement one protocol, `Field`, so that the Kahan
-map is written once for all of them. Elements of the fields here are FLINT's own numbers with the ordinary operators
-(`fmpq`, `nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`, `acb`); the methods of a field are the operations for
-which FLINT has no common name. `convert` accepts exact numbers only: text, integers and fractions, not floats.
-`Element` is the base class of elements that are not FLINT's.
+These fields, and those in duals.py, etale.py, functions.py and bounds.py, implement one protocol, `Field`, so that the
+Kahan map is written once for all fields. Elements of the fields in this file are FLINT's numbers with the usual
+operators (`fmpq`, `nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`, `acb`); the methods of a field are operations
+that have different names for these types. `convert` accepts exact numbers only: text, integers and fractions, not
+floats. `Element` is the base class of elements that are not FLINT's.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ MAX_BALL_BITS = 1_000_000
 def rational(value: Any) -> fmpq:
     """Convert a value to an exact rational number.
 
-    Accepts int, Fraction, Decimal, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and every `numbers.Rational`: also numbers
-    of SymPy and integers of numpy. Raises `InexactNumber` for floats, whose value differs from the printed decimal.
+    Accepts int, Fraction, Decimal, text (`"1/3"`, `"0.1"`), fmpz, fmpq, and every `numbers.Rational`, such as rational
+    numbers of SymPy and integers of numpy. Raises `InexactNumber` for floats: their value differs from the decimal.
 
     >>> rational("0.1")
     1/10
@@ -62,7 +62,7 @@ def rational(value: Any) -> fmpq:
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or kind:
-        example = str(value)  # not for nan, inf and 1j, which are no exact numbers
+        example = str(value)  # nan, inf and 1j are no exact numbers and get no example
         try:
             parse_number(example)
         except InputError:
@@ -77,7 +77,7 @@ def rational(value: Any) -> fmpq:
 
 
 def integer(value: Any, name: str) -> int:
-    """Convert an integer of Python, FLINT, numpy or SymPy to int; `name` is its name in the message of InputError.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError, which calls the value `name`.
 
     >>> integer(7, "m")
     7
@@ -102,7 +102,7 @@ def _numpy_kind(value: Any) -> str:
 
 
 class Field(ABC):
-    """A field of numbers; `exact` says whether equality of two elements can be decided."""
+    """A field of numbers; `exact` tells whether equality of two elements is decidable."""
 
     name: str
     characteristic: int
@@ -120,23 +120,23 @@ class Field(ABC):
 
     @abstractmethod
     def convert(self, value: Any) -> Any:
-        """Convert an exact number (int, Fraction, text, fmpz, fmpq), or an element, to an element."""
+        """Convert an exact number (int, Fraction, text, fmpz, fmpq), or an element, to an element of this field."""
 
     def format(self, element: Any) -> str:
-        """Return the element as text, which `convert` accepts for exact fields."""
+        """Return the element as text. In exact fields `convert` accepts this text."""
         return str(element)
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
-        """Return a random element: a rational number of this height, or any residue."""
+        """Return a random element: a rational number of at most this height, or any residue."""
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     def value(self, polynomial: Any, point: Sequence[Any]) -> Any:
-        """Evaluate a polynomial if the field has its own method; None otherwise (see `polynomials.evaluate`)."""
+        """Evaluate a polynomial if the field has a method of its own, else return None (see `polynomials.evaluate`)."""
         return None
 
     @abstractmethod
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        """Return the matrix over this field with these entries, row by row: FLINT's type, or an `EntryMatrix`."""
+        """Return a matrix over this field with these entries (row by row), of FLINT's type or an `EntryMatrix`."""
 
     def column(self, entries: Sequence[Any]) -> Any:
         """Return the entries as a matrix with one column."""
@@ -155,11 +155,11 @@ class Field(ABC):
         return bool(element == 0)
 
     def equal(self, left: Any, right: Any) -> bool:
-        """Whether two elements are equal (for balls: whether they overlap, so that they may be equal)."""
+        """Whether two elements are equal; for balls, whether they overlap, so that the numbers may be equal."""
         return bool(left == right)
 
     def working(self) -> AbstractContextManager[Any]:
-        """Return the context in which the arithmetic of this field has to run (for balls: the precision)."""
+        """Return the context in which the arithmetic of this field must run; for balls, it sets the precision."""
         return nullcontext()
 
     def __repr__(self) -> str:
@@ -167,9 +167,9 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """Convert an operand to an element of `field`, or return None (for text, matrices and other objects).
+    """Convert an operand to an element of `field`; return None for text, matrices and other objects.
 
-    Raises `InexactNumber` and `BadPrime` as `convert` does.
+    Raises `InexactNumber` and `BadPrime` like `convert`.
     """
     if isinstance(value, str):
         return None
@@ -182,9 +182,9 @@ def operand(field: Field, value: Any) -> Any:
 
 
 class Element(ABC):
-    """An element of a field that FLINT does not have: defines all operators from sum, product and quotient.
+    """An element of a field that FLINT lacks. It derives all operators from the sum, the product and the quotient.
 
-    The other operand may be any number or element that `field.convert` accepts, but not text.
+    The second operand may be any number or element that `field.convert` accepts, but not text.
     """
 
     __slots__ = ("field",)
@@ -211,13 +211,13 @@ class Element(ABC):
     def __neg__(self) -> Self: ...
 
     def _pair(self, other: Any) -> tuple[Self, Self] | None:
-        """Convert both operands to the field of one of them; None if that is impossible."""
+        """Convert both operands to one of their two fields; return None if that is impossible."""
         if isinstance(other, type(self)) and other.field is self.field:
             return self, other
         right = operand(self.field, other)
         if right is not None:
             return self, right
-        # Python calls no reflected method for equal types.
+        # For two operands of equal types Python calls no reflected method.
         left = operand(other.field, self) if isinstance(other, type(self)) else None
         return None if left is None else (left, other)
 
@@ -271,7 +271,7 @@ class Element(ABC):
             return NotImplemented
         return NotImplemented if pair is None else pair[0]._same(pair[1])
 
-    __hash__ = None  # type: ignore[assignment]  # elements may equal numbers, which have other hashes
+    __hash__ = None  # type: ignore[assignment]  # an element may equal a number that has another hash
 
     def __repr__(self) -> str:
         text: str = self.field.format(self)
@@ -288,7 +288,7 @@ class RationalField(Field):
     name = "QQ"
 
     def __reduce__(self) -> str:
-        return "QQ"  # unpickles to the same object, since code tests `field is QQ`
+        return "QQ"  # unpickling returns the same object, since code tests `field is QQ`
 
     characteristic = 0
 
@@ -314,7 +314,7 @@ class RationalField(Field):
 
 
 class PrimeField(Field):
-    """The field of p elements; elements are nmod for p < 2^63, fmpz_mod above. Made by `GF`."""
+    """The field of p elements, made by `GF`. Elements are nmod for p < 2^63, and fmpz_mod for larger p."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return GF, (self.characteristic,)
@@ -347,7 +347,7 @@ class PrimeField(Field):
             raise InputError(f"found an element of another field, expected one of {self.name}")
         if isinstance(value, fmpz_mod):
             try:
-                return value + self._zero  # raises for another modulus, which FLINT gives no way to read
+                return value + self._zero  # raises for another modulus; FLINT has no function to read a modulus
             except (TypeError, ValueError) as error:
                 raise InputError(f"found an element of another field, expected one of {self.name}") from error
         if isinstance(value, int | fmpz) and not isinstance(value, bool):
@@ -372,7 +372,7 @@ class PrimeField(Field):
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
         if self._large is not None:
             return fmpz_mod_mat(rows, columns, [self.convert(entry) for entry in entries], self._large)
-        p, convert = self.prime, self.convert  # large systems spend much of their time in the next loop
+        p, convert = self.prime, self.convert  # local names: large systems spend much time in the next loop
         elements = [e if type(e) is nmod and e.modulus() == p else convert(e) for e in entries]
         return nmod_mat(rows, columns, elements, p)
 
@@ -423,12 +423,12 @@ class _Balls(Field):
         return False
 
     def equal(self, left: Any, right: Any) -> bool:
-        if not (left.is_finite() and right.is_finite()):  # infinite balls and nan overlap everything
+        if not (left.is_finite() and right.is_finite()):  # for FLINT, infinite balls and nan overlap everything
             raise PrecisionLost(f"a ball with {self.bits} bits has become infinite: use more bits")
         return bool(left.overlaps(right))
 
     def working(self) -> AbstractContextManager[Any]:
-        # flint.ctx.prec is global to the process, so it is set for the time of each computation only.
+        # flint.ctx.prec is global to the process, so it is set only during each computation.
         return flint.ctx.workprec(self.bits)
 
     def __eq__(self, other: object) -> bool:
@@ -466,7 +466,7 @@ QQ = RationalField()
 
 
 def GF(prime: int) -> PrimeField:
-    """The field of `prime` elements.
+    """Return the field of `prime` elements.
 
     Raises InputError if the number is not a prime: FLINT would abort the process for a composite modulus.
 
@@ -493,7 +493,7 @@ def _prime_field(prime: int) -> PrimeField:
 
 @lru_cache(maxsize=64)
 def RR(bits: int) -> BallField:
-    """Real balls with `bits` bits of precision (2 to 1,000,000).
+    """Return the field of real balls with `bits` bits of precision (2 to 1,000,000).
 
     >>> RR(64).convert("1/3") * 3 == 1, RR(64).equal(RR(64).convert("1/3") * 3, RR(64).one)
     (False, True)
@@ -504,7 +504,7 @@ def RR(bits: int) -> BallField:
 
 @lru_cache(maxsize=64)
 def CC(bits: int) -> ComplexBallField:
-    """Complex balls with `bits` bits of precision (2 to 1,000,000).
+    """Return the field of complex balls with `bits` bits of precision (2 to 1,000,000).
 
     >>> CC(64).equal(CC(64).convert(acb(1, 2)) * CC(64).convert(acb(1, -2)), CC(64).convert(5))
     True

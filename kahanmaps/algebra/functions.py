@@ -1,9 +1,9 @@
-"""The field of rational functions Q(x1, ..., xn), in which an identity can be expanded and so be proved.
+"""The field of rational functions Q(x1, ..., xn). Expanding both sides of an identity in this field proves it.
 
 FLINT has no fraction field of polynomials. Elements here are quotients. By default they are never reduced by a gcd:
-sums and comparisons use a common denominator only if one divides the other. This is fast for expanding an identity of
-few terms once. A field with `reduces` cancels a gcd after every sum and product instead: each operation is slower, but
-quotients with many factors stay small. Work is counted in advance and bounded by a budget.
+sums and comparisons use the larger of two denominators if the other one divides it, and their product otherwise. This
+is fast for expanding an identity of few terms once. A field with `reduces` cancels a gcd after every sum and product:
+each operation is slower, but quotients with many factors stay small. Work is counted in advance and has a budget.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.work import count_work, counted
 from kahanmaps.errors import KahanmapsError
 
-DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
-_MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # matrices whose minors are cached, and terms of these: 30 MB
-_MAX_ROWS_BY_MINORS = 7  # up to this size 2^n n/2 products with single entries are faster than elimination
+DEFAULT_BUDGET = 100_000_000  # products of terms: about a second, for coefficients of a few words
+_MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # number of matrices whose minors are cached; terms of all minors: 30 MB
+_MAX_ROWS_BY_MINORS = 7  # up to 7 rows, minors (2^n n/2 products by single entries) are faster than elimination
 
 _TOO_MANY = "expanding the identity would take too many products of terms"
-_Key = bytes | tuple[bytes, int]  # hash of a matrix; together with the budget if this was too small
-_cache: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, their products of terms, and their work
+_Key = bytes | tuple[bytes, int]  # hash of a matrix; after a failure, with the budget that was too small
+_cache: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, number of products of terms, units of work
 _cache_lock = Lock()
 
 
 class BudgetExceeded(KahanmapsError):
-    """Expanding would take more products of terms than the budget allows."""
+    """An expansion would take more products of terms than the budget allows."""
 
 
 class FunctionField(Field):
-    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds all products of terms together.
+    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the total number of term products.
 
-    `reduces` says whether quotients are reduced to lowest terms. `modulus` are the coefficients of an irreducible
-    polynomial of which the last name is a root: multiples of this polynomial are then 0.
+    `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients of an irreducible
+    polynomial that has the last variable as a root: multiples of this polynomial are then 0.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -94,14 +94,14 @@ class FunctionField(Field):
         return self.vanishes(element.numerator)
 
     def vanishes(self, polynomial: fmpq_mpoly) -> bool:
-        """Whether a polynomial is zero here."""
+        """Whether a polynomial represents zero in this field, also as a multiple of the modulus."""
         return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
         return self.vanishes((left - right).numerator)
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
-        """Multiply two polynomials; the budget is charged in advance. Raises BudgetExceeded."""
+        """Multiply two polynomials; the budget is charged before. Raises BudgetExceeded."""
         self.pay(len(left) * len(right) + 1)
         return left * right
 
@@ -137,7 +137,7 @@ class FunctionField(Field):
             return None
         columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         operands = [(point[k], powers) for k, powers in columns if any(powers)]
-        denominators: list[fmpq_mpoly] = []  # none of which divides another
+        denominators: list[fmpq_mpoly] = []  # no element divides another one
         for entry, _ in sorted(operands, key=lambda operand: -int(operand[0].denominator.total_degree())):
             if (
                 all(self.quotient(D, entry.denominator) is None for D in denominators)
@@ -159,7 +159,7 @@ class FunctionField(Field):
             (D, tuple(largest_power + a for a in row))
             for D, largest_power, row in zip(denominators, largest_powers, exponents, strict=True)
         ]
-        # The longest factor comes last: in the innermost sum the other operands of its products are short.
+        # The longest factor comes last: then the innermost sum multiplies it by short operands only.
         rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [factor for factor, _ in rows])
@@ -177,7 +177,7 @@ class FunctionField(Field):
         return product
 
     def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """Return the sum of coefficients times powers of the factors; `terms` has the coefficients by exponents."""
+        """Return the sum of coefficients times powers of `factors`; `terms` maps exponents to coefficients."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
         by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
@@ -206,7 +206,7 @@ class FunctionField(Field):
 class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced.
 
-    The value of a polynomial also stores its denominator as a product of powers, which cancel in quotients of values.
+    The value of a polynomial also stores its denominator as a product of `powers`, which cancel in quotients of values.
     """
 
     __slots__ = ("denominator", "numerator", "powers")
@@ -255,7 +255,7 @@ class Function(Element):
             raise ZeroDivisionError("division by the zero function")
         shared = [(D, min(power, other_power)) for D, power in self.powers for E, other_power in other.powers if D == E]
         if shared:
-            # a/D^3 over b/D^2 is a/(D b): the denominators as they stand would be multiplied into both sides.
+            # a/D^3 over b/D^2 is a/(D b): multiplying both sides by the full denominators would leave a factor D^2.
             own_rest, other_rest = (
                 self.field.product_of([(D, power - sum(n for E, n in shared if D == E)) for D, power in value.powers])
                 for value in (self, other)
@@ -271,17 +271,17 @@ class Function(Element):
 
 
 class FunctionMatrix(EntryMatrix):
-    """A matrix over a `FunctionField`, with the operations that the Kahan map needs."""
+    """A matrix over a `FunctionField`, with determinant and solution of linear systems."""
 
     def _dot(self, row: Sequence[Function], column: Sequence[Function]) -> Function:
         total: Function = self.field.zero
         for a, b in zip(row, column, strict=True):
-            if not a.numerator.is_zero() and not b.numerator.is_zero():  # most entries are zero where there are blocks
+            if not a.numerator.is_zero() and not b.numerator.is_zero():  # block matrices consist mostly of zeros
                 total = total._plus(a._times(b))
         return total
 
     def det(self) -> Function:
-        """Compute the determinant block by block, from rows with denominators cleared."""
+        """Compute the determinant block by block, after clearing the denominators of each row."""
         total: Function = self.field.one
         for block in self._blocks():
             n = len(block)
@@ -305,12 +305,12 @@ class FunctionMatrix(EntryMatrix):
             augmented = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
             flat = [entry for row in augmented for entry in row]
             rows, _ = FunctionMatrix(self.field, n, n + columns, flat)._polynomial_rows()
-            sign = -1 if n % 2 else 1  # makes the denominator equal to the determinant
+            sign = -1 if n % 2 else 1  # so that the denominator is the determinant
             for j in range(n, n + columns):
                 *numerator, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(last):
                     raise ZeroDivisionError("singular matrix in solve()")
-                if last.is_constant():  # or its digits would double with each step of an affine map
+                if last.is_constant():  # cancel it: otherwise the digits double with each step of an affine map
                     factor = last.leading_coefficient() * sign
                     numerator, last = [entry / factor for entry in numerator], self.field.one.numerator * sign
                 for i, entry in zip(block, numerator, strict=True):
@@ -336,7 +336,7 @@ class FunctionMatrix(EntryMatrix):
         for i in range(self._rows):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
-            for entry in row:  # a sum has a common denominator of its terms
+            for entry in row:  # a common denominator as in a sum
                 if entry.numerator.is_zero():
                     continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.denominator)
@@ -356,13 +356,13 @@ class FunctionMatrix(EntryMatrix):
 
 
 def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
-    """Return the signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th omits column k.
+    """Return the signed maximal minors of an n x (n + 1) matrix of polynomials; the k-th minor omits column k.
 
     Many identities contain the same image of the same map, so recent minors are cached. A cached result is charged and
-    counted as if it were computed again, so that no verdict depends on earlier computations. For the same reason a
-    failure is cached together with its budget: with another budget the work until it is exceeded would differ.
+    counted like a new computation, so that no verdict depends on earlier computations. For the same reason a failure is
+    cached together with its budget: with another budget, the work done before the failure would differ.
     """
-    count_work(sum(map(len, chain(*rows))))  # for the text of the hash key
+    count_work(sum(map(len, chain(*rows))))  # the work of writing the text that is hashed
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, before = field.budget, counted()
     for cached_key in (key, (key, budget)):
@@ -390,7 +390,7 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
 
 
 def _store(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
-    """Store minors, or None for a failure, and drop the oldest entries of a full cache."""
+    """Store minors, or None for a failure; remove the oldest entries of a full cache."""
     with _cache_lock:
         _cache[key] = minors, products, units
         while (

@@ -1,8 +1,8 @@
 """Integers: contents, common denominators, and the parts of integers that consist of given primes.
 
-The integers are long, and their parts from given primes short, so these parts are computed from residues. The primes
-are given as the divisors of an integer `power`. It is fastest if `power` contains each prime as often as the numbers
-do; higher multiplicities are found as well.
+The integers are long, and the parts that consist of given primes are short, so these parts are computed from residues.
+The primes are given as the divisors of an integer `power`. The computation is fastest if `power` contains each prime
+with the multiplicity that it has in the integers; higher multiplicities in the integers are found as well.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def without(number: fmpz, power: fmpz) -> fmpz:
 
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
-    """Split an integer into the part coprime to `power` and the positive part of the primes of `power`; 0 is (0, 1)."""
+    """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 is (0, 1)."""
     part = fmpz(1)
     if number == 0:
         return number, part
@@ -52,12 +52,12 @@ def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
         part = part * common
         if is_all(common, power):
             break
-        power = common * common  # contains all primes that may still divide the number
+        power = common * common  # contains every prime that may still divide the number
     return number, part
 
 
 def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
-    """Return the largest common factor of integers, not all 0, that consists of the primes of `power` > 0."""
+    """Return the largest common factor of integers (not all 0) that consists of primes dividing `power` > 0."""
     while True:
         common = power
         for number in numbers:
@@ -70,7 +70,7 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def is_all(common: fmpz, power: fmpz) -> bool:
-    """Whether a common divisor with `power` is complete: each of its primes divides `power` more often."""
+    """Whether a gcd with `power` has the full multiplicity of its primes: `power` contains each one more often."""
     cofactor = power // common
     while common != 1:
         shared = common.gcd(cofactor)
@@ -81,7 +81,7 @@ def is_all(common: fmpz, power: fmpz) -> bool:
 
 
 def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
-    """Return values / divisor. Raises ArithmeticError if the lowest 64 bits show a remainder."""
+    """Return values / divisor. Raises ArithmeticError if the lowest 64 bits of a value reveal a remainder."""
     if divisor == 1:
         return list(values)
     quotients = [value // divisor for value in values]
@@ -93,7 +93,7 @@ def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
 
 
 def radical(*numbers: fmpz) -> fmpz:
-    """Return an integer with the primes of these nonzero numbers: small ones once, others to low powers."""
+    """Return an integer with the prime factors of these nonzero numbers: small ones once, others to low powers."""
     product = fmpz(1)
     for number in numbers:
         if number == 0:

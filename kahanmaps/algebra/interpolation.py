@@ -1,20 +1,20 @@
 """Interpolation of rational functions over Q from few values modulo primes.
 
-A black box returns, modulo a prime p and at a point of GF(p)^s, a vector of numbers. The aim is to find the rational
-functions of s symbols with these values. Modulo one prime:
+A black box is a function that returns, for a prime p and a point of GF(p)^s, a vector of numbers modulo p. The aim is
+to find the rational functions of s symbols that have these values. Modulo one prime:
 
-    axes    On each axis through a random point (the anchor), every entry is a fraction of two polynomials; the
-            fraction of least degrees that fits the values is computed, with one value more than needed. It gives
-            the exponents of each symbol, so that functions of eps^2 are recognized at once.
-    stages  Symbols are added one by one, while the others stay at the anchor. The possible monomials are those of the
-    previous stage times the exponents of the new symbol, up to a total degree known from a line. A linear system N(s_k)
-    - v_k D(s_k) = 0 gives the coefficients, hence the monomials. One further value must agree.
+    axes    On each axis through a random point (the anchor), every entry is a fraction of two polynomials. The
+            fraction of least degree that fits the values is computed; one value more than needed is a check. The
+            exponents of each symbol are read off, so that functions of eps^2 are recognized early.
+    stages  Symbols are added one by one, while the remaining ones stay at the anchor. The possible monomials are those
+    of the previous stage times the exponents of the new symbol, up to a total degree known from a random line. The
+    linear system N(s_k) - v_k D(s_k) = 0 gives the coefficients, hence the monomials. One further value must agree.
 
-All values taken so far are reused as equations, and entries with the same denominator share its unknowns. Modulo
-further primes the monomials are known. Coefficients follow by the Chinese remainder theorem, and the functions must
-give the values of the black box at new points modulo new primes. If the black box has the values of a rational function
-over Q, a wrong answer passes with a probability of about degree/2^60 at each of these points (schwartz-1980). That it
-is rational at all is supported by these points only: an answer is strong evidence, not proof.
+All values computed so far are reused as equations, and entries with the same denominator share its unknowns. Modulo
+further primes the monomials are known. The coefficients follow by the Chinese remainder theorem, and the functions must
+agree with the black box at new points modulo new primes. If the black box has the values of a rational function over Q,
+a wrong answer passes at each of these points with probability about degree/2^60 (schwartz-1980). That the black box
+is rational at all is supported by these points only: an answer is strong evidence, not a proof.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from kahanmaps.errors import BadPrime, InputError
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
 
 
-_UNLUCKY_PRIMES = 3  # after this number of failures the black box counts as not rational
-# Values modulo a new prime each; a black box like the Legendre symbol passes each one with probability 1/2.
+_UNLUCKY_PRIMES = 3  # after this number of failures the black box is declared not rational
+# One value modulo each of these new primes; a black box like the Legendre symbol passes each with probability 1/2.
 _CONFIRMATIONS = 5
 
 
@@ -45,8 +45,8 @@ Exponents = tuple[int, ...]
 BlackBox = Callable[[int, Point], Sequence[int] | None]
 
 NONE_FIXED: Mapping[int, int] = MappingProxyType({})
-_BAD_POINTS = 20  # in a row, before another prime is tried
-_DETERMINING = 4  # entries that determine their common denominator together; more only enlarge the matrices
+_BAD_POINTS = 20  # consecutive points without a value, before another prime is tried
+_DETERMINING = 4  # number of entries that determine their common denominator; more would only enlarge the matrices
 
 
 class Stop(Exception):
@@ -59,7 +59,7 @@ class Unlucky(Exception):
 
 @dataclass
 class Samples:
-    """The limits of the calls of the black box, the number of values `taken` so far, and the length of each vector."""
+    """The limits of the calls of the black box, the number `taken` of calls so far, and the length of each vector."""
 
     max_samples: int
     budget: Budget | None
@@ -75,7 +75,7 @@ class Samples:
 
 
 class SampledValues:
-    """The values modulo one prime so far, with cached values of monomials at their points."""
+    """The values of the black box modulo one prime so far, and cached values of monomials at their points."""
 
     def __init__(self, black_box: BlackBox, prime: int, samples: Samples) -> None:
         self.prime = prime
@@ -86,7 +86,7 @@ class SampledValues:
         self._powers: list[dict[Exponents, int]] = []
 
     def take(self, draw: Callable[[], Point]) -> None:
-        """Take one more value, at the first drawn point where the black box has one."""
+        """Compute one more value, at the first point drawn for which the black box has one."""
         for _ in range(_BAD_POINTS):
             self.samples.check(1)
             point = draw()
@@ -131,7 +131,7 @@ class SampledValues:
 
 @dataclass(frozen=True)
 class Shape:
-    """The monomials of a numerator and of a denominator; the monomial `lead` of the denominator has coefficient 1."""
+    """The monomials of a numerator and a denominator. The monomial `lead` of the denominator has coefficient 1."""
 
     numerator: tuple[Exponents, ...]
     denominator: tuple[Exponents, ...]
@@ -147,7 +147,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Quotient:
-    """A fraction of two polynomials modulo a prime: coefficients in the order of the shape's monomials."""
+    """A fraction of two polynomials modulo a prime, given by its coefficients in the order of the shape's monomials."""
 
     shape: Shape
     numerator: tuple[int, ...]
@@ -171,7 +171,7 @@ class Quotient:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """The result of `reconstruct`: the functions, or None and the reason.
+    """The result of `reconstruct`: the functions, or None and the reason for the failure.
 
     `samples` is the number of calls of the black box, including calls that give no value; `primes` are the primes used.
     """
@@ -197,12 +197,12 @@ def reconstruct(
     Args:
         black_box: `black_box(prime, point)` returns a list of values modulo the prime, of constant length, at a point
             with one integer for each name; None if there is no value, for example at a pole.
-        names: the symbols; without symbols the numbers themselves are reconstructed from their residues.
+        names: the symbols. Without symbols, the numbers themselves are reconstructed from their residues.
         seed: the random seed of primes (of 61 bits) and points.
-        max_degree: on any line the sum of the degrees of numerator and denominator is at most twice this number.
+        max_degree: the sum of the degrees of numerator and denominator on any line is at most twice this number.
         max_samples: the maximal number of calls.
         budget: the work limit, checked between calls; None means no limit.
-        draw: a function that draws a random prime, if only some primes are suitable.
+        draw: a function that draws a random prime, for black boxes that accept only some primes.
 
     Returns:
         A `Reconstruction`: functions in lowest terms, or None and a reason. A black box that is not rational, or is
@@ -266,7 +266,7 @@ def _modulo_first_prime(values: SampledValues, symbols: int, max_degree: int, rn
     for j in range(symbols):
         direction = tuple(int(i == j) for i in range(symbols))
         axes.append(_along_line(values, anchor, direction, max_degree, rng))
-    # Symbols of large degree first: a symbol multiplies the number of all monomials known before it.
+    # Symbols of large degree come first: each new symbol multiplies the number of monomials known before.
     order = sorted(range(symbols), key=lambda j: -max((_size(N) + _size(D) for N, D in axes[j]), default=0))
     denominators: list[list[str]] = [[] for _ in entries]
     for stage, j in enumerate(order):
@@ -291,7 +291,7 @@ def _modulo_first_prime(values: SampledValues, symbols: int, max_degree: int, rn
         if not dependent:
             continue
         shapes = {}
-        for i in dependent:  # the possible monomials after adding symbol j, with its exponents on the axis
+        for i in dependent:  # after symbol j is added, the possible monomials have its exponents on axis j
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -327,9 +327,9 @@ def _size(polynomial: nmod_poly) -> int:
 def _along_line(
     values: SampledValues, anchor: Point, direction: Point, max_degree: int, rng: random.Random
 ) -> list[tuple[nmod_poly, nmod_poly]]:
-    """Interpolate all entries as fractions (N, D) of polynomials in t at the points anchor + t direction; D is monic.
+    """Interpolate all entries on the line anchor + t direction as fractions (N, D) of polynomials in t, D monic.
 
-    On an axis t is 0 at the origin, so that exponents of t are exponents of the symbol.
+    On an axis, the line is parametrized by its symbol, so that exponents of t are exponents of the symbol.
     """
     p = values.prime
     varying = [i for i, d in enumerate(direction) if d]
@@ -343,8 +343,8 @@ def _along_line(
         nodes.append(t)
         return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
 
-    # Newton's form: a further point adds one term to each polynomial, so that points can be taken one by one until all
-    # fractions are determined. Their degrees are not known in advance.
+    # Newton's form: a further point adds one term to each polynomial. The degrees are not known in advance, so points
+    # are taken one by one until all fractions are determined.
     entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
     interpolants = [nmod_poly([v], p) for v in values.values[0]]
@@ -387,14 +387,14 @@ def _least_fraction(interpolant: nmod_poly, vanishing: nmod_poly, n: int) -> tup
 
 # -- the linear systems: quotients with given monomials from values modulo a prime ------------------------------------
 #
-# A value v = N(s)/D(s) at a point s is an equation N(s) - v D(s) = 0 for the coefficients of N and D. Enough equations
-# determine the solution up to a factor, provided that the monomials allow no common factor of N and D.
+# A value v = N(s)/D(s) at a point s is a linear equation N(s) - v D(s) = 0 for the coefficients of N and D. Enough
+# equations determine N and D up to a scalar, provided that the monomials allow no common factor of N and D.
 
 
 def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
-    """Split entries with one denominator into those that determine it and the others.
+    """Split entries with one denominator into those that suffice to determine it and the remaining entries.
 
-    Entries with proportional numerators would give the same equations, so only one of them is used.
+    Entries with proportional numerators would give the same equations, so only one of these is used.
     """
     if len(shapes[group[0]].denominator) == 1:
         return group[:1], group[1:]
@@ -411,7 +411,7 @@ def fit(
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
-    """Fit fractions of these shapes to all values but the last, which must agree; take further values as needed.
+    """Fit fractions of these shapes to all values but the last, which must agree; compute further values as needed.
 
     With `fixed` coordinates only points with these coordinates are used.
     """
@@ -444,15 +444,15 @@ def _solve(
     known_denominator: Quotient | None,
     fitted: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of members with one denominator, perhaps a known one, and enter them into `fitted`.
+    """Solve for the fractions of members with one denominator (known or not), and enter them into `fitted`.
 
-    Returns the number of further values that are needed, 0 on success. Raises Unlucky if there is no solution.
+    Returns the number of further values needed, 0 on success. Raises Unlucky if there is no solution.
     """
     p = values.prime
     values.samples.check()
     denominator = shapes[members[0]].denominator if known_denominator is None else known_denominator.shape.denominator
     widths = [len(shapes[i].numerator) for i in members]
-    # The last point is held out as a check; without symbols all points are the same.
+    # The last point is left out of the equations, as a check; without symbols all points are the same.
     last = usable[-1]
     rows: list[int] = []
     height = 0
@@ -519,7 +519,7 @@ def _lift(
     groups: dict[object, list[int]] = {}
     for i, quotient in enumerate(at_first_prime):
         groups.setdefault((quotient.shape.denominator, quotient.denominator), []).append(i)
-    # Numerators up to a factor: the first coefficient is made 1.
+    # Numerators are compared up to a factor: the first coefficient is made 1.
     monic = [str([c * pow(f.numerator[0], -1, modulus) % modulus for c in f.numerator]) for f in at_first_prime]
     pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
     misfits = 0
@@ -554,7 +554,7 @@ def _lift(
 def _functions_with_residues(
     shapes: list[Shape], residues: list[list[int]], modulus: int, names: tuple[str, ...]
 ) -> tuple[RationalFunction, ...] | None:
-    """Return the functions whose coefficients are simple fractions with these residues; None if there are none."""
+    """Return the functions whose coefficients are fractions of small height with these residues, or None."""
     context = ring(names)
     functions = []
     for shape, entries in zip(shapes, residues, strict=True):
@@ -572,7 +572,7 @@ def _functions_with_residues(
 def _find_counterexample(
     functions: tuple[RationalFunction, ...], at_new_prime: Callable[[], SampledValues], rng: random.Random
 ) -> SampledValues | None:
-    """Compare the functions with the black box modulo new primes; return the values modulo a prime that disagrees."""
+    """Compare the functions with the black box modulo new primes; return the values modulo the first that disagrees."""
     for _ in range(_CONFIRMATIONS):
         values = at_new_prime()
         values.take(values.random_points(len(functions[0].names) if functions else 0, rng))

@@ -1,8 +1,8 @@
-"""Linear algebra with the same functions over each field: solve, determinant, rank, null space.
+"""Linear algebra with the same functions over each field: solution, determinant, rank, null space.
 
-Matrices are FLINT's own (`Field.matrix` creates them), with their operators for products, sums and transposes. This
-module has the operations whose names in FLINT depend on the type of matrix, or that FLINT lacks, and `EntryMatrix` for
-the rings without FLINT matrices.
+Matrices are FLINT's own (created by `Field.matrix`), with their operators for products, sums and transposes. This
+module has the operations that FLINT lacks, or whose names in FLINT depend on the type of the matrix, and `EntryMatrix`
+for rings without FLINT matrices.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from kahanmaps.errors import PrecisionLost, SingularMatrix
 def solve(matrix: Any, right: Any) -> Any:
     """Solve `matrix` X = `right`.
 
-    Raises `SingularMatrix`, or `PrecisionLost` over balls if the ball of the determinant contains zero.
+    Raises `SingularMatrix`; over balls also `PrecisionLost`, if the ball of the determinant contains zero.
 
     >>> solve(fmpq_mat([[1, 2], [3, 4]]), fmpq_mat([[1], [1]]))
     [-1]
@@ -51,10 +51,10 @@ def rank(field: Field, matrix: Any) -> int:
 
 
 def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
-    """Return the basis of { v : `matrix` v = 0 } in reduced echelon form from the right.
+    """Return the basis of { v : `matrix` v = 0 } in echelon form, reduced from the last column to the first.
 
-    Each basis vector belongs to a column without pivot: it is 1 there and 0 at every other such column, so the basis
-    depends on the space only. It is empty for a matrix of full column rank.
+    Each basis vector belongs to a column without pivot: it is 1 there and 0 at every other column without pivot, so
+    the basis depends only on the space. It is empty for a matrix of full column rank.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> nullspace(QQ, fmpq_mat([[2, 4]]))
@@ -99,7 +99,7 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 
 
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
-    """Return the coprime integers proportional to a rational vector, the first nonzero one positive."""
+    """Return the coprime integers proportional to a rational vector; the first nonzero integer is positive."""
     integers, _ = over_common_denominator(vector)
     common = content(integers)
     if common == 0:
@@ -110,7 +110,7 @@ def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
 
 
 class EntryMatrix(ABC):
-    """A matrix stored as the list of its entries, row by row; subclasses define determinant and solution."""
+    """A matrix stored as the list of its entries, row by row. Subclasses define `det` and `solve`."""
 
     def __init__(self, field: Any, rows: int, columns: int, entries: Sequence[Any]) -> None:
         self.field = field
@@ -126,7 +126,7 @@ class EntryMatrix(ABC):
 
     @abstractmethod
     def solve(self, right: Self) -> Self:
-        """Solve self X = right, where `right` may have several columns. Raises ZeroDivisionError if singular."""
+        """Solve self X = right; `right` may have several columns. Raises ZeroDivisionError if self is singular."""
 
     def nrows(self) -> int:
         return self._rows
@@ -213,14 +213,14 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
             if not others:
                 continue
             best = others[0]
-            if hasattr(rows[best][column], "abs_lower"):  # for balls choose the one farthest from zero
+            if hasattr(rows[best][column], "abs_lower"):  # over balls take the pivot farthest from zero
                 best = max(others, key=lambda k: rows[k][column].abs_lower())
                 if rows[best][column].contains(0):
                     raise PrecisionLost("the rank cannot be decided with balls this wide: use more bits")
             rows[row], rows[best] = rows[best], rows[row]
             lead = rows[row][column]
             rows[row] = [entry / lead for entry in rows[row]]
-            rows[row][column] = field.one  # exactly; over balls lead / lead is only a ball around 1
+            rows[row][column] = field.one  # exactly 1; over balls lead / lead is only a ball around 1
             for i in range(len(rows)):
                 if i != row and not _is_zero(rows[i][column]):
                     factor = rows[i][column]
@@ -231,5 +231,5 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
 
 
 def _is_zero(entry: Any) -> bool:
-    """Whether an entry is certainly zero. Trap: for a ball that contains 0 both == 0 and != 0 are False."""
+    """Whether an entry is certainly zero. Trap: for a ball that contains 0, both == 0 and != 0 are False."""
     return bool(entry == 0)

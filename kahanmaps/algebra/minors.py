@@ -18,16 +18,16 @@ def kernel_minors(
 
     `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays); the result is exact
     if the ring is. `times` multiplies two elements. The minors of the first k rows are computed for k = 1, 2, ..., with
-    2^(n+1) n/2 products in all. An entry None is a zero whose products are skipped. `check_pairs` is called with all
-    pairs to be multiplied for a further row, and may raise. The k-th minor omits column k and has the sign (-1)^k; it
-    is None if all its products contain a None.
+    2^(n+1) n/2 products in all. An entry None is a zero; products with it are skipped. `check_pairs` is called with
+    all pairs to be multiplied for the next row, and may raise an exception. The k-th minor omits column k and has the
+    sign (-1)^k; it is None if all its products contain a None.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
     >>> kernel_minors([[1, 2, None], [4, 5, None]])
     [None, None, -3]
     """
-    # Expansion along rows and no elimination: it needs no division and no decision whether an entry is zero.
+    # Expansion along rows, not elimination: it needs no division and no decision whether an entry is zero.
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
     for row, layer in zip(rows[1:], _layers(width), strict=True):
@@ -55,9 +55,9 @@ def kernel_minors(
 
 @cache
 def _layers(width: int) -> list[list[tuple[int, list[tuple[int, int, bool]]]]]:
-    """Return, for k = 2, 3, ... rows, the sets of k columns as bit masks, each with the expansion of its minor.
+    """Return, for k = 2, 3, ..., all sets of k columns as bit masks, each with the expansion of its minor.
 
-    The expansion is by the last row: each product is (column, mask without this column, whether the sign is negative).
+    The expansion is along the last row: each product is (column, mask without it, whether the sign is negative).
     """
     layers = []
     for k in range(2, width):

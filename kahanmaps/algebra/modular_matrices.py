@@ -15,7 +15,7 @@ def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
     count_work(2 + 0.3 * len(rows) * len(rows[0]))
     if rows[0] and isinstance(rows[0][0], nmod):
         return nmod_mat(rows, prime)
-    return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat from Python integers
+    return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat(rows, prime)
 
 
 def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
@@ -48,7 +48,7 @@ def integers(A: nmod_mat) -> list[list[int]]:
 
 
 def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[list[int]]:
-    """Return the reduced echelon basis of the null space of the rows, modulo a prime."""
+    """Return the reduced echelon basis of the null space of the matrix with these rows, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
     form, rank = reduced(matrix([row[::-1] for row in rows], prime))
@@ -56,7 +56,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
 
 
 def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
-    """Return the pivot columns of a reduced echelon form, and the other columns.
+    """Return the pivot columns of a reduced echelon form, and its remaining columns.
 
     >>> split_columns(*nmod_mat([[0, 2, 4, 0], [0, 1, 2, 3]], 7).rref())
     ([1, 3], [0, 2])
@@ -71,7 +71,7 @@ def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
 
 
 def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
-    """Return a basis of the null space of a reduced echelon form: for each free column, 1 there and 0 at the others.
+    """Return a basis of the null space of a reduced echelon form: one vector for each free column, where it is 1.
 
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]
@@ -104,7 +104,7 @@ def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], 
 
 
 def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
-    """Return the pivot columns of an echelon form: where its rows have their first nonzero entries.
+    """Return the pivot columns of an echelon form: the positions of the first nonzero entry of each row.
 
     >>> pivots(echelon([[1, 2, 0], [2, 4, 1]], 7))
     [0, 2]

@@ -4,9 +4,9 @@
     point       1/2,-1/3,0
     expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
-Text is exact: a decimal means the rational number that it denotes. The reader computes values from the bottom up while
-it reads the text; it keeps no tree and runs nothing as code. (Python's `ast` fails for sums of some thousand terms, and
-for integers of 4300 digits.) FLINT ends the process when memory runs out and does not react to Ctrl-C, so the size of
+Text is exact: a decimal means the rational number that it denotes. The parser computes values while it reads the text;
+it builds no tree and executes nothing as code. (Python's `ast` fails for sums of several thousand terms, and for
+integers of 4300 digits.) FLINT ends the process when memory is exhausted and does not react to Ctrl-C, so the size of
 every result is compared with `ExpressionLimits` before FLINT is called.
 """
 
@@ -29,18 +29,18 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 class ExpressionLimits:
     """Bounds on the size of a text and of its value, large enough for ordinary use.
 
-    The limits apply to results and to all intermediate values. The number of digits is bounded before a computation.
+    The limits apply to results and to all intermediate values. The number of digits is bounded before each computation.
     """
 
-    number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
-    power_of_ten: int = 10_000  # the e in 1e-3, in size
-    characters: int = 200_000  # of an expression
-    depth: int = 100  # of brackets
+    number_digits: int = 1_000_000  # digits of one number read by parse_number or parse_point
+    power_of_ten: int = 10_000  # absolute value of the exponent in 1e-3
+    characters: int = 200_000  # length of an expression
+    depth: int = 100  # nested brackets
     degree: int = 64  # total degree of a numerator or denominator
-    exponent: int = 1_000  # in size
-    digits: int = 100_000  # of a coefficient written over the common denominator of its polynomial
-    terms: int = 20_000  # of a polynomial
-    words: int = 5_000_000  # of 64 bits, of all intermediate values; products of two terms count too
+    exponent: int = 1_000  # absolute value of an exponent
+    digits: int = 100_000  # digits of a coefficient over the common denominator of its polynomial
+    terms: int = 20_000  # terms of a polynomial
+    words: int = 5_000_000  # 64-bit words of all intermediate values; products of two terms count too
 
 
 LIMITS = ExpressionLimits()
@@ -48,7 +48,7 @@ NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
 
 BLANKS = " \t\r\n"
 _NUMBER = re.compile(r"([+-]?)(?:([0-9]+)/([0-9]+)|([0-9]+)?(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?)")
-# 10^-6, 1/10**6, 2^10/3^4: the parser of expressions bounds the exponents and the digits.
+# p/q with powers, as in 10^-6, 1/10**6, 2^10/3^4: the parser of expressions bounds the exponents and the digits.
 _POWER = re.compile(r"(?=[^*^]*[*^])[+-]?[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?(?:/[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?)?")
 _START_OF_NUMBER = re.compile(
     r"[+-]?(?:[0-9]+(?:/[0-9]*|\.?[0-9]*(?:[eE][+-]?[0-9]*)?)|\.(?:[0-9]+(?:[eE][+-]?[0-9]*)?)?)?"
@@ -58,7 +58,7 @@ _EXPECTED = "expected an integer, p/q or a decimal such as 0.1"
 
 
 def is_name(text: str) -> bool:
-    """Whether `text` is a valid variable name: ASCII letters, digits and _, no digit first (FLINT accepts only ASCII).
+    """Whether `text` is a valid variable name: ASCII letters, digits and _, not starting with a digit (as in FLINT).
 
     >>> is_name("x1"), is_name("1x"), is_name("ε")
     (True, False, False)
@@ -67,7 +67,7 @@ def is_name(text: str) -> bool:
 
 
 def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
-    """Raise `InputError` unless `names` are distinct valid variable names; `iterates` allows x~ as well.
+    """Raise `InputError` unless `names` are distinct valid variable names; with `iterates`, names like x~ are valid.
 
     >>> check_names(["x", "y", "x"])
     Traceback (most recent call last):
@@ -135,7 +135,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
 
 
 def require_text(text: object, expected: str, hint: str) -> None:
-    """Raise `InputError` unless `text` is a str; for a float `InexactNumber`."""
+    """Raise `InputError` unless `text` is a str. For a float the error is `InexactNumber`."""
     if not isinstance(text, str):
         raise wrong_kind(text, f"{expected} as text", hint)
 
@@ -148,9 +148,9 @@ def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
 
 
 def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
-    """Parse a rational number: an integer, p/q or a finite decimal, perhaps with blanks around it.
+    """Parse a rational number: an integer, p/q or a finite decimal. Blanks around it are ignored.
 
-    In p/q both may be powers, as in 1/10^6. Raises `ExpressionError` for anything else and beyond the limits.
+    In p/q both may be powers, as in 1/10^6. Raises `ExpressionError` for other text and for numbers beyond the limits.
 
     >>> parse_number("0.1"), parse_number(" -6/4 "), parse_number("1e-3"), parse_number("1/10^3")
     (1/10, -3/2, 1/1000, 1/1000)
@@ -165,9 +165,9 @@ def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
 
 
 def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLimits = LIMITS) -> tuple[fmpq, ...]:
-    """Parse a point: numbers separated by commas or blanks, perhaps in brackets; `dimension` is their number, if given.
+    """Parse a point: `dimension` numbers (any number if None), separated by commas or blanks, with or without brackets.
 
-    Raises `ExpressionError` with the number of the entry (counted from 1) and its column in the complete text.
+    Raises `ExpressionError` with the number of the invalid entry (counted from 1) and the column in the complete text.
 
     >>> parse_point("1/2, -1/3, 0"), parse_point("[1 2]")
     ((1/2, -1/3, 0), (1, 2))
@@ -194,7 +194,7 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
 
 
 def point_entries(text: str) -> list[tuple[int, int]]:
-    """Return begin and end of the entries of a point in its text; they are separated by commas, or else by blanks.
+    """Return begin and end of each entry of a point in its text; entries are separated by commas, or else by blanks.
 
     >>> point_entries("(1,2)"), point_entries("1 2"), point_entries("")
     ([(1, 2), (3, 4)], [(0, 1), (2, 3)], [])
@@ -226,7 +226,7 @@ def parse_polynomial(
     *,
     limits: ExpressionLimits = LIMITS,
 ) -> fmpq_mpoly:
-    """Parse a polynomial in `ring(variables)`; `constants` are the values of further names.
+    """Parse a polynomial in `ring(variables)`; `constants` maps further names to their values.
 
     Division by a nonconstant polynomial is an error, even if it would leave no remainder (`x^2/x`).
     Raises `ExpressionError` with the column of the mistake; `InputError` for invalid names or inexact constants.
@@ -253,7 +253,7 @@ def parse_rational_function(
 ) -> RationalFunction:
     """Parse a quotient of polynomials in `ring(variables)`; common factors are not canceled.
 
-    Raises as `parse_polynomial` does.
+    Raises like `parse_polynomial`.
 
     >>> from kahanmaps.algebra.printing import format_rational_function
     >>> format_rational_function(parse_rational_function("x/(y-1) + 1/(y-1)", ["x", "y"]))
@@ -264,7 +264,7 @@ def parse_rational_function(
     numerator, denominator = _parse(arithmetic)
     if denominator is None or not numerator.element:
         return RationalFunction(arithmetic.polynomial(numerator), arithmetic.ring.constant(1))
-    # Make the denominator integral first: otherwise its normal form would take one lcm for each coefficient.
+    # Make the denominator integral first: otherwise its normalization would compute one lcm for each coefficient.
     return RationalFunction(
         arithmetic.polynomial(numerator) * denominator.common_denominator,
         denominator.element * denominator.common_denominator,
@@ -274,7 +274,7 @@ def parse_rational_function(
 def parse_constant(
     text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: ExpressionLimits = LIMITS
 ) -> fmpq:
-    """Evaluate an expression in numbers and `constants`. Raises as `parse_polynomial` does.
+    """Evaluate an expression in numbers and `constants`. Raises like `parse_polynomial`.
 
     >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
     3/4
@@ -321,10 +321,10 @@ _OPERAND = "expected a number, a name or '('"
 class _Polynomial(NamedTuple):
     """A polynomial, or a number, of known size: the `element` (fmpq_mpoly or fmpq).
 
-    `common_denominator` times it has integer coefficients of absolute value at most 2**bits.
+    The product of `common_denominator` and the element has integer coefficients of absolute value at most 2**bits.
 
-    FLINT keeps one common denominator for all coefficients, so this is the size of FLINT's representation as well.
-    Numbers are fmpq, which is much faster than constant polynomials.
+    FLINT also stores one common denominator for all coefficients, so `bits` measures FLINT's representation as well.
+    Numbers are stored as fmpq, which is much faster than as constant polynomials.
     """
 
     element: Any
@@ -335,14 +335,14 @@ class _Polynomial(NamedTuple):
 
 
 class _Quotient(NamedTuple):
-    """A quotient; the denominator has degree at least 1 and leading coefficient 1, or is None for 1."""
+    """A quotient of polynomials. The denominator has degree at least 1 and leading coefficient 1; None means 1."""
 
     numerator: _Polynomial
     denominator: _Polynomial | None
 
 
 class Token(str):
-    """A token of the text and its start; `kind` is number, name, end, or (for a sign or bracket) the token."""
+    """A token of the text and its start; `kind` is "number", "name", "end", or (for a sign or bracket) the token."""
 
     kind: str
     start_pos: int
@@ -354,7 +354,7 @@ class Token(str):
 
 
 def _tokens(text: str) -> Iterator[Token]:
-    """Yield the tokens lazily, so that the first mistake in the text is the one that is reported."""
+    """Yield the tokens lazily, so that the first mistake in the text is reported."""
     column = 0
     while column < len(text):
         if text[column] in BLANKS:
@@ -374,7 +374,7 @@ def _tokens(text: str) -> Iterator[Token]:
 
 def _parse(arithmetic: _Arithmetic) -> _Quotient:
     """Compute the value of the text. Raises `ExpressionError`."""
-    # Check length and brackets first, since the recursion below is as deep as the brackets.
+    # Check length and brackets first: the recursion below is as deep as the nested brackets.
     text, limits = arithmetic.text, arithmetic.limits
     if len(text) > limits.characters:
         raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
@@ -401,10 +401,10 @@ def _parse(arithmetic: _Arithmetic) -> _Quotient:
 
 
 class _Reader:
-    """A reader for sums of products of powers, from left to right.
+    """A recursive reader of sums of products of powers, from left to right.
 
-    Signs bind less than powers, so that -x^2 is -(x^2), and powers associate to the right, so that 2^3^2 is 2^9. Only
-    brackets lead to recursion, and their depth is limited.
+    A sign binds more weakly than a power, so that -x^2 is -(x^2), and powers associate to the right, so that 2^3^2 is
+    2^9. Only brackets lead to recursion, and their depth is limited.
     """
 
     def __init__(self, arithmetic: _Arithmetic) -> None:
@@ -455,7 +455,7 @@ class _Reader:
             return value
         if token.kind not in ("number", "name"):
             raise _syntax_error(token, self.arithmetic)
-        if self.next.kind in ("number", "name", "("):  # before the name is looked up: sin(x) is a call
+        if self.next.kind in ("number", "name", "("):  # tested before the name is looked up, as sin(x) is a call
             raise _syntax_error(self.next, self.arithmetic)
         return self.arithmetic.number(token) if token.kind == "number" else self.arithmetic.name(token)
 
@@ -482,9 +482,9 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
 
 
 class _Arithmetic:
-    """The operations of one expression; each raises an error where it would exceed a limit.
+    """The operations in one expression; each raises an error before its result would exceed a limit.
 
-    `pieces` are operands, separated by the tokens of the operators.
+    The argument `pieces` alternates between operands and the tokens of the operators between them.
     """
 
     def __init__(
@@ -525,7 +525,7 @@ class _Arithmetic:
     def sum(self, pieces: list[Any]) -> _Quotient:
         column = pieces[1].start_pos
         polynomials: list[_Polynomial] = []
-        # Add terms with the same denominator first, before expanding: a/d + b/d = (a + b)/d.
+        # Add terms with the same denominator before other terms: a/d + b/d = (a + b)/d.
         fractions: list[tuple[_Polynomial, list[_Polynomial]]] = []
         for i in range(0, len(pieces), 2):
             value: _Quotient = pieces[i]
@@ -544,7 +544,7 @@ class _Arithmetic:
                 self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
         def sum_of(values: list[_Polynomial]) -> _Polynomial:
-            """Add in pairs: adding one by one would copy the growing sum once for each term."""
+            """Add in pairs: if the terms were added one by one, the growing sum would be copied for each term."""
             while len(values) > 1:
                 odd = values[-1:] if len(values) % 2 else []
                 pairs = zip(values[::2], values[1::2], strict=False)
@@ -611,7 +611,7 @@ class _Arithmetic:
         leading = numerator.element.leading_coefficient()
         if leading == 1:
             return _Quotient(denominator, numerator)
-        # Make the leading coefficient 1, so that denominators which differ by a constant become equal.
+        # Make the leading coefficient 1, so that denominators that differ by a constant factor become equal.
         self.spend(numerator.terms, numerator.bits, column)
         monic = numerator._replace(
             element=numerator.element / leading, common_denominator=abs((leading * numerator.common_denominator).p)
@@ -621,7 +621,7 @@ class _Arithmetic:
     def negative(self, value: _Quotient, column: int) -> _Quotient:
         return _Quotient(self.times_number(value.numerator, fmpq(-1), column), value.denominator)
 
-    # Arithmetic of numbers and polynomials: estimate the size, then raise an error or compute.
+    # Arithmetic of numbers and polynomials: estimate the size of the result, then raise an error or compute.
 
     def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         common_denominator = left.common_denominator
@@ -644,7 +644,7 @@ class _Arithmetic:
         pairs = left.terms * right.terms
         bits = left.bits + right.bits + (max(1, min(left.terms, right.terms)) - 1).bit_length()
         self.check_bits(max(bits, _bits(left.common_denominator) + _bits(right.common_denominator)), column)
-        bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
+        bits_of_pair = bits // 8  # FLINT takes about 50 ns for a pair of terms with coefficients of at most 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             found_text = f"found a product of polynomials with {left.terms} and {right.terms} terms"
             raise self.error_at(f"{found_text}, which is too large to expand", column)
@@ -664,7 +664,7 @@ class _Arithmetic:
         )
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
-        """Compute the n-th power by squaring, n > 0; each product is checked."""
+        """Compute the n-th power by squaring, for n > 0; the size of each product is checked."""
         self.check_degree(value.degree * n, "a power", column)
         if value.terms == 1:
             bits = value.bits * n
@@ -678,7 +678,7 @@ class _Arithmetic:
                 result = self.times(result, value, column)
         return result
 
-    # Limits, and the errors where they are exceeded.
+    # The limits, and the errors raised if a limit is exceeded.
 
     def measured(self, value: Any, common_denominator: fmpz, bits: int, column: int) -> _Polynomial:
         if isinstance(value, fmpq):
@@ -702,7 +702,7 @@ class _Arithmetic:
             raise self.error_at(f"found {operation} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend(self, terms: int, bits: int, column: int) -> None:
-        """Count the machine words of `terms` terms with coefficients of this number of bits."""
+        """Count the machine words of `terms` terms whose coefficients have this number of bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
             raise self.error_at("found an expression that takes too much work to expand: simplify or split it", column)
@@ -715,7 +715,7 @@ class _Arithmetic:
         if not names:
             return UnknownName(f"found the name {quoted(name)}, expected numbers only", self.text, column)
         suggestion = ""
-        if len(name) <= 40:  # the search for a look-alike is quadratic
+        if len(name) <= 40:  # the search for a similar name takes quadratic time
             folded = {other.lower(): other for other in names}
             from difflib import get_close_matches
 
@@ -728,7 +728,7 @@ class _Arithmetic:
 
 
 def _constant(value: _Quotient) -> fmpq | None:
-    """Return the number that a value equals, or None if it contains variables."""
+    """Return the number that equals a value, or None if the value contains variables."""
     numerator = value.numerator.element
     if not numerator:
         return fmpq(0)
@@ -738,5 +738,5 @@ def _constant(value: _Quotient) -> fmpq | None:
 
 
 def _bits(integer: fmpz) -> int:
-    """The least b >= 0 with |integer| <= 2**b: 0 for 1 and -1, so that a product by them does not grow."""
+    """The least b >= 0 with |integer| <= 2**b; it is 0 for 1 and -1, since a product with these does not grow."""
     return int((abs(integer) - 1).bit_length()) if integer else 0

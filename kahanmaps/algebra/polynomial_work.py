@@ -1,7 +1,7 @@
-"""Units of counted work (work.py) for polynomials: in one variable modulo primes below 2^64, and in several over Q.
+"""Units of work (see work.py) for polynomials: in one variable modulo primes below 2^64, and in several over Q.
 
-A length is a number of coefficients, a size a number of terms. The formulas were fitted to FLINT 3, from 2 to 100,000
-coefficients, within a factor of two: classical products and remainders for small lengths, fast ones for larger.
+A length is the number of coefficients, a size the number of terms. The formulas were fitted to FLINT 3 within a factor
+of two, for 2 to 100,000 coefficients: its classical products and remainders for small lengths, fast ones for larger.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from kahanmaps.algebra.work import count_work
 
 
 def product_units(length: int, other: int) -> float:
-    """Return the units of a product of two polynomials, or of two series with this number of terms."""
+    """Return the units of a product of two polynomials of these lengths, or of two series with as many terms."""
     short, long = (length, other) if length < other else (other, length)
     return 0.4 + long * (0.05 + min(short / 3000, 0.05 * short.bit_length()))
 
 
 def series_units(length: int) -> float:
-    """Return the units of the inverse of a series with this number of terms, or of a quotient of two."""
+    """Return the units of inverting a series with this number of terms, or of a quotient of two such series."""
     return 0.5 + 2 * product_units(length, length)
 
 
 def gcd_units(length: int, common: int = 0) -> float:
-    """Return the units of a gcd of two polynomials, where the gcd has the length `common`."""
+    """Return the units of a gcd of two polynomials of this length, if the gcd has the length `common`."""
     return 0.5 + length * (0.2 + min((length - common) / 500, 0.1 * sqrt(length)))
 
 
 def minpoly_units(length: int) -> float:
-    """Return the units of a search for the shortest linear recurrence of this number of terms."""
+    """Return the units of a search for the shortest linear recurrence of a sequence with this number of terms."""
     return 3 + length * (1.2 + min(length / 100, 0.2 * sqrt(length)))
 
 
 def roots_units(length: int, roots: int = 0) -> float:
-    """Return the units for the roots modulo a prime of 61 bits: powers of t modulo the polynomial and its factors."""
+    """Return the units for the roots modulo a 61-bit prime: powers of t modulo the polynomial and its factors."""
     return 150 * (product_units(length, length) + product_units(roots, roots) * roots.bit_length())
 
 
@@ -52,7 +52,7 @@ def counted_product(left: Any, right: Any) -> Any:
 def factored(polynomial: Any) -> list[tuple[Any, int]]:
     """Return the irreducible factors over Q of a polynomial in several variables, with multiplicities.
 
-    The work is counted by terms, whose number the caller has to bound.
+    The work is counted by the number of terms, which the caller must bound.
     """
     count_work(50 + 10 * len(polynomial))
     return [(factor, int(k)) for factor, k in polynomial.factor()[1]]

@@ -66,7 +66,7 @@ def degree(polynomial: fmpq_mpoly) -> int:
 
 
 def degree_in(polynomial: fmpq_mpoly, count: int) -> int:
-    """Return the total degree in the first `count` variables; 0 for the zero polynomial.
+    """Return the total degree in the first `count` variables, and 0 for the zero polynomial.
 
     >>> x, a = ring(["x", "a"]).gens()
     >>> degree_in(a**3*x**2 + a**7, 1)
@@ -102,7 +102,7 @@ def gradient(polynomial: fmpq_mpoly) -> tuple[fmpq_mpoly, ...]:
 
 
 def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
-    """Yield the exponent vectors of all monomials of one degree in `count` variables, x1 first.
+    """Yield the exponent vectors of all monomials of degree `of_degree` in `count` variables, starting with x1^degree.
 
     >>> list(monomials(2, 2))
     [(2, 0), (1, 1), (0, 2)]
@@ -125,7 +125,7 @@ def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
-    """Return the approximate number of decimal digits of the longest coefficient over a common denominator.
+    """Return the approximate number of decimal digits of the longest coefficient, over a common denominator.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> digits_of([x/3, 1000*y])
@@ -141,9 +141,9 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
 def over_one_denominator(
     functions: Sequence[RationalFunction], context: fmpq_mpoly_ctx, images: Sequence[fmpq_mpoly]
 ) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
-    """Return numerators over the least common denominator, and this denominator.
+    """Return the numerators of the functions over their least common denominator, and this denominator.
 
-    The variables are replaced by the `images`, in the ring `context`.
+    The variables are replaced by the polynomials `images`, elements of the ring `context`.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> over_one_denominator([RationalFunction(y, x), RationalFunction(x, x * y)], x.context(), [x, y])
@@ -164,7 +164,7 @@ def over_one_denominator(
 
 
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
-    """Return (c, P) with polynomial = c P, where P has coprime integer coefficients, the leading one positive.
+    """Return (c, P) with polynomial = c P, where P has coprime integer coefficients and a positive leading one.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> primitive_part(x/2 - 3*y/4)
@@ -180,10 +180,10 @@ def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
 
 
 def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
-    """Return the nonconstant irreducible factors over Q with their powers.
+    """Return the nonconstant irreducible factors over Q with their exponents.
 
-    A polynomial of more than 100,000 terms is returned unfactored: FLINT takes some ten microseconds for each term, and
-    cannot be interrupted.
+    A polynomial with more than 100,000 terms is returned unfactored: FLINT takes about ten microseconds for each term,
+    and cannot be interrupted.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> irreducible_factors(2 * x**2 * (x + y))
@@ -201,7 +201,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     Raises `BadPrime` if the field is GF(p) and p divides the denominator of a coefficient.
     """
     if all(isinstance(entry, fmpq) for entry in point):
-        # Compute in integers over a common denominator: one gcd for the result instead of one for each term.
+        # Compute with integers over a common denominator: one gcd for the result instead of one for each term.
         total_degree = degree(polynomial)
         if total_degree <= 0:
             return polynomial.leading_coefficient() if total_degree == 0 else fmpq(0)
@@ -240,7 +240,7 @@ def _power(table: list[Any], exponent: int) -> Any:
 
 
 def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> tuple[fmpq_mpoly, ...]:
-    """Return the entries of `matrix` times the column of `polynomials`."""
+    """Return the product of `matrix` and the column vector of `polynomials`."""
     zero: Any = polynomials[0].context().constant(0)
     combined = []
     for i in range(matrix.nrows()):
@@ -260,9 +260,9 @@ def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly
 
 
 def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
-    """Return the coefficients of the monomials in the first `count` variables.
+    """Return the coefficients of a polynomial with respect to monomials in the first `count` variables.
 
-    They are polynomials in the other variables, as elements of the same ring.
+    The coefficients are polynomials in the remaining variables, as elements of the same ring.
 
     >>> x, a, b = ring(["x", "a", "b"]).gens()
     >>> coefficients_in(a*x**2 + b*x - a*b*x + 3, 1)
@@ -277,10 +277,10 @@ def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RationalFunction(LatexDisplay):
-    """A quotient of two polynomials over Q; the denominator has coprime integer coefficients, the first positive.
+    """A quotient of two polynomials over Q; the denominator has coprime integer coefficients and a positive first one.
 
-    Common factors are not removed, since a gcd of large polynomials is expensive; two rational functions are equal if
-    the cross products are.
+    Common factors are not canceled, since a gcd of large polynomials is expensive. Two rational functions are equal if
+    their cross products are equal.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> RationalFunction(x, 2*y) == RationalFunction(x*y, 2*y**2)
@@ -316,7 +316,7 @@ class RationalFunction(LatexDisplay):
             return False
         return bool(self.numerator * other.denominator == other.numerator * self.denominator)
 
-    # Equal functions may have different common factors, so there is no fast hash that is consistent with ==.
+    # Equal functions may be stored with different common factors, so no fast hash is consistent with ==.
     __hash__ = None  # type: ignore[assignment]
 
     @property
@@ -335,16 +335,16 @@ class RationalFunction(LatexDisplay):
         return f"RationalFunction({shorten(str(self), 100)})"
 
     def __call__(self, *point: Any, **named: Any) -> Any:
-        """Return the value at a point: exact numbers, or rounded where a coordinate is a float; None at a pole.
+        """Return the value at a point: exact for exact numbers, rounded if a coordinate is a float, None at a pole.
 
-        The arguments are the values of `names` in this order, those of the variables also as one point, I(x, eps) or
-        I("1,2", eps), and all of them also by name: I(x, eps="1/10"), I(x, h="1/5"), I({"x": 1, "y": 2}, eps).
-        Several points, such as an orbit, give the array of the values, for an array of floats with NaN at poles.
+        The arguments are the values of `names`, in this order. The variables may be given as one point, I(x, eps) or
+        I("1,2", eps), and each name as a keyword: I(x, eps="1/10"), I(x, h="1/5"), I({"x": 1, "y": 2}, eps).
+        For several points, such as an orbit, the result is the array of values; for float points, NaN marks a pole.
         """
         return import_module("kahanmaps.maps.values").function_value(self, point, named)
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
-        """Return the value at `point` over `field`, or None where the denominator vanishes."""
+        """Return the value at `point` over `field`, or None if the denominator is zero there."""
         denominator = evaluate(self.denominator, field, point)
         if field.is_zero(denominator):
             return None
@@ -385,5 +385,5 @@ copyreg.pickle(fmpq_mpoly, lambda P: (_polynomial, (P.context().names(), P.conte
 copyreg.pickle(arb, _of_ball)
 copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
 copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
-# fmpz_mod has no method for its modulus p: the residue 0 x - 1 is p - 1.
+# fmpz_mod has no method that returns its modulus p: the residue 0 x - 1 is p - 1.
 copyreg.pickle(fmpz_mod, lambda x: (_residue, (int(x), int(0 * x - 1) + 1)))

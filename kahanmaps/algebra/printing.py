@@ -1,6 +1,6 @@
-"""Exact values as text: numbers, polynomials and rational functions, in any notation, and plain data for JSON and CSV.
+"""Exact values as text: numbers, polynomials and rational functions in several notations, and data for JSON and CSV.
 
-The text of a `format_...` function parses back to the same value, as long as it is within the limits of parsing.py.
+The text returned by a `format_...` function parses back to the same value within the limits of parsing.py.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of, primitive_part
 
-_MAX_FACTORED = 2000  # terms of a polynomial that is printed in factored form
+_MAX_FACTORED = 2000  # maximal number of terms of a polynomial that is factored for printing
 _ONE = fmpq(1)
 
 
@@ -43,7 +43,7 @@ def format_point(point: Sequence[fmpq]) -> str:
 
 
 def format_polynomial(polynomial: fmpq_mpoly) -> str:
-    """Return the polynomial as text, terms in the order of its ring: the inverse of `parse_polynomial`.
+    """Return the polynomial as text, its terms in the order of its ring: the inverse of `parse_polynomial`.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -100,14 +100,14 @@ def format_rational_function(function: RationalFunction) -> str:
     denominator = format_polynomial(function.denominator)
     if len(function.numerator) > 1:
         numerator = f"({numerator})"
-    # A name or its power needs no brackets; a/2*y would be read as a*y/2.
+    # Brackets are needed unless the denominator is a name or a power of one; a/2*y would be read as a*y/2.
     if any(sign in denominator for sign in "*+- "):
         denominator = f"({denominator})"
     return f"{numerator}/{denominator}"
 
 
 def format_factored(function: RationalFunction) -> str:
-    """Return the quotient as text, with numerator and denominator factored over Q where that is shorter.
+    """Return the quotient as text; numerator and denominator are factored over Q if that makes the text shorter.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -119,10 +119,10 @@ def format_factored(function: RationalFunction) -> str:
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
-    """Factor a function if that is shorter: return primitive polynomials with exponents, and a number; otherwise None.
+    """Factor a function: return primitive polynomials with exponents, and a number; None if the text is not shorter.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
-    Factors of both are cancelled.
+    Common factors of numerator and denominator are canceled.
     """
     factors, constant, is_shorter = list[tuple[fmpq_mpoly, int]](), fmpq(1), False
     for sign, polynomial in ((1, function.numerator), (-1, function.denominator)):
@@ -140,13 +140,13 @@ def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, 
             same = next((n for n, (other, _) in enumerate(factors) if other == g), None)
             if same is None:
                 factors.append((g, sign * k))
-            else:  # a common factor: rational functions are not reduced
+            else:  # a common factor, since rational functions are not reduced
                 factors[same] = g, factors[same][1] + sign * k
     return ([(g, k) for g, k in factors if k], constant) if is_shorter else None
 
 
 def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _ONE) -> str:
-    """Return a number times powers of polynomials as text, short ones first, negative exponents in the denominator.
+    """Return a number times powers of polynomials as text, short polynomials first, negative powers as denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -174,9 +174,9 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
 def numerator_and_denominator(
     factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq
 ) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
-    """Return numerator and denominator of a product.
+    """Return the numerator and the denominator of a product of powers.
 
-    Each is a positive integer and powers (polynomial, exponent), short polynomials first.
+    Each is a pair: a positive integer, and powers (polynomial, exponent) with short polynomials first.
     """
 
     def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
@@ -192,7 +192,7 @@ def numerator_and_denominator(
 
 
 def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
-    """Return the first terms that fit into about this number of characters, perhaps none; all of them if they fit.
+    """Return the first terms whose text has at most about this number of characters, perhaps none or all of them.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
@@ -214,9 +214,9 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
 class Notation:
     """The notation of a language for formulas: functions for names, positive numbers and powers, and separators.
 
-    `signs` are the minus of the first term, and plus and minus of later terms; `gap` separates terms, `times` factors.
-    `enclosed` puts brackets around a sum, `fraction` joins numerator and denominator, `row` groups a sum or a product.
-    Terms are in the order of the ring; with `eps_first`, eps is the first factor of a term.
+    `signs` are the minus of the first term, the plus and the minus of later terms. `gap` separates terms, `times`
+    factors. `enclosed` puts brackets around a sum, `fraction` joins numerator and denominator, `row` groups a sum or a
+    product. Terms are in the order of the ring; with `eps_first`, eps is the first factor of each term.
     """
 
     name: Callable[[str], str]
@@ -231,7 +231,7 @@ class Notation:
     eps_first: bool = True
 
     def terms(self, polynomial: fmpq_mpoly) -> list[str]:
-        """Return the terms with their signs.
+        """Return the terms of a polynomial as text, each with its sign.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> PLAIN.terms(parse_polynomial("3/2*x^2*z - y", ["x", "y", "z"]))
@@ -245,7 +245,7 @@ class Notation:
         for monomial, coefficient in terms_of(polynomial):
             powers = ((variables[k], monomial[k]) for k in order if monomial[k])
             factors = [name if exponent == 1 else self.power(name, exponent) for name, exponent in powers]
-            if not factors or abs(coefficient) != 1:  # a factor 1 is omitted
+            if not factors or abs(coefficient) != 1:  # the coefficients 1 and -1 are printed only without factors
                 factors.insert(0, self.number(abs(coefficient)))
             sign = (minus if terms else first) if coefficient < 0 else plus if terms else ""
             terms.append(sign + self.times.join(factors))
@@ -256,9 +256,9 @@ class Notation:
         return self.row(self.gap.join(self.terms(polynomial)))
 
     def rational(self, function: RationalFunction) -> str:
-        """Return the formula of a quotient, without nested fractions, factored where that is shorter.
+        """Return the formula of a quotient, without nested fractions, factored if that is shorter.
 
-        Numerator and denominator start with a positive term. Common factors stay, as in `RationalFunction`.
+        Numerator and denominator start with a positive term. Common factors are not canceled, as in `RationalFunction`.
         """
         factored = shorter_factors(function)
         if factored is None:
@@ -276,7 +276,7 @@ class Notation:
         return self.row(self.signs[0] + absolute) if is_negative else absolute
 
     def _product(self, number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
-        """Return the formula of a product: the number and the variables together, then sums in brackets."""
+        """Return the formula of a product: first the number and the variables, then the sums in brackets."""
         if number == 1 and [k for _, k in powers] == [1]:
             return self.polynomial(powers[0][0])
         variables = [g**k for g, k in powers if len(g) == 1]
@@ -294,9 +294,9 @@ PLAIN = Notation(str, str, "{}^{}".format)
 
 
 def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_mpoly]:
-    """Return the sign, numerator and denominator, both with integer coefficients and a positive first term.
+    """Return a quotient as its sign, numerator and denominator, both with integer coefficients and positive first term.
 
-    A polynomial keeps its own coefficients and signs, with the denominator 1.
+    A polynomial is returned with its own coefficients and signs, and with the denominator 1.
     """
     numerator, denominator = function.numerator, function.denominator
     if function.is_polynomial or numerator.is_zero():
@@ -307,18 +307,18 @@ def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq
 
 
 def terms_of(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
-    """Yield exponents and coefficients in the order of the ring, lazily, for callers that need only the first ones."""
+    """Yield pairs of exponents and coefficient in the order of the ring, lazily for callers that need only a few."""
     for k in range(len(polynomial)):
         yield tuple(int(exponent) for exponent in polynomial.monomial(k)), polynomial.coefficient(k)
 
 
 # Plain data.
 
-_MAX_EXACT = 2**53  # smaller integers are exact in every JSON reader
+_MAX_EXACT = 2**53  # integers up to this size are exact in every JSON reader
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to plain data: by its `to_json` if it has one; sequences to lists, large integers to text.
+    """Convert a value to plain data: by its `to_json` if it has one; a sequence to a list, a large integer to text.
 
     >>> from flint import fmpq
     >>> plain([fmpq(1, 2), 7, 2**61 - 1, fmpq_mat([[1, -3]]), {"eps": None}])
@@ -338,7 +338,7 @@ def plain(value: Any) -> Any:
 
 
 def json_float(value: Any) -> float | str:
-    """Return a JSON number, or the text inf, -inf or nan."""
+    """Return a float as a JSON number, or as the text inf, -inf or nan."""
     number = float(value)
     return number if isfinite(number) else repr(number)
 
@@ -355,20 +355,20 @@ def _deep(value: Any) -> Any:
 
 
 def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:
-    """Return attributes of a value as plain data, under their own names or under other keys: `key="attribute"`."""
+    """Return attributes of a value as plain data; `key="attribute"` stores an attribute under another key."""
     attribute_of = {**dict(zip(names, names, strict=True)), **others}
     return {key: plain(getattr(value, attribute)) for key, attribute in attribute_of.items()}
 
 
-# An integer, p/q or a decimal. The bound on the exponent prevents that 1e999999999 fills the memory of a reader.
+# An integer, p/q or a decimal. The bound on the exponent keeps 1e999999999 from filling the memory of a reader.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)")
-# Text that a spreadsheet would run as a formula. A leading apostrophe marks it as text. Text that already has
-# apostrophes before such a sign gets one more, so that removing one apostrophe restores the original.
+# Text that a spreadsheet would run as a formula. An apostrophe before it marks it as text. If text already has such
+# apostrophes, one more is added, so that removing one apostrophe always restores the original.
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 
 
 def spreadsheet_safe(text: str) -> str:
-    """Add an apostrophe to text that a spreadsheet would run as a formula; numbers stay unchanged.
+    """Add an apostrophe to text that a spreadsheet would run as a formula; numbers do not change.
 
     >>> [spreadsheet_safe(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
     ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
@@ -378,7 +378,7 @@ def spreadsheet_safe(text: str) -> str:
 
 def csv_line(cells: Iterable[str]) -> str:
     """Return a line of a CSV file."""
-    # Some versions of the csv module quote only line ends that occur in the terminator; "\r\n" contains both.
+    # Some versions of the csv module quote a line end only if it occurs in the terminator; "\r\n" contains both.
     line = StringIO(newline="")
     csv.writer(line, lineterminator="\r\n").writerow(cells)
     return line.getvalue().removesuffix("\r\n") + "\n"

@@ -1,6 +1,6 @@
-"""Primes of bad reduction of elliptic curves over Q, and of the curves of a member's planes over number fields.
+"""Primes of bad reduction of elliptic curves over Q, and of the curves in the planes of a member of the family.
 
-Numbers are factored within a bound; what remains unfactored is reported.
+The curves in the planes may be over number fields. Integers are factored within a bound; other cofactors are reported.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from flint import fmpq, fmpq_poly, fmpz
 from kahanmaps.algebra.elliptic_curves import EllipticCurve
 from kahanmaps.algebra.integers import without
 
-_SMOOTH_BITS = 32  # prime factors up to this size are found
-_MAX_FACTORED_BITS = 140  # a cofactor up to this size is factored completely, in about a second
+_SMOOTH_BITS = 32  # prime factors with at most this number of bits are found
+_MAX_FACTORED_BITS = 140  # a cofactor with at most this number of bits is factored completely, in about a second
 
 
 @dataclass(frozen=True)
 class BadPrimes:
-    """The primes of bad reduction of an elliptic curve over Q, or the primes of Q below those of a number field.
+    """The primes of bad reduction of an elliptic curve over Q; for a number field, the primes of Q below the bad ones.
 
-    `bad` are proved, at `undecided` the reduction is not known. `bad_cofactors` are composite numbers that were not
-    factored, of which all prime factors are bad, `undecided_cofactors` those of which some may be. At all other primes
-    the reduction is good (proved). `minimal_discriminant` is that of the curve over Q, None if it is not known.
+    At the primes `bad` the reduction is bad (proved), at `undecided` it is not known. `bad_cofactors` are unfactored
+    composite integers all of whose prime factors are bad; of `undecided_cofactors` some prime factors may be bad. At
+    all other primes the reduction is good (proved). `minimal_discriminant` is for a curve over Q, None if not known.
     """
 
     bad: tuple[int, ...]
@@ -46,7 +46,7 @@ class BadPrimes:
         return "; ".join(parts)
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; integers are text, as they may be long."""
+        """Return plain data; integers are given as text, since they may be long."""
         names = ("bad", "undecided", "bad_cofactors", "undecided_cofactors")
         minimal = self.minimal_discriminant
         lists = {name: [str(n) for n in getattr(self, name)] for name in names}
@@ -54,7 +54,7 @@ class BadPrimes:
 
 
 def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
-    """Return the prime factors of a nonzero integer that are found, and composite cofactors.
+    """Return the prime factors found for a nonzero integer, and the composite cofactors that remain.
 
     >>> factor_within_bound(fmpz(-12))
     ({2, 3}, set())
@@ -71,11 +71,11 @@ def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
 
 
 def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> BadPrimes:
-    """Return the primes of bad reduction of a curve over Q: those of its minimal discriminant.
+    """Return the primes of bad reduction of a curve over Q, i.e. the primes that divide its minimal discriminant.
 
     Args:
         curve: the curve.
-        divisors: nonzero integers that contain, with 2 and 3, all bad primes; None for the discriminant.
+        divisors: nonzero integers whose prime factors, with 2 and 3, include all bad primes; None: the discriminant.
 
     Source: laska-1982 for minimal models, with the conditions of kraus-1989 at 2 and 3.
 
@@ -106,10 +106,10 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
 
 
 def bad_primes_of_plane(gamma: Any) -> BadPrimes:
-    """Return the primes of Q below those of bad reduction of the Jacobian of a level (level_curves.py).
+    """Return the primes of Q below the bad primes of the Jacobian of a level curve (level_curves.py).
 
-    With delta = 1 - gamma the reduction at a prime not above 2 or 3 is bad if and only if the valuation of gamma is not
-    0, or that of delta is not a multiple of 6: docs/mathematics.md, "Geometry of the level sets".
+    Let delta = 1 - gamma. At a prime not above 2 or 3 the reduction is bad if and only if the valuation of gamma is not
+    0, or the valuation of delta is not a multiple of 6: docs/mathematics.md, "Geometry of the level sets".
 
     Args:
         gamma: an element of Q, or of Q[t]/g with g integral and irreducible; not 0 and not 1.
@@ -119,7 +119,7 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
     K, denominator = gamma.field, leading_coefficient(gamma)
-    # Primes of the denominator of j are bad; in a number field they are those of this integer.
+    # Primes in the denominator of j are bad. For a number field these are the primes that divide this integer.
     poles = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()
@@ -130,7 +130,7 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         elif p < 5:
             undecided.append(p)
         else:
-            # The slopes are the valuations divided by ramification indices, which are 1 if p does not divide disc(g).
+            # The slopes are valuations divided by ramification indices, which are 1 if p does not divide disc(g).
             indices = range(1, K.degree + 1) if ramified % p == 0 else (1,)
             slopes = [[s * e for e in indices if (s * e).q == 1] for s in newton_slopes(polynomial, p)]
             if any(all(n.p % 6 != 0 for n in possible) for possible in slopes):
@@ -142,9 +142,9 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
 
 
 def leading_coefficient(element: Any) -> fmpz:
-    """Return the leading coefficient of the primitive polynomial over Z whose roots are the values of an element.
+    """Return the leading coefficient of the primitive polynomial over Z whose roots are the conjugates of an element.
 
-    It is the norm of the denominator of the element.
+    This coefficient is the norm of the denominator of the element.
     """
     return fmpq_poly(element.matrix.charpoly()).denom()
 

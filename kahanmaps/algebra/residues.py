@@ -1,7 +1,7 @@
-"""Rational numbers from their residues: Wang's reconstruction, many numbers over one denominator, Chinese remainders.
+"""Rational numbers from their residues: Wang's reconstruction, several numbers with one denominator, and the CRT.
 
-A residue fits infinitely many fractions, and these functions return the simplest one. The caller has to check the
-answer, for instance modulo another prime.
+Infinitely many fractions have a given residue; these functions return the simplest one. The caller must check the
+result, for instance modulo another prime.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 
 from flint import fmpq, fmpz, fmpz_mat
 
-_MAX_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8), where Wang's bound is m^(1/2)
-_SPARE_BITS = 4  # bits by which a common denominator must be shorter than for random residues
+_MAX_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8) for the modulus m; Wang's bound is m^(1/2)
+_SPARE_BITS = 4  # a common denominator must be shorter by this number of bits than for random residues
 
 
 def random_prime(rng: random.Random, bits: int = 61) -> int:
-    """Draw a random prime with this number of bits, at least 2; it depends on the state of `rng` only.
+    """Draw a random prime with this number of bits (at least 2); the prime depends only on the state of `rng`.
 
-    With 61 bits FLINT computes gcds of polynomials and echelon forms in two thirds of the time for 63 bits.
+    For 61 bits FLINT computes gcds of polynomials and echelon forms in two thirds of the time that 63 bits take.
 
     >>> random_prime(random.Random(1)).bit_length()
     61
@@ -32,7 +32,7 @@ def random_prime(rng: random.Random, bits: int = 61) -> int:
 def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
     """Return the fraction n/d = residue modulo `modulus` with |n| and d at most sqrt((modulus - 1)/2), or None.
 
-    There is at most one. Exact; `modulus` is at least 2 and need not be prime.
+    At most one such fraction exists. The result is exact; `modulus` is at least 2 and need not be prime.
 
     >>> rational_reconstruction(pow(3, -1, 101) * 2, 101)
     2/3
@@ -54,11 +54,11 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
 
 
 def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
-    """Return the fraction n/d with this residue and the least |n| d, if this is less than modulus / 2^spare_bits.
+    """Return the fraction n/d with this residue and the least |n| d; None unless |n| d < modulus / 2^spare_bits.
 
-    A random residue has such a fraction with a probability of about 2^-spare_bits times the bits of the modulus. Trap:
-    the modulus must be random too; with one near a power of 10 a simple fraction may have the residue of a simpler one.
-    The numerator may be much longer than the denominator or the reverse. Exact.
+    A random residue has such a fraction with probability about 2^-spare_bits times the number of bits of the modulus.
+    Trap: the modulus must be random too; modulo a number near a power of 10, a simple fraction may have the residue of
+    a simpler one. The numerator may be much longer than the denominator, or much shorter. The result is exact.
 
     >>> m = (2**61 - 1) * (2**63 - 25)
     >>> simple_fraction(10**20 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
@@ -78,10 +78,10 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
 
 
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
-    """Return the simplest fractions with these residues, taken together; None if no fractions are simple enough.
+    """Return the simplest fractions with these residues, computed together; None if they are not simple enough.
 
-    Numbers with a common denominator may be longer than single ones: k of them may have heights up to about
-    modulus^(k/(k+1)); they are found as a short vector of a lattice (LLL). The answer is a guess to be checked.
+    Fractions with a common denominator may be longer than single ones: k of them may have heights up to about
+    modulus^(k/(k+1)). They are found as a short vector of a lattice (LLL). The result is a guess that must be checked.
 
     >>> m = 2**61 - 1
     >>> numbers = [fmpq(n, 10**10 + 19) for n in (10**10, -3141592653)]
@@ -94,7 +94,7 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     chosen = [residues[i] for i in nontrivial[::step]]
     denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
     if k > 1:
-        # The q > 0 with the smallest q and q r modulo `modulus`, if they are smaller than for random residues.
+        # The least q > 0 with small q r modulo `modulus`, provided that both are smaller than for random residues.
         rows = [[1, *chosen], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
@@ -108,7 +108,7 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
             fraction = rational_reconstruction(n, modulus)
             if fraction is None:
                 return None
-            denominator *= int(fraction.q)  # probably a factor of the other denominators too
+            denominator *= int(fraction.q)  # probably a factor of the remaining denominators as well
             fractions.append(fraction / (denominator // int(fraction.q)))
         else:
             fractions.append(fmpq(n, denominator))
@@ -130,9 +130,9 @@ def from_residues(
 ) -> list[tuple[fmpq, ...]] | None:
     """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with a further prime.
 
-    The residues come in groups of numbers that probably have a common denominator. Returns None if `modulo` returns
-    None, or `max_primes` are not enough. Every call uses the same primes: since the answer is checked, a bad prime
-    costs only time.
+    The residues come in groups of numbers that probably share a denominator. Returns None if `modulo` returns None, or
+    if `max_primes` primes do not suffice. Every call uses the same primes: since the result is checked, an unsuitable
+    prime costs only time.
 
     >>> numbers = (fmpq(355, 113), fmpq(-7, 3**40))
     >>> from_residues(lambda p: [[int(x.p % p) * pow(int(x.q), -1, p) % p] for x in numbers], 5)
@@ -154,7 +154,7 @@ def from_residues(
         residues = [chinese(old, modulus, group, prime) for old, group in zip(residues or new, new, strict=True)]
         modulus *= prime
         guesses = []
-        if count >= next_guess:  # not after each prime, since a guess takes longer than the values modulo a prime
+        if count >= next_guess:  # not after each prime, since a guess takes longer than evaluating modulo a prime
             for group in residues:
                 guess = rational_vector(group, modulus)
                 if guess is None:

@@ -1,7 +1,7 @@
 """Algebraic numbers as values of parameters: `root of t^2 - 2`, `root of t^2 - 2 near 1.4`.
 
-Identities over Q cannot distinguish conjugate roots: exact results hold in Q[t]/g for the class of t, and so for every
-root of g. Modulo a prime any root represents it; real numbers need the embedding that `near` selects.
+Identities over Q cannot distinguish conjugate roots: exact results hold in Q[t]/g for the class of t, hence for every
+root of g. Modulo a prime, any root of g represents t; real values use the real root that `near` selects.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _GUARD_BITS = 64
 
 
 class Root:
-    """A root of the monic irreducible `polynomial`; if `near` is given, the real root closest to it.
+    """A root of the monic irreducible `polynomial`; if `near` is given, the real root closest to `near`.
 
     >>> root = parse_root("root of 2*t^2 - 4 near 1.4")
     >>> root, root.number_field, root == parse_root("root of t^2 - 2 near 3/2")
@@ -53,8 +53,8 @@ class Root:
         self.near = near
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
-            with suppress(InputError):  # the error is raised where the real number is needed
-                # Use the same text for all `near` with the same root: the shortest decimal of 4, 8, ... digits.
+            with suppress(InputError):  # the error is raised later, when the real number is needed
+                # Use the same text for all `near` with the same root: its shortest decimal of 4, 8, ... digits.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -74,7 +74,7 @@ class Root:
         return EtaleAlgebra(self.polynomial)
 
     def over(self, field: Field) -> Any:
-        """Return the root as an element of the field.
+        """Return the root as an element of a field: GF(p), or a field that contains this root.
 
         Raises BadPrime if GF(p) contains no root, InputError for other fields.
         """
@@ -85,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # A bound for all conjugates: the root is b/q with an algebraic integer b within Cauchy's bound.
+            # A bound for all conjugates: the root is b/q for an algebraic integer b, bounded by Cauchy's bound.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
@@ -94,18 +94,18 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Reduce a polynomial modulo the minimal polynomial of its k-th variable: 0 if it vanishes at the root."""
+        """Reduce a polynomial modulo the minimal polynomial of its k-th variable: to 0 if it vanishes at the root."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
     def real_approximation(self, bits: int = 256) -> fmpq:
-        """Return a rational approximation of the real root to this number of bits."""
+        """Return a rational approximation of the real root with this number of bits."""
         middle = self._real(bits).mid()
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
     def residues(self, field: PrimeField) -> list[int]:
-        """Return all distinct roots modulo the prime. Raises BadPrime if there are none."""
+        """Return all distinct roots of g in GF(p) as integers. Raises BadPrime if there are none."""
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
@@ -117,7 +117,7 @@ class Root:
 
     @property
     def decimal(self) -> str:
-        """The real root as text, `, about 1.41421356237310`; empty if there is none or it is ambiguous."""
+        """The real root as text, `, about 1.41421356237310`; empty if no real root is determined."""
         try:
             return f", about {self._real(64).str(15, radius=False)}"
         except InputError:
@@ -126,13 +126,13 @@ class Root:
     def _real(self, bits: int, near: fmpq | None = None) -> arb:
         near = self.near if near is None else near
         with flint.ctx.workprec(bits + _GUARD_BITS):
-            roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs have a weaker type
+            roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs declare a less precise type
             real_roots: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not real_roots:
                 raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
             middle = arb(0 if near is None else near)
             first, *others = sorted(real_roots, key=lambda root: float(abs(root - middle)))
-            if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # a comparison of balls
+            if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # the two may overlap
                 texts = ", ".join(root.str(6, radius=False) for root in real_roots)
                 example = real_roots[-1].str(4, radius=False)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {example}")
@@ -161,7 +161,7 @@ class AlgebraicPoint(NamedTuple):
     entries: tuple[fmpq_mpoly, ...]
 
     def over(self, field: Field) -> tuple[Any, ...]:
-        """Return the point over a field that contains the root. Raises BadPrime, InputError as `Root.over` does."""
+        """Return the point over a field that contains the root. Raises BadPrime and InputError like `Root.over`."""
         root = self.root.over(field)
         return tuple(evaluate(entry, field, (root,)) for entry in self.entries)
 
@@ -182,10 +182,10 @@ def parse_algebraic_point(
         constants: rational numbers by name.
 
     Returns:
-        The exact point; a rational point if no algebraic number occurs.
+        The exact point; it is a tuple of rational numbers if no algebraic number occurs.
 
     Raises:
-        InputError: for invalid text, with the number of the entry, and for two different algebraic numbers.
+        InputError: for invalid text, with the number of the coordinate, and if two different algebraic numbers occur.
     """
     entries = []
     for number, (start, end) in enumerate(point_entries(text), 1):

@@ -1,14 +1,14 @@
 """All rational solutions of a small system of polynomial equations over Q, exactly, by factoring and branching.
 
-The solver branches on the factors of an equation and substitutes linear equations; if nothing factors, it computes a
-Groebner basis of bounded size. For a finite set of solutions it then uses the matrix of multiplication by a linear form
-in the quotient ring: its rational eigenvalues are the values of the form at the rational solutions. The result also
-contains linear families with free variables, equations that could not be solved, and descriptions of the solutions that
-are not rational. No step discards a rational solution.
+The solver branches on the factors of an equation and substitutes linear equations. If no equation factors, it computes
+a Groebner basis of bounded size. If the solutions are finite in number, it then uses the matrix of multiplication by a
+linear form in the quotient ring, whose rational eigenvalues are the values of the form at the rational solutions. The
+result also contains linear families with free variables, equations that could not be solved, and descriptions of the
+solutions that are not rational. No step discards a rational solution.
 
 FLINT cannot be interrupted, so single operations are bounded in size: Groebner bases are computed one S-polynomial
-after the other, and polynomials in several variables are factored only up to a number of terms. Everything counts as
-work, in units fitted to measurements.
+after the other, and polynomials in several variables are factored only up to a bounded number of terms. All operations
+count as work, in units fitted to measurements.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
 from kahanmaps.algebra.work import SPENT, Budget, count_work
 
-MAX_BASIS = 120  # polynomials of a Groebner basis
-MAX_TERMS = 400  # of one of them
-MAX_BITS = 4_000  # of a coefficient
+MAX_BASIS = 120  # polynomials in a Groebner basis
+MAX_TERMS = 400  # terms of one of these polynomials
+MAX_BITS = 4_000  # bits of one of their coefficients
 MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored (about 20 ms)
 MAX_PARTS = 400  # points, families and unsolved parts together
 MAX_QUOTIENT = 130  # dimension of the quotient ring: the number of complex solutions with multiplicity
@@ -38,9 +38,9 @@ MAX_QUOTIENT = 130  # dimension of the quotient ring: the number of complex solu
 
 @dataclass(frozen=True)
 class SolutionComponent:
-    """A set of solutions: `values` are the variables as polynomials of degree at most 1 in the free variables.
+    """A set of solutions: `values` gives each variable as a polynomial of degree at most 1 in the free variables.
 
-    `equations` are conditions on the free variables; without any it is a linear family, or a point.
+    `equations` are conditions on the free variables; without equations the set is a linear family or a point.
     """
 
     values: tuple[fmpq_mpoly, ...]
@@ -57,7 +57,7 @@ class SolutionComponent:
 
     @property
     def point(self) -> tuple[fmpq, ...]:
-        """The solution with all free variables equal to 0."""
+        """The solution in which all free variables are 0."""
         zero = (0,) * self.values[0].context().nvars()
         return tuple(value[zero] if not value.is_zero() else fmpq(0) for value in self.values)
 
@@ -66,7 +66,7 @@ class SolutionComponent:
         return [v.derivative(i).leading_coefficient() if v.degrees()[i] else fmpq(0) for v in self.values]
 
     def contains(self, other: SolutionComponent) -> bool:
-        """Whether the linear family `other`, or the point, lies in this linear family."""
+        """Whether this linear family contains `other`, a linear family or a point."""
         size = len(self.values)
         directions = [self.direction(i) for i in self.free]
         space = fmpq_mat(size, len(directions), [direction[k] for k in range(size) for direction in directions])
@@ -80,15 +80,15 @@ class SolutionComponent:
 class Solutions:
     """The result of `solve_system`: linear families and points, unsolved parts, and parts without rational points.
 
-    `conjugate` are the parts without a rational point, in the order of their descriptions `irrational`.
+    `conjugate` lists the parts without a rational point; `irrational` describes them, in the same order.
     """
 
     components: list[SolutionComponent] = field(default_factory=list)
     unsolved: list[SolutionComponent] = field(default_factory=list)
     conjugate: list[SolutionComponent] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
-    without_basis: list[SolutionComponent] = field(default_factory=list)  # unsolved: the Groebner basis was too large
-    reason: str = ""  # why something is unsolved
+    without_basis: list[SolutionComponent] = field(default_factory=list)  # unsolved as the Groebner basis was too large
+    reason: str = ""  # why some part is unsolved
 
     @property
     def complete(self) -> bool:
@@ -99,7 +99,7 @@ class Solutions:
 def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly], budget: Budget) -> Solutions:
     """Solve `equations` = 0 over Q, for polynomials in the ring whose generators are `variables`.
 
-    Exact. Parts that are not solved when the `budget` is spent are returned as unsolved.
+    Exact. Parts that are not yet solved when the `budget` is spent are returned as unsolved.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -129,7 +129,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     if not nonzero:
         return []
     context = nonzero[0].context()
-    # A polynomial with all the monomials has them in the order of the ring.
+    # A sum of all the monomials lists them in the order of the ring.
     order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
     places = {tuple(m): k for k, m in enumerate(order)}
     count_work(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 30)
@@ -146,7 +146,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
 
 
 def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """Return the remainder on division by all of `basis`: the normal form, if it is a Groebner basis.
+    """Return the remainder on division by all polynomials of `basis`: the normal form, for a Groebner basis.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -175,17 +175,17 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
     """Find coordinates in which cubic forms may decouple: a matrix whose columns are the new basis, or None.
 
-    If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all
+    If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all its
     elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic
-    polynomial of the quotient of two Hessians. Correctness does not depend on the answer, since the caller may use any
-    invertible matrix; the one returned is checked with a third Hessian.
+    polynomial of the quotient of two Hessians. The caller may use any invertible matrix, so a wrong answer cannot make
+    its result false; the matrix returned is checked with a third Hessian.
     """
     if not forms or count < 2:
         return None
     rng = random.Random("decoupling")
 
     def hessian() -> fmpq_mat:
-        """Return the Hessian of a random combination at a random point."""
+        """Return the Hessian of a random combination of the forms at a random point."""
         total = forms[0].context().constant(0)
         for p in forms:
             total = total + p * fmpq(rng.randint(1, 99))
@@ -207,7 +207,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
             power = power * ratio
         blocks.append(nullspace(QQ, annihilator))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
-    # Return nothing unless the coordinates decouple: they would only make the numbers longer.
+    # Return None unless the forms decouple: other coordinates would only make the coefficients longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
     check = T.transpose() * hessian() * T
     is_decoupled = all(check[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
@@ -221,7 +221,7 @@ class _Solver:
         self.stopped = ""
 
     def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], is_basis: bool = False) -> None:
-        """Add the solutions of `equations` to the result; `is_basis` says that they are already a Groebner basis."""
+        """Add the solutions of `equations` to the result; `is_basis` says that these form a Groebner basis."""
         if self.stopped:  # the reason is already in the result
             return
         count_work(50)
@@ -252,15 +252,15 @@ class _Solver:
                 ]
                 self.solve(list(substituted[0]), substituted[1])
                 return
-        # The reduced basis may hide factors of the original equations, as for x f, y g, z h: try both.
+        # The reduced basis may hide factors of the original equations, as for x f, y g, z h: factor both.
         best = _easiest_product(equations) or _easiest_product(original)
         if best is not None:
             for factor in sorted(best, key=lambda q: (degree(q), str(q))):
-                # Use remainders, since the solver would otherwise branch on the same product again.
+                # Use remainders: otherwise the solver would branch on the same product again.
                 self.solve([factor, *(divmod(p, factor)[1] for p in original)], values)
             return
         for p in equations:
-            if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable and not linear: no rational root
+            if sum(e > 0 for e in p.degrees()) == 1:  # in one variable, irreducible and not linear: no rational root
                 self._no_rational_point(str(primitive_part(p)[1]), equations, values)
                 return
         if is_basis:
@@ -287,7 +287,7 @@ class _Solver:
         gens = basis[0].context().gens()
         form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free)), basis[0].context().constant(0))
         context, places = form.context(), {m: k for k, m in enumerate(quotient)}
-        matrix = fmpq_mat(len(quotient), len(quotient))  # of the multiplication by the form in the quotient ring
+        matrix = fmpq_mat(len(quotient), len(quotient))  # multiplication by the form in the quotient ring
         for k, m in enumerate(quotient):
             if self.budget.is_spent:
                 self._give_up(basis, values, SPENT)
@@ -300,7 +300,7 @@ class _Solver:
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
-                # Evaluate the factor at the form in the quotient ring: expanded it may have millions of terms.
+                # Evaluate the factor at the form within the quotient ring: expanded, it may have millions of terms.
                 vector = fmpq_mat(len(quotient), 1)
                 for coefficient in reversed(factor.coeffs()):
                     vector = matrix * vector
@@ -322,8 +322,8 @@ class _Solver:
 
 
 def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """Return the factors of the equation whose factorization is best to branch on; None if no equation factors."""
-    # Factors of high degree lead to long branches: the least of the largest degrees decides, not the number of factors.
+    """Return the factors of the equation that is best to branch on; None if no equation factors."""
+    # Factors of high degree lead to long branches, so the equation whose largest factor has the least degree is taken.
     products = []
     for p in equations:
         variable_count = sum(e > 0 for e in p.degrees())
@@ -340,7 +340,7 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
 
 
 def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly] | None:
-    """Compute the reduced Groebner basis (degree reverse lexicographic); None if it exceeds the limits or the budget.
+    """Compute the reduced Groebner basis (degree reverse lexicographic); None if a limit or the budget is exceeded.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -349,14 +349,14 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     """
     context = equations[0].context()
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
-    basis: list[Any] = []  # fmpz_mpoly, of which type checkers do not know spoly
+    basis: list[Any] = []  # elements are fmpz_mpoly; type checkers do not know their method spoly
     leads: list[tuple[int, ...]] = []
-    packed: list[int] = []  # leading exponents, 16 bits each: a divides b if b + guard - a keeps all guard bits
+    packed: list[int] = []  # leading exponents, 16 bits each: a divides b if b + guard - a has all guard bits set
     guard = sum(1 << 16 * i + 15 for i in range(integers.nvars()))
-    # A heap of pairs of polynomials, by the least common multiple of their leading monomials.
+    # A heap of pairs of polynomials, ordered by the least common multiple of their leading monomials.
     pairs: list[tuple[int, list[int], int, int]] = []
-    waiting: set[tuple[int, int]] = set()  # the same pairs, for lookups
-    bits = 1  # of the longest coefficient
+    waiting: set[tuple[int, int]] = set()  # the pairs in the heap, for lookups
+    bits = 1  # length of the longest coefficient
 
     def pack(monomial: Iterable[int]) -> int:
         return sum(e << 16 * i for i, e in enumerate(monomial))
@@ -370,7 +370,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         lead = tuple(map(int, p.monoms()[0]))
         for i, other in enumerate(leads):
             lcm = list(map(max, lead, other))
-            if sum(lcm) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
+            if sum(lcm) < sum(lead) + sum(other):  # otherwise the S-polynomial reduces to 0 (Buchberger's criterion)
                 heappush(pairs, (sum(lcm), [-e for e in reversed(lcm)], i, len(basis)))
                 waiting.add((i, len(basis)))
         basis.append(p)
@@ -391,8 +391,8 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         lcm_degree, _, i, j = heappop(pairs)
         waiting.remove((i, j))
         count_work(4 + len(basis) / 10)
-        # Buchberger's chain criterion: a third leading monomial divides the least common multiple of these two, and
-        # both pairs with the third polynomial are done.
+        # Buchberger's chain criterion: skip the pair if a third leading monomial divides the least common multiple of
+        # its leading monomials, and both pairs with the third polynomial are done.
         guarded_lcm = pack(map(max, leads[i], leads[j])) + guard
         if any(
             (guarded_lcm - lead) & guard == guard
@@ -414,7 +414,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
 
 
 def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
-    """Return the monomials that no leading monomial divides; None if there are infinitely many."""
+    """Return the monomials that no leading monomial of the basis divides; None if there are infinitely many."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     for i in free:
         if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leading):
@@ -432,7 +432,7 @@ def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list
 
 
 def without_contained(components: Sequence[SolutionComponent]) -> list[SolutionComponent]:
-    """Remove components that are equal to, or contained in, another one."""
+    """Remove components that are equal to another component or contained in one."""
     ordered = sorted(components, key=lambda c: -len(c.free))
     maximal: list[SolutionComponent] = []
     for component in ordered:

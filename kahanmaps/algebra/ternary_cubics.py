@@ -1,4 +1,4 @@
-"""Aronhold's invariants S and T of a ternary cubic, which determine the j-invariant of the plane curve."""
+"""Aronhold's invariants S and T of a ternary cubic form, which determine the j-invariant of the plane curve."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Cubic = dict[tuple[int, int, int], Any]
 
 
 def aronhold_invariants(K: Field, cubic: Cubic) -> tuple[Any, Any]:
-    """Return S and T of F = sum of a_ijk X_i X_j X_k, of degrees 4 and 6 in the coefficients.
+    """Return the invariants S and T of F = sum of a_ijk X_i X_j X_k, of degrees 4 and 6 in the coefficients.
 
     The curve F = 0 is singular if and only if T^2 + 64 S^3 = 0, and j = 110592 S^3/(T^2 + 64 S^3).
 
     Args:
         K: the field of the coefficients.
-        cubic: a_ijk for 0 <= i <= j <= k <= 2, each one coefficient of the symmetric tensor.
+        cubic: a_ijk for 0 <= i <= j <= k <= 2, the entries of the symmetric tensor.
 
-    Source: salmon-1879; with S = m - m^4 and T = 1 - 20 m^3 - 8 m^6 for X^3 + Y^3 + Z^3 + 6 m X Y Z.
+    Source: salmon-1879, normalized to S = m - m^4 and T = 1 - 20 m^3 - 8 m^6 for X^3 + Y^3 + Z^3 + 6 m X Y Z.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> m = fmpq(2)
@@ -59,7 +59,7 @@ def _first_invariant(cubic: Cubic, two: Any, three: Any) -> Any:
 
 
 def hessian(K: Field, cubic: Cubic) -> Cubic:
-    """Return the determinant of the matrix of second derivatives, divided by 216, as a cubic."""
+    """Return the Hessian determinant (of the second derivatives) divided by 216, as a ternary cubic."""
     forms = {(i, j): [cubic[_sorted(i, j, k)] for k in range(3)] for i in range(3) for j in range(3)}
     total = dict.fromkeys(cubic, K.zero)
     for p in itertools.permutations(range(3)):
@@ -69,7 +69,7 @@ def hessian(K: Field, cubic: Cubic) -> Cubic:
             term = rows[0][k[0]] * rows[1][k[1]] * rows[2][k[2]]
             index = _sorted(*k)
             total[index] = total[index] + term if even else total[index] - term
-    # A monomial X_i X_j X_k stands for as many entries of the symmetric tensor as there are orders of its indices.
+    # The coefficient of X_i X_j X_k is the entry a_ijk times the number of distinct orders of the indices.
     orders = {index: {1: 1, 2: 3, 3: 6}[len(Counter(index))] for index in total}
     return {index: value * K.convert(fmpq(1, orders[index])) for index, value in total.items()}
 

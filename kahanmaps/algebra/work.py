@@ -1,11 +1,11 @@
-"""Counted work: it bounds a search instead of a clock, so that a search has the same result on every machine.
+"""Counted work. It bounds a search instead of a clock, so that a search has the same result on every machine.
 
-Work is counted in units of about a microsecond of field operations on a laptop of 2020. Expensive operations call
-`count_work` in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work
-that is counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
+A unit of work is about a microsecond of field operations on a laptop of 2020. Expensive operations call `count_work`
+in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work that is
+counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
-Trap: a result from a module-level cache costs no work the second time, so the outcome would depend on earlier calls.
-For functions that count work use `counted_cache`, which counts it again. Caches within a single search are harmless.
+Trap: a result from a module-level cache would cost no work the second time, so the outcome would depend on earlier
+calls. `counted_cache` counts the work of a cached result again. Caches within a single search need no such care.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from typing import Any
 from kahanmaps.errors import InputError
 
 LEAST_EFFORT, MOST_EFFORT = -20, 40
-SPENT = "work limit reached; raise --effort"  # why a search ended early
+SPENT = "work limit reached; raise --effort"  # the reason given for a search that ended early
 UNFINISHED = "the search was interrupted before all stages were completed"
 
 
 class _Counter(threading.local):
-    units = 0  # an integer, so that sums do not depend on their order
+    units = 0  # an integer, since sums of floats would depend on their order
 
 
 _counter = _Counter()
@@ -81,14 +81,14 @@ class Budget:
     def share(self, weights: Sequence[float]) -> Iterator[Budget]:
         """Yield budgets for stages, in proportion to their weights; each is created when the stage begins.
 
-        Units that a stage does not use go to the later stages.
+        Units that a stage does not use are passed to the later stages.
         """
         for k, weight in enumerate(weights):
             yield self.part(weight / sum(weights[k:]))
 
 
 def units_at(effort: int, units: float) -> float:
-    """Return the units for an effort: `units` for the default 1, doubled for each step above, halved for each below.
+    """Return the units for an effort: `units` for effort 1, twice as many per step up, half as many per step down.
 
     Raises InputError for an effort that is not an integer from -20 to 40.
 
@@ -101,7 +101,7 @@ def units_at(effort: int, units: float) -> float:
 
 
 def counted_cache(size: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorate a function with a cache of its last results that counts the work of a result on every call."""
+    """Decorate a function: cache its last `size` results, and count the work of a cached result on every call."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         @lru_cache(size)

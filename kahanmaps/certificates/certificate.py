@@ -1,4 +1,4 @@
-"""The certificate of a system: the choice of the claims, and the script for the program that checks their proofs."""
+"""The certificate of a system: its claims, and the script for the program that checks their proofs."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ CHECKERS: dict[str, Callable[..., str]] = {
     "gp": partial(script_certificate, GP),
     "sympy": partial(script_certificate, PYTHON),
 }
-# Measured seconds of the programs: to start, for each byte of the text, and for each term that is multiplied out.
+# Measured seconds of each program: to start, for each byte of the text, and for each term that is multiplied out.
 _SECONDS = {"rocq": (1.7, 2.2e-4, 7e-5), "gp": (0.05, 5e-6, 0.0), "sympy": (0.6, 0.0, 1.8e-5)}
-VOLUME = "volume"  # the name of the claim that dx/phi is invariant
+VOLUME = "volume"  # the claim that the volume form dx/phi is invariant
 TENSOR = "poisson"
-ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
-DETERMINANT = "determinant"  # that dx/det(I - eps f') is invariant, where the file claims another density
-UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
-ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
+ENTROPY = "entropy"  # the claim of positive algebraic entropy, hence of nonintegrability
+DETERMINANT = "determinant"  # the claim that dx/det(I - eps f') is invariant, if the file claims another density
+UNPROVED = "Pi"  # the claim that J - eps^2 f'^2 J is invariant, if no theorem implies it
+ASSOCIATES = "associates"  # given as the other system: the associated systems of a member of the commuting family
 
 
 class Certificate(str):
@@ -84,7 +84,7 @@ class Certificate(str):
     def of(
         cls, checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
     ) -> Certificate:
-        """Write the script; `terms` is the number of terms of the products that it multiplies out."""
+        """Write the script; `terms` is the number of terms that the program multiplies out."""
         pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
         about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
         left_out = [f"Not in this certificate: {reason}" for reason in skipped]
@@ -96,7 +96,7 @@ class Certificate(str):
 
     @property
     def summary(self) -> str:
-        """The number of claims and bytes, and the time to check them."""
+        """The number of claims, the number of bytes, and the time that the check takes."""
         time = f"about {self.seconds:.2g} seconds" if self.seconds >= 1 else "less than a second"
         return f"{counted(len(self.claims), 'claim')}, {len(self.encode())} bytes, {time} to check"
 
@@ -117,37 +117,37 @@ def certificate(
     effort: int = 1,
     command: str = "",
 ) -> Certificate:
-    """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
+    """Write a proof for another program to check: integrals, invariant volume forms and further claims, for every eps.
 
     Args:
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
-        claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
-            "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
-            (Darboux polynomials up to degree 2), "symmetry" and "equivalence" (to a system of the catalogue) for what a
-            search finds and proves; "entropy" for positive entropy of a map of the plane, from one theorem that is
-            assumed. None for all that need no search, or for the following alone if these are given.
-        integrals: further rational functions of x and eps, as `check_integrals` takes them.
-        density: phi, as `check_measure` takes it.
-        tensor: a Poisson tensor, as `check_poisson` takes it.
-        everything: whether to search for all of these claims, too.
-        commute: another system or map, in the same variables: certify that the two maps commute. For members of the
-            commuting family this is written in coordinates in which the planes separate; "associates" stands for all
-            pairs of rational associated systems.
-        equivalent: another quadratic system g, of the same dimension: certify that T takes the Kahan map to that of g.
-        by: T, one polynomial of degree 1 in the variables for each variable of g, as text.
-        period: certify that this iterate of the map is the identity.
+        claims: names of integrals of the file; "modified_hamiltonian" or "H0", "H1", ... for integrals given by
+            theorems; "volume" for the invariant volume form; "poisson" for a Poisson tensor. Names of claims that a
+            search finds and proves: "integrals", "density", "darboux" (Darboux polynomials up to degree 2),
+            "symmetry", "equivalence" (to a system of the catalogue). "entropy": positive entropy of a map of the plane,
+            from a theorem that is assumed. None: all claims without a search, or those of the following arguments only.
+        integrals: further rational functions of x and eps, given as for `check_integrals`.
+        density: phi, given as for `check_measure`.
+        tensor: a Poisson tensor, given as for `check_poisson`.
+        everything: whether all these claims are searched for as well.
+        commute: another system or map in the same variables: certify that the two maps commute. For members of the
+            commuting family the proof uses coordinates in which the planes separate. "associates" stands for all pairs
+            of rational associated systems.
+        equivalent: another quadratic system g of the same dimension: certify that T takes the Kahan map to that of g.
+        by: T, as one text for each variable of g: a polynomial of degree 1 in the variables.
+        period: certify that the iterate of the map with this number of steps is the identity.
         effort: each increase by 1 doubles the limit for the length of the identities.
-        command: the command line that writes this script, for the comment on top.
+        command: the command line that writes this script, for the comment at its beginning.
 
     Returns:
-        The text of the script, exact. It defines the map by its equation M(x, eps) x~ = r(x, eps), states each claim,
-        and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps. This text has further
-        attributes: `claims`, their names, and `seconds`, an estimate of the time that the program takes.
+        The exact text of the script. It defines the map by its equation M(x, eps) x~ = r(x, eps), states each claim,
+        and proves it by polynomial identities, without kahanmaps. The time step is 2 eps. The text has two attributes:
+        `claims`, the names of the claims, and `seconds`, an estimate of the time that the program takes.
 
     Raises:
-        FalseClaim: for a claim that is not true.
-        InputError: if no claim is known, for unknown names, and for identities that are too long.
+        FalseClaim: if a claim is not true.
+        InputError: if there is nothing to claim, a name is unknown, or an identity is too long.
 
     Source: docs/mathematics.md, section "Certificates".
 
@@ -187,7 +187,7 @@ def certificate(
         if claims is None:
             claims = [] if proved and not everything else [*known, *(searches if everything else ())]
             unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
-            has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
+            has_integral = bool(formulas.integrals) or formulas.H is not None  # then the entropy is not positive
             unwanted |= {ENTROPY} if has_integral or not everything else set()
             claims = [name for name in claims if name not in unwanted]
         skipped = []
@@ -204,7 +204,7 @@ def certificate(
                 proved += [claim for claim in new if all(claim is not other for other in proved)]
             except FalseClaim:
                 raise
-            except InputError as error:  # of all claims those that are short enough
+            except InputError as error:  # if all claims are requested, those with too long identities are omitted
                 if is_required:
                     raise
                 skipped.append(f"{name}: {error}")
@@ -221,7 +221,7 @@ def certificate(
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
-    """Return the names of the claims of a certificate that a check covers: integrals, measure or poisson.
+    """Return the names of the claims that a certificate can prove for a check: integrals, measure or poisson.
 
     >>> from kahanmaps.documents.catalog import load
     >>> known_claims(load("euler_top"), "integrals")
@@ -236,26 +236,26 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
 
 
 def certificate_of(result: Any, checker: str, *, command: str = "") -> Certificate:
-    """Write a proof that another program checks, of what a check or a search has proved about a map.
+    """Write a proof for another program to check, of what a check or a search has proved about a map.
 
     Args:
-        result: what `analyze`, `verify`, a check or a search returns, for every eps, or a finding of a report.
+        result: the result of `analyze`, `verify`, a check or a search, valid for every eps, or one finding of a report.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
-        command: the command line that writes this script, for the comment on top.
+        command: the command line that writes this script, for the comment at its beginning.
 
     Returns:
-        The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
+        The exact text of the script, as for `certificate`. The symbols of a search remain symbols.
 
     Raises:
-        FalseClaim: for a claim that is not true.
-        InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
+        FalseClaim: if a claim is not true.
+        InputError: if nothing is proved, the result is for one eps or about the flow, or an identity is too
             long.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
     quit(!ok)
     """
-    result = getattr(result, "finding", result)  # that of a commuting system
+    result = getattr(result, "finding", result)  # a commuting system contains its finding
     if isinstance(result, Report | Finding):
         return _of_check(result, checker, command)
     parts: list[Any] = [result]
@@ -296,7 +296,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                 claims += find()
             except FalseClaim:
                 raise
-            except InputError as error:  # of all results of an analysis those that are short enough
+            except InputError as error:  # of an analysis, results with too long identities are omitted
                 if parts == [result]:
                     raise
                 skipped.append(f"{name}: {error}")
@@ -306,7 +306,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
 
 
 def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
-    """The certificate of a check, or of one of its claims."""
+    """The certificate of a check (of all its claims), or of one finding."""
     arguments = dict(result.certified)
     if "why_not" in arguments or not arguments:
         about = "no other program is told how to check these claims" if isinstance(result, Report) else result.claim
@@ -317,7 +317,7 @@ def _of_check(result: Report | Finding, checker: str, command: str) -> Certifica
 
 
 def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
-    """The formulas of a single map over Q, and its equation."""
+    """The formulas of a single map over Q, and the equation of this map."""
     if checker not in CHECKERS:
         raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
     if file.map.root is not None:
@@ -331,12 +331,12 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
 
 
 def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
-    """The claims that maps commute, in separate coordinates if there are any; their names begin with the label."""
+    """The claims that maps commute, in coordinates that separate the planes if possible; `label` begins their names."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
         others = [associate.system for associate in listed_associates(file.member)]
-        others += [others[0].scaled(-1)] if len(others) == 1 else []  # as check_commute does
+        others += [others[0].scaled(-1)] if len(others) == 1 else []  # as in check_commute
         maps: list[MapFamily] = [as_map(system) for system in others]
     else:
         second = as_file(other)
@@ -361,7 +361,7 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = 
 
 
 def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequence[Any]) -> AffineSymmetry:
-    """The claim that the affine map takes the Kahan map of the file to that of the other system."""
+    """The claim that the affine map `by` takes the Kahan map of the file to the Kahan map of the other system."""
     n = file.dim
     if not (file.is_quadratic and other.is_quadratic) or other.dim != n or len(by) != n:
         raise InputError(
@@ -381,7 +381,7 @@ def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequenc
 def _known_claims(
     formulas: Formulas, planes: _Planes, checker: str = ""
 ) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
-    """The claims of the file and those that theorems give: functions, by name, that find the identities."""
+    """Yield the claims of the file, then those from theorems, as names with functions that compute the identities."""
     H, file, data = formulas.H, formulas.file, planes.data
 
     def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
@@ -399,7 +399,7 @@ def _known_claims(
         volume = VOLUME if formulas.density is None else DETERMINANT
         yield volume, lambda: [invariant_volume(data, volume, _polynomial(data.determinant))]
     if data.dim == 2:
-        is_short = checker == "rocq"  # which takes a second for a hundred terms
+        is_short = checker == "rocq"  # Coq takes a second for a hundred terms
         yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows), is_short)]
     if file.hamiltonian is not None:
         is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
@@ -409,14 +409,14 @@ def _known_claims(
 
 @dataclass(frozen=True)
 class _Planes:
-    """Proofs about a function of one plane of a member of the commuting family, in coordinates z with x = T z."""
+    """Proofs about functions of one plane of a member of the commuting family, in coordinates z with x = T z."""
 
     file: SystemFile
     data: MapData
 
     @cached_property
     def separate(self) -> tuple[Separated, AffineSymmetry] | None:
-        """The system in these coordinates, if it is shorter, and the claim that T takes its map to the given one."""
+        """The system in the coordinates z if it is shorter, and the claim that T takes its map to the given map."""
         file, n = self.file, self.data.dim
         has_symbols = len(self.data.names) > n + 1
         separate = None if file.member is None or has_symbols else separated(file.system)
@@ -426,7 +426,7 @@ class _Planes:
         return separate, affine_symmetry(in_planes, "coordinates", separate.T, [fmpq(0)] * n, target=self.data)
 
     def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
-        """The claims that `prove` finds about the function, in its plane if it depends on one plane only."""
+        """The claims that `prove` returns for a function; for a function of one plane, for the map of this plane."""
         if self.separate is not None:
             separate, way = self.separate
             moved = separate.function(function)
@@ -438,7 +438,7 @@ class _Planes:
 
 
 def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
-    """What the result of a search proves about the map; None is that of one that found nothing."""
+    """The claims that the result of a search proves about the map; `result` None stands for a search without result."""
     if result is None:
         return []
     proved = Certainty.PROVED
@@ -447,7 +447,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         found = [integral for integral in result.integrals if integral.verdict is proved]
         return [claim for I in found for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
-        densities = [density for density in result.shown if density.verdict is proved]  # the others are multiples
+        densities = [density for density in result.shown if density.verdict is proved]  # further ones are multiples
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
     if isinstance(result, PoissonSearch):
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
@@ -455,7 +455,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
     if isinstance(result, DarbouxSearch):
         planes = planes or _Planes(result.file, data)
         polynomials = [P for space in result.spaces if space.verdict is proved for P in space.polynomials]
-        # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
+        # If P is a factor of det M, its cofactor has P in the denominator: it is no polynomial over D^k.
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
         return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]

@@ -1,8 +1,8 @@
 """Claims about compositions of maps: two maps commute, or an iterate is the identity.
 
-Every point that a composition passes through is written as a common vector of rational functions of x, and the equation
-of the map is verified at each arrow. For Phi_f and Phi_g with y = Phi_f(x) and z = Phi_g(x) this is one vector w with
-M_g(y) w = r_g(y) and M_f(z) w = r_f(z): then w is both Phi_g(y) and Phi_f(z). No composition is expanded twice.
+Every point that a composition passes through is written as a vector of rational functions of x, and the equation of the
+map is verified for each step. For Phi_f and Phi_g let y = Phi_f(x), z = Phi_g(x). One vector w satisfies M_g(y) w =
+r_g(y) and M_f(z) w = r_f(z): hence w is both Phi_g(y) and Phi_f(z). No composition is expanded twice.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _PRIME = 2**61 - 1
 
 @dataclass(frozen=True)
 class RationalPoint:
-    """A point that depends rationally on x: each coordinate has a numerator, and one of the denominators by index."""
+    """A point that depends rationally on x; each coordinate has a numerator and the index of a denominator."""
 
     numerators: tuple[fmpq_mpoly, ...]
     denominators: tuple[fmpq_mpoly, ...]
@@ -32,7 +32,7 @@ class RationalPoint:
 
     @classmethod
     def of(cls, fractions: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> RationalPoint:
-        """The point with these coordinates in lowest terms, over Z."""
+        """Return the point with these coordinates, reduced to lowest terms over Z."""
         numerators, denominators, which = [], list[fmpq_mpoly](), []
         for numerator, denominator in fractions:
             common = numerator.gcd(denominator)
@@ -49,10 +49,10 @@ class RationalPoint:
 
 @dataclass(frozen=True)
 class Chain(EquationClaim):
-    """Points x = point 0, point 1, ..., each the image of an earlier one; two of them are equal.
+    """The points x = point 0, point 1, ..., each the image of an earlier point, two of which are equal.
 
-    `maps` are the maps by their letters; `arrows` give for each point but x the letter of the map, the number of the
-    preimage, and the index of the point in `values`, which begin with x. `says` are the two equal points.
+    `maps` are the maps by their letters. For each point except x, `arrows` contains the letter of the map, the number
+    of the preimage, and the index of the point in `values`, which begin with x. `says` are the two equal points.
     """
 
     maps: Mapping[str, MapData]
@@ -61,16 +61,16 @@ class Chain(EquationClaim):
     says: tuple[int, int]
 
     def value_of(self, point: int) -> int:
-        """The index of the value of a point."""
+        """Return the index in `values` of a point."""
         return self.arrows[point - 1][2] if point else 0
 
 
 def commuting(name: str, f: MapData, g: MapData) -> Chain:
-    """The identities that prove that two maps in the same variables commute.
+    """Return the identities that prove that two maps in the same variables commute.
 
     Raises:
-        FalseClaim: if they do not.
-        InputError: if one of the maps is the identity, as for f = 0, or if the identities have too many terms.
+        FalseClaim: if the maps do not commute.
+        InputError: if a map is the identity, as for f = 0, or if the identities have too many terms.
     """
     x = _identity(f)
     y, z = apply(f, x), apply(g, x)
@@ -86,10 +86,10 @@ def commuting(name: str, f: MapData, g: MapData) -> Chain:
 
 
 def periodic(f: MapData, period: int) -> Chain:
-    """The identities that prove that an iterate of the map is the identity.
+    """Return the identities that prove that an iterate of the map is the identity.
 
     Raises:
-        FalseClaim: if it is not; random points modulo a prime are tried first, before products are expanded.
+        FalseClaim: if it is not the identity; random points modulo a prime are tried before products are expanded.
         InputError: for a period above 1000, or if the identities have too many terms.
     """
     if period > MAX_PERIOD:
@@ -109,10 +109,10 @@ def periodic(f: MapData, period: int) -> Chain:
 
 
 def _moved_point(f: MapData, period: int) -> str | None:
-    """A random point modulo a prime that the iterate moves, or None.
+    """Return, as text, a random point modulo a prime that the iterate moves, or None.
 
-    The equation is over Z, so that x~ modulo the prime is the image of x modulo the prime if det M is not 0 there. So
-    an iterate that is the identity moves no such point.
+    The equation is over Z, so if det M is not 0 at x modulo the prime, then x~ modulo the prime is the image of x
+    modulo the prime. Hence if the iterate is the identity, it moves no such point.
     """
     n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
     values = [rng.randrange(_PRIME) for _ in f.names]
@@ -129,7 +129,7 @@ def _moved_point(f: MapData, period: int) -> str | None:
 
 
 def apply(data: MapData, point: RationalPoint) -> RationalPoint:
-    """The image of a point that depends on x. Raises InputError where it has too many terms."""
+    """Return the image of a point that depends on x. Raises InputError if the image has too many terms."""
     fractions = []
     for numerator in data.numerators:
         common = numerator.gcd(data.determinant)
@@ -142,9 +142,9 @@ def apply(data: MapData, point: RationalPoint) -> RationalPoint:
 
 
 def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tuple[fmpq_mpoly, list[int]]:
-    """The polynomial at the point, times powers of its denominators, and their exponents.
+    """Return the polynomial at the point times powers of the point's denominators, and the exponents of these powers.
 
-    Raises InputError where it has too many terms.
+    Raises InputError if the result has too many terms.
     """
     n, letters = data.dim, ring(data.names).gens()
     rows = [[int(e) for e in exponents] for exponents in polynomial.monoms()]

@@ -1,17 +1,17 @@
 """Claims that follow from the equation of a map by linear combinations, without solving for x~.
 
-Let e(x, y) = M(x) y - r(x), which is 0 where y is the image of x. A claim G = 0 is proved by polynomials c with G = c .
-e, an identity that holds for any points. With three points x, y, z of an orbit and a symmetric trilinear form T with
-H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H, J constant and skew,
+Let e(x, y) = M(x) y - r(x), which is 0 if y is the image of x. A claim G = 0 is proved by polynomials c with G = c . e,
+an identity for arbitrary points. With three consecutive points x, y, z of an orbit, and a symmetric trilinear form T
+with H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H with J constant and skew,
 
     T(y, y, z) - T(x, x, y) = g(x, y) . (e(x, y) + e(y, z)) + g(y, z) . e(x, y),
 
-so that T(x, x, x~) = H + grad H . (x~ - x)/3 is an integral. For a skew matrix B for which B f' is symmetric,
+so that T(x, x, x~) = H + grad H . (x~ - x)/3 is an integral. For a skew matrix B with B f' symmetric,
 
     y^T B z - x^T B y = x^T B e(y, z) - z^T B e(x, y),
 
 so that x^T B x~ is an integral, as for members of the commuting family. An affine T(x) = S x + b with f(T x) = S f(x)
-is a symmetry, since e(T x, T y) = S e(x, y), and with f(T x) = -S f(x) a reversing one: e(T y, T x) = -S e(x, y).
+is a symmetry, since e(T x, T y) = S e(x, y). If f(T x) = -S f(x), it is a reversing symmetry: e(T y, T x) = -S e(x, y).
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ Row = tuple[fmpq_mpoly, ...]
 
 @dataclass(frozen=True)
 class OrbitIntegral(EquationClaim):
-    """I(x, x~) = P/Q, Q without variables: P(y, z) - P(x, y) = first . e(x, y) + second . e(y, z).
+    """I(x, x~) = P/Q with P(y, z) - P(x, y) = first . e(x, y) + second . e(y, z); Q does not contain the variables.
 
-    All are polynomials over Z in the letters of `three_points`.
+    P, Q, `first` and `second` are polynomials over Z in the names `three_points`.
     """
 
     numerator: fmpq_mpoly
@@ -43,10 +43,10 @@ class OrbitIntegral(EquationClaim):
 
 @dataclass(frozen=True)
 class AffineSymmetry(EquationClaim):
-    """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
+    """The affine map T(x) = `image`/`divisor` with `multiple` e(T x, T y) = `matrix` e(x, y).
 
-    The left e belongs to the map `target`, the right one to `data`. For a symmetry these are the same map; otherwise T
-    takes the map `data` to `target`.
+    If `reversing`, e(T y, T x) is on the left instead. The e on the left belongs to the map `target`, the e on the
+    right to `data`. For a symmetry both maps are equal; otherwise T takes the map `data` to `target`.
     """
 
     target: MapData
@@ -55,11 +55,11 @@ class AffineSymmetry(EquationClaim):
     matrix: tuple[tuple[int, ...], ...]
     multiple: int
     reversing: bool
-    about: str = ""  # for the comment on top: what the target is
+    about: str = ""  # what the target is, for the comment at the beginning
 
     @property
     def inverse(self) -> list[tuple[fmpq_mpoly, int]]:
-        """The inverse of T, each coordinate as a polynomial over Z and its divisor."""
+        """The inverse of T: for each coordinate a polynomial over Z and its divisor."""
         n, zero, letters = self.data.dim, (0,) * len(self.data.names), ring(self.data.names).gens()
         S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in self.image]).inv()
         moved = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
@@ -69,7 +69,7 @@ class AffineSymmetry(EquationClaim):
 
 @dataclass(frozen=True)
 class ChangedFunction(EquationClaim):
-    """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; pairs of numerator and denominator over Z."""
+    """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; each function is a pair of polynomials over Z."""
 
     image: Row
     divisor: int
@@ -78,17 +78,17 @@ class ChangedFunction(EquationClaim):
 
 
 def three_points(data: MapData) -> tuple[str, ...]:
-    """The variables of x, its image y, the image z of y, and the constants."""
+    """Return the names for x, its image y, the image z of y, and the constants."""
     return (*data.variables, *data.new, *(f"{name}2" for name in data.new), *data.names[data.dim :])
 
 
 def row_multiples(data: MapData) -> list[fmpq]:
-    """The numbers by which the rows of I - eps f' of a Kahan map were multiplied, read off M at x = 0 and eps = 0."""
+    """Return the factors by which the rows of I - eps f' of a Kahan map were multiplied, read from M at x = eps = 0."""
     return [row[i][(0,) * len(data.names)] for i, row in enumerate(data.rows)]
 
 
 def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegral:
-    """The identity for T(x, x, x~), H a polynomial of degree at most 3 in the variables and the symbols.
+    """Return the identity for T(x, x, x~); H is a polynomial of degree at most 3 in the variables and the symbols.
 
     Raises:
         FalseClaim: if the map is not the Kahan map of J grad H with a constant skew J.
@@ -99,7 +99,7 @@ def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegr
     constants = gens[3 * n : -1]
 
     def gradient(a: int, b: int) -> list[fmpq_mpoly]:
-        """The vector g(a, b) by polarization of grad H/3; a and b are indices of the first letters of two points."""
+        """Return the vector g(a, b) by polarizing grad H/3; a and b are indices of the first names of two points."""
         points = (
             [(gens[a + i] + gens[b + i]) / 2 for i in range(n)],
             gens[a : a + n],
@@ -125,12 +125,12 @@ def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegr
 
 
 def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
-    """The identity for x^T B x~/eps. Raises FalseClaim if it does not hold."""
+    """Return the identity for x^T B x~/eps. Raises FalseClaim if it does not hold."""
     n, context = data.dim, ring(three_points(data))
     gens = context.gens()
 
     def times(a: int) -> list[fmpq_mpoly]:
-        """B^T x for the point x whose first letter has the index a."""
+        """Return B^T x for the point x whose first name has the index a."""
         return [sum((gens[a + i] * B[i, j] for i in range(n)), gens[0] * 0) for j in range(n)]
 
     def form(a: int, b: int) -> fmpq_mpoly:
@@ -148,10 +148,10 @@ def affine_symmetry(
     target: MapData | None = None,
     about: str = "",
 ) -> AffineSymmetry:
-    """The identity by which T(x) = S x + shift takes the map to the target (by default itself) or to its inverse.
+    """Return the identity by which T(x) = S x + shift takes the map to `target` (default: the map), or to its inverse.
 
     Raises:
-        FalseClaim: if it does not, or is not invertible.
+        FalseClaim: if the identity does not hold, or T is not invertible.
     """
     target = target or data
     if S.det() == 0:
@@ -181,10 +181,10 @@ def affine_symmetry(
 def changed_function(
     way: AffineSymmetry, name: str, function: RationalFunction, moved: RationalFunction, letters: tuple[str, ...]
 ) -> ChangedFunction:
-    """The identity that the function at x = T z is `moved`, a function of z that contains only these letters.
+    """Return the identity that a function of x = T z equals `moved`, a function of z that contains only `letters`.
 
     Raises:
-        FalseClaim: if it is not.
+        FalseClaim: if the two functions are not equal.
     """
     data, context = way.data, ring(way.data.names)
     gens = dict(zip(data.names, context.gens(), strict=True))
@@ -197,7 +197,7 @@ def changed_function(
 
 
 def _affine(S: fmpq_mat, shift: Sequence[fmpq], letters: Sequence[fmpq_mpoly], i: int) -> fmpq_mpoly:
-    """The component i of S x + shift."""
+    """Return component i of S x + shift."""
     return sum((S[i, j] * letters[j] for j in range(len(shift))), letters[0] * 0 + shift[i])
 
 
@@ -210,7 +210,7 @@ def _orbit_integral(
     first: Sequence[fmpq_mpoly],
     second: Sequence[fmpq_mpoly],
 ) -> OrbitIntegral:
-    """The claim with integer coefficients, after its identity was verified by expansion."""
+    """Return the claim with integer coefficients, after verifying its identity by expansion."""
     n, names = data.dim, three_points(data)
     rows = [fmpq(1) / c for c in row_multiples(data)]
     multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]

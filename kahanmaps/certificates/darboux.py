@@ -1,8 +1,8 @@
 """Darboux polynomials and their cofactors in factored form, so that no large product is expanded.
 
-P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, C is the
-product of their cofactors C_i and a power of D; and the C_i often share their factors c_1, c_2, ... So only the
-identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all others compare monomials in D and the c_j.
+P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, then C is the
+product of their cofactors C_i and a power of D. The C_i often have common factors c_1, c_2, ... So only the
+identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all further identities compare monomials in D and the c_j.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from kahanmaps.certificates.identities import (
 )
 from kahanmaps.errors import InputError
 
-_MAX_FACTORED_TERMS = 3000  # of a cofactor: longer ones are left as they are
+_MAX_FACTORED_TERMS = 3000  # terms of a cofactor; longer cofactors are not factored
 
 
 @dataclass(frozen=True)
 class Monomial:
-    """A multiple of a product of powers of D, c_1, c_2, ..."""
+    """A constant times a product of powers of D, c_1, c_2, ..."""
 
     constant: int
     powers: tuple[int, ...]
@@ -45,11 +45,11 @@ class Monomial:
         return Monomial(self.constant**exponent, tuple(exponent * power for power in self.powers))
 
     def without(self, common: Sequence[int]) -> Monomial:
-        """The quotient by the monomial with the powers `common`."""
+        """Return the quotient by the monomial with the exponents `common`."""
         return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, common, strict=True)))
 
     def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """The polynomial with these values of D, c_1, ... Raises InputError if it has too many terms."""
+        """Return the polynomial for these values of D, c_1, ... Raises InputError if it has too many terms."""
         total = values[0] ** 0 * self.constant
         for value, power in zip(values, self.powers, strict=True):
             for _ in range(power):
@@ -57,7 +57,7 @@ class Monomial:
         return total
 
     def text(self, D: str, multiply: str = "*", power: str = "^") -> str:
-        """The monomial, with this letter for D, or without powers of D if the letter is empty."""
+        """Return the monomial as text, with this name for D; an empty name omits the powers of D."""
         names = [D, *(f"c{j}" for j in range(1, len(self.powers)))]
         pairs = [(name, k) for name, k in zip(names, self.powers, strict=True) if name and k]
         factors = [name if k == 1 else f"{name}{power}{k}" for name, k in pairs]
@@ -67,9 +67,9 @@ class Monomial:
 
 @dataclass(frozen=True)
 class DarbouxFactor:
-    """P with D^k P(N/D) = C P, polynomials over Z, and its exponent in a product.
+    """A factor P with D^k P(N/D) = C P, where P and C are polynomials over Z, and the exponent of P in a product.
 
-    k is `degree`: the degree of P in the variables, or more if P has a factor of D.
+    k is `degree`: the degree of P in the variables, or a larger number if P has a factor of D.
     """
 
     polynomial: fmpq_mpoly
@@ -80,14 +80,14 @@ class DarbouxFactor:
 
 @dataclass(frozen=True)
 class DarbouxProduct:
-    """A product of Darboux polynomials, and of `content`, a polynomial over Z without the variables."""
+    """A product of Darboux polynomials and of `content`, a polynomial over Z that does not contain the variables."""
 
     content: fmpq_mpoly
     factors: tuple[DarbouxFactor, ...]
 
     @cached_property
     def polynomial(self) -> fmpq_mpoly:
-        """The product, multiplied out."""
+        """The expanded product."""
         return prod((factor.polynomial**factor.exponent for factor in self.factors), start=self.content)
 
     @property
@@ -101,7 +101,7 @@ class DarbouxProduct:
         return sum(factor.degree * factor.exponent for factor in self.factors)
 
     def cofactor(self, degree: int, count: int) -> Monomial:
-        """C with D^degree P(N/D) = C P, a monomial in D and `count` factors."""
+        """Return C with D^degree P(N/D) = C P, a monomial in D and c_1, ..., c_count."""
         total = Monomial(1, (degree - self.degree, *[0] * count))
         for factor in self.factors:
             total *= factor.cofactor**factor.exponent
@@ -122,30 +122,30 @@ class DarbouxProducts:
 
     @property
     def cofactors(self) -> list[Monomial]:
-        """The cofactors of the products, all at the largest degree."""
+        """The cofactors of all products, for the largest degree."""
         return [product.cofactor(self.degree, len(self.letters)) for product in self.products]
 
 
 @dataclass(frozen=True)
 class ConservedFunction(Claim):
-    """F = P/Q: the two products of Darboux polynomials have the same cofactor."""
+    """F = P/Q is conserved, since the two products of Darboux polynomials have the same cofactor."""
 
     fraction: DarbouxProducts
 
 
 @dataclass(frozen=True)
 class DarbouxPolynomial(Claim):
-    """A Darboux polynomial P of degree k with the cofactor C: P(x~) = P C/D^k."""
+    """A Darboux polynomial P of degree k with cofactor C: P(x~) = P C/D^k."""
 
     product: DarbouxProducts
 
 
 @dataclass(frozen=True)
 class InvariantVolume(Claim):
-    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
+    """The volume form dx/phi, phi = P/Q, is invariant: P(x~) Q(x) det M = P(x) Q(x~) det L.
 
-    `fraction` are P and Q as products of Darboux polynomials. It is None if the identity holds for any two points x and
-    x~, as for Hamiltonian systems.
+    `fraction` contains P and Q as products of Darboux polynomials. It is None if the identity holds for arbitrary
+    points x and x~, as for Hamiltonian systems.
     """
 
     numerator: fmpq_mpoly
@@ -154,14 +154,14 @@ class InvariantVolume(Claim):
 
     @property
     def is_free(self) -> bool:
-        """Whether the identity holds for any two points."""
+        """Whether the identity holds for arbitrary points x and x~."""
         return self.fraction is None
 
     @property
     def balance(self) -> tuple[Monomial, Monomial, Monomial]:
-        """The monomials c, l, r with C D^(n + 1) = c l and B = c r, so that l = r D^n det L(x, N/D).
+        """The monomials c, l, r with C D^(n + 1) = c l and B = c r; the claim is then l = r D^n det L(x, N/D).
 
-        C and B are the cofactors of P and Q.
+        C is the cofactor of P, B the cofactor of Q.
         """
         assert self.fraction is not None
         C, B = self.fraction.cofactors
@@ -171,10 +171,10 @@ class InvariantVolume(Claim):
 
 
 def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
-    """The identities that prove that the map conserves the function.
+    """Return the identities that prove that the map conserves a function.
 
     Raises:
-        FalseClaim: if it does not.
+        FalseClaim: if the map does not conserve the function.
         InputError: if the identities have too many terms.
     """
     P, Q = coprime(function, data.names)
@@ -188,10 +188,10 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
 
 
 def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> DarbouxPolynomial:
-    """The identity that proves that the function, a polynomial, is a Darboux polynomial of the map.
+    """Return the identity that proves that a function, which is a polynomial, is a Darboux polynomial of the map.
 
     Raises:
-        FalseClaim: if it is none.
+        FalseClaim: if it is not a Darboux polynomial.
         InputError: if the identity has too many terms.
     """
     P, _ = coprime(function, data.names)
@@ -204,10 +204,10 @@ def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> 
 
 
 def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
-    """The identity that proves that the map preserves the volume form dx/phi, phi the function.
+    """Return the identity that proves that the map preserves the volume form dx/phi, where phi is `function`.
 
     Raises:
-        FalseClaim: if it does not.
+        FalseClaim: if the map does not preserve this volume form.
         InputError: if the identity has too many terms.
     """
     P, Q = coprime(function, data.names)
@@ -230,12 +230,12 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
 
 
 def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: bool = True) -> DarbouxProducts | None:
-    """The polynomials over Z as products of Darboux polynomials of the map; None if one of them is no such product.
+    """Write polynomials over Z as products of Darboux polynomials of the map; return None if one is not such a product.
 
     Args:
         data: the map.
-        polynomials: polynomials over Z, not 0, in the names of the map.
-        splits: whether the polynomials are split into factors that are Darboux polynomials, too.
+        polynomials: nonzero polynomials over Z in the names of the map.
+        splits: whether the polynomials are also split into factors that are Darboux polynomials.
     """
     known, k = list[fmpq_mpoly](), max(degree_in(P, data.dim) for P in polynomials)
     pieces = []
@@ -262,7 +262,7 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
 
 
 def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]]:
-    """The factor without the variables, and the irreducible others with their exponents."""
+    """Return the factor without the variables, and the remaining irreducible factors with exponents."""
     constant, factors = P.factor()
     content = prod((f ** int(e) for f, e in factors if degree_in(f, dim) <= 0), start=P**0 * constant)
     return content, [(f, int(e)) for f, e in factors if degree_in(f, dim) > 0]
@@ -271,10 +271,10 @@ def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpol
 def _with_cofactors(
     data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]], most: int
 ) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
-    """The factors with their k, exponents and cofactors; None if a factor has no cofactor.
+    """Return the factors with their k, exponents and cofactors; None if a factor has no cofactor.
 
-    A factor f that has a factor of D may divide D^k f(N/D) for a larger k than its degree: up to `most`, that of P and
-    Q, if P/Q is an integral, and n + 1 more if dx/phi is invariant, phi = P/Q.
+    If f has a factor of D, f may divide D^k f(N/D) only for some k larger than deg f. Such k are tried up to `most`:
+    the degree of P and Q if P/Q is an integral, and n + 1 more if dx/phi with phi = P/Q is invariant.
     """
     content, factors = factored
     result = []
@@ -286,20 +286,20 @@ def _with_cofactors(
             while cofactor is None and k < most + data.dim + 1:
                 value, k = times(value, D), k + 1
                 cofactor = quotient(value, f)
-        if not cofactor:  # 0: the image of the map lies in f = 0
+        if not cofactor:  # the cofactor 0: the image of the map lies in f = 0
             return None
         result.append((f, k, e, cofactor))
     return content, result
 
 
 def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, k: int, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
-    """C, with D^k P(N/D) = C P, as a monomial in D and the `known` polynomials, to which new factors are added."""
+    """Write C, with D^k P(N/D) = C P, as a monomial in D and the `known` polynomials; append new factors to `known`."""
     power, rest = 0, C
-    if D.is_constant():  # then the powers of D in C are numbers; of 1 there are k, as in D^k
+    if D.is_constant():  # the powers of D in C are numbers; count at most k of them, as in D^k
         number, content = abs(int(D.coeffs()[0].p)), gcd(*(int(c.p) for c in C.coeffs()))
         while content % number == 0 and power < k:
             power, content, rest = power + 1, content // number, rest / D
-    elif gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
+    elif gcd(*(int(c.p) for c in D.coeffs())) == 1:  # D is primitive, so that the quotients are over Z
         while (smaller := quotient(rest, D)) is not None:
             power, rest = power + 1, smaller
     constant, factors = rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (fmpq(1), [(rest, 1)])

@@ -1,12 +1,12 @@
 """Positive algebraic entropy of a map of the plane, proved by degrees that another program recomputes.
 
 The criterion is the theorem of docs/mathematics.md, section "Positive entropy, proved in the plane": for a birational f
-with D_n = deg f^n and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1). Here f is the map
-over Q(eps); an upper bound of D_n and a lower bound of D_2n are needed:
+with D_n = deg f^n and dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1). Here f is the map over
+Q(eps). An upper bound of D_n and a lower bound of D_2n are needed:
 
 * forms F_1, ..., F_n over Z[eps] with F_1(F_k) = c F_(k+1) show D_n <= deg F_n;
-* modulo a prime and at a residue eps, the image of a line under 2n steps, without its common factor, has a degree of
-  at most D_2n: the forms of f^(2n) take the line to a multiple of this image, as long as no step gives 0.
+* modulo a prime and for a residue eps, 2n steps map a line to a curve, whose degree without common factors is
+  at most D_2n: the forms of f^(2n) map the line to a multiple of this curve, unless a step gives 0.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
 PRIME = 2**61 - 1
 EPS = 1234567
 LINE = ((3, 5), (7, 11), (1, 0))  # the points (3 + 5 t : 7 + 11 t : 1)
-_MAX_TERMS = 100  # of one form of the last iterate but one
-_MAX_DEGREE = 600  # of the image of the line
+_MAX_TERMS = 100  # maximal number of terms of a form of the iterate before the last one
+_MAX_DEGREE = 600  # maximal degree of the image of the line
 _MAX_STEPS = 5
 
 
@@ -35,8 +35,8 @@ _MAX_STEPS = 5
 class PositiveEntropy(Claim):
     """The forms of `inverse` and of F_1, ..., F_n, the common factors c_1, ..., c_n, and the degrees of the line.
 
-    The forms are in the variables, the symbols, eps and a last letter that makes them homogeneous: c_1 F_1 is (N : D),
-    and c_(k+1) F_(k+1) = F_1(F_k). The dynamical degree is more than `lower`.
+    The forms are in the variables, the symbols, eps and a last, homogenizing variable: c_1 F_1 is (N : D), and
+    c_(k+1) F_(k+1) = F_1(F_k). The dynamical degree is greater than `lower`.
     """
 
     inverse: tuple[fmpq_mpoly, ...]
@@ -49,12 +49,12 @@ class PositiveEntropy(Claim):
 
 
 def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) -> PositiveEntropy:
-    """The degrees that prove that the dynamical degree is more than 1, for a map of the plane and its inverse.
+    """Return the degrees which prove that the dynamical degree is above 1, for a map of the plane and its inverse.
 
-    Those of the best bound within the limits or, if `is_short`, of the first one above 1.
+    They give the best bound within the limits; with `is_short`, the first bound above 1.
 
     Raises:
-        InputError: if such degrees are not found within the limits, which proves nothing.
+        InputError: if no such degrees are found within the limits; this proves nothing about the map.
     """
     first, factor = _without_common_factor(_forms(data))
     iterates, factors = [first], [factor]
@@ -86,7 +86,7 @@ def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) ->
 
 
 def homogenizing(names: Sequence[str]) -> str:
-    """A name for the variable that makes forms homogeneous, different from the names of the map.
+    """Return a name for the homogenizing variable, different from the names of the map.
 
     >>> homogenizing(["x", "h", "eps"])
     'xhepsh'
@@ -95,26 +95,26 @@ def homogenizing(names: Sequence[str]) -> str:
 
 
 def _degree(forms: Sequence[fmpq_mpoly]) -> int:
-    """The degree in the two variables and the last letter."""
+    """Return the degree in the two variables and the homogenizing variable."""
     return max(int(e[0] + e[1] + e[-1]) for form in forms for e in form.monoms())
 
 
 def _forms(data: MapData) -> list[fmpq_mpoly]:
-    """N and D, made homogeneous in the variables by a further letter."""
+    """Return N and D as homogeneous forms in the variables and the homogenizing variable."""
     context, parts = ring((*data.names, homogenizing(data.names))), (*data.numerators, data.determinant)
     degree = max(degree_in(part, 2) for part in parts)
     return [context.from_dict({(*e, degree - e[0] - e[1]): c for e, c in part.terms()}) for part in parts]
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
-    """The forms over Z divided by their primitive common factor, and this factor."""
+    """Return the forms over Z divided by their primitive common factor, and this common factor."""
     common = reduce(fmpq_mpoly.gcd, forms)
     common *= common_denominator(common)
     return tuple(form / common for form in forms), common
 
 
 def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
-    """The degree of the image of the line after some steps modulo a prime; None where it is undefined."""
+    """Return the degree of the image of the line after `steps` steps modulo a prime; None if a step is undefined."""
     line = [nmod_poly(list(point), prime) for point in LINE]
     try:
         for _ in range(steps):
@@ -125,7 +125,7 @@ def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | N
 
 
 def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
-    """The image of a curve modulo the prime, without its common factor. Raises InputError where it is 0."""
+    """Return the image of a curve modulo the prime, without common factors. Raises InputError if the image is 0."""
     powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], prime)} for _ in curve]
 
     def power(k: int, exponent: int) -> nmod_poly:

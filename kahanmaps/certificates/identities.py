@@ -1,17 +1,17 @@
-"""The polynomial identities by which a map conserves a function or a volume form, as exact polynomials over Z.
+"""The identities that prove that a map conserves a function or a volume form, as exact polynomials over Z.
 
 A map M(x, eps) x~ = r(x, eps) has x~ = N/D with D = det M and N = adj(M) r, polynomials in x. A function F = P/Q of x
-is an integral if P(x~) Q(x) = P(x) Q(x~). With k the larger degree of P and Q in the variables, D^k P(N/D) and
-D^k Q(N/D) are polynomials, and if P and Q have no common factor, then F is an integral exactly if there is a polynomial
-C (the cofactor of the Darboux polynomials P and Q) with
+is an integral if P(x~) Q(x) = P(x) Q(x~). With k the larger of the degrees of P and Q in x, D^k P(N/D) and D^k Q(N/D)
+are polynomials. If P and Q have no common factor, F is an integral if and only if there is a polynomial C (the cofactor
+of the Darboux polynomials P and Q) with
 
     D^k P(N/D) = C P   and   D^k Q(N/D) = C Q.
 
-These two identities are far shorter than the expanded difference, and they are what a certificate states and another
-program multiplies out. The volume form dx/phi, phi = P/Q, is invariant if phi(x~) = phi(x) det dPhi(x); differentiating
-M x~ = r gives M dPhi = L(x, x~), L_ij = d/dx_j (r_i - sum_k M_ik x~_k), so that the identity is P(x~) Q(x) det M = P(x)
-Q(x~) det L. Likewise dPhi T dPhi^T = T(x~), T = (P_ij)/Q, becomes Q(x~) L P(x) L^T = Q(x) M P(x~) M^T. If such an
-identity does not hold for all x and x~, then x~ = N/D is inserted, and both sides are multiplied by a power of D.
+These two identities are far shorter than the expanded difference. A certificate states them, and another program
+expands them. The volume form dx/phi, phi = P/Q, is invariant if phi(x~) = phi(x) det dPhi(x). Differentiating M x~ = r
+gives M dPhi = L(x, x~), L_ij = d/dx_j (r_i - sum_k M_ik x~_k), so that the identity is P(x~) Q(x) det M = P(x) Q(x~)
+det L. Likewise, dPhi T dPhi^T = T(x~) with T = (P_ij)/Q becomes Q(x~) L P(x) L^T = Q(x) M P(x~) M^T. If an identity
+does not hold for all x and x~, then x~ = N/D is inserted, and both sides are multiplied by a power of D.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from kahanmaps.errors import InputError
 
 Row = Sequence[fmpq_mpoly]
 MAX_DIMENSION = 6
-MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
-MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
+MAX_TERMS = 20_000  # terms of one side of an expanded identity: some ten seconds for Coq
+MAX_PRODUCTS = 20_000_000  # products of terms to expand one side: some ten seconds for PARI
 
 
 @dataclass
 class Limits:
-    """A multiple of the limits, and the number of terms of all products so far."""
+    """The factor by which the limits are multiplied, and the number of terms of all products so far."""
 
     multiple: float = 1.0
     terms: int = 0
 
 
-_LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039  # outside of `limited` no terms count
+_LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039  # terms count within `limited` only
 
 
 @contextmanager
 def limited(effort: int) -> Iterator[Limits]:
-    """Limits for the identities of a certificate: doubled for each step of the effort above 1."""
+    """Set the limits for the identities of a certificate: they double with each step of `effort` above 1."""
     token = _LIMITS.set(limits := Limits(units_at(effort, 1.0)))
     try:
         yield limits
@@ -60,10 +60,10 @@ def limited(effort: int) -> Iterator[Limits]:
 
 
 def check_limits(terms: int, products: int = 0) -> None:
-    """Check the size of one side of an identity: its number of terms, and the products of terms that it takes.
+    """Check the size of one side of an identity: its number of terms, and the number of products of terms to expand it.
 
     Raises:
-        InputError: if these are too many.
+        InputError: if one of these numbers exceeds its limit.
     """
     limits = _LIMITS.get()
     limits.terms += terms
@@ -76,15 +76,15 @@ def check_limits(terms: int, products: int = 0) -> None:
 
 
 class FalseClaim(InputError):
-    """A claim for which no certificate exists, as an exact computation refutes it."""
+    """A claim that an exact computation refutes, so that no certificate exists."""
 
 
 @dataclass(frozen=True)
 class MapData:
     """A map by its equation: `rows` of (M | r), polynomials over Z in `names`: the variables, the symbols and eps.
 
-    `new` are names for the coordinates of x~. The solution x~ = N/D is computed on demand. Raises InputError if it is
-    long.
+    `new` are names for the coordinates of x~. The solution x~ = N/D is computed when it is first used. Raises
+    InputError if the solution is too long.
     """
 
     variables: tuple[str, ...]
@@ -99,7 +99,7 @@ class MapData:
 
     @cached_property
     def solution(self) -> tuple[fmpq_mpoly, ...]:
-        """D = det M, then N = adj(M) r."""
+        """D = det M, followed by N = adj(M) r."""
         return tuple(self._solved([row[-1] for row in self.rows]))
 
     @property
@@ -131,11 +131,11 @@ class MapData:
 
     @property
     def two_points(self) -> tuple[str, ...]:
-        """The variables of x and of x~, and the constants."""
+        """The names for x and x~, and the constants."""
         return (*self.variables, *self.new, *self.names[self.dim :])
 
     def residual(self, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
-        """M(x) y - r(x) in the ring of the names, where x begins at the letter with index `first`, y at `second`."""
+        """Return M(x) y - r(x) in the ring of `names`; x begins at the name with index `first`, y at `second`."""
         n, context = self.dim, ring(names)
         letters = context.gens()
         constants = letters[len(names) - len(self.names) + n :]
@@ -146,7 +146,7 @@ class MapData:
         return result
 
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
-        """The functions of x as functions of x and of x~, in the ring of `derivative`."""
+        """Return functions of x, evaluated at x and at x~, in the ring of `derivative`."""
         n, context = self.dim, ring(self.two_points)
         letters = context.gens()
         points = letters[:n], letters[n : 2 * n]
@@ -154,42 +154,42 @@ class MapData:
         return at_old, at_new
 
     def with_rows(self, rows: Sequence[Row]) -> MapData:
-        """The map in the same letters whose equation has the rows of (M | -r)."""
+        """Return the map in the same variables whose equation has the rows of (M | -r)."""
         return map_data([[*row[:-1], -row[-1]] for row in rows], self.variables, self.new, self.names)
 
     def _solved(self, right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """Det M and det M times the solution of M y = right: (M | right) annihilates (y, -1)."""
+        """Return det M, and det M times the solution y of M y = right, from minors: (M | right) annihilates (y, -1)."""
         n = self.dim
         rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right, strict=True)]
         *minors, last = kernel_minors(rows, times)
-        sign = -1 if n % 2 else 1  # the last of the signed minors is (-1)^n det M
+        sign = -1 if n % 2 else 1  # the last signed minor is (-1)^n det M
         return [sign * last, *(-sign * minor for minor in minors)]
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim with its name, about a map."""
+    """A claim about a map, and its name."""
 
     name: str
     data: MapData
 
     @property
     def is_at_image(self) -> bool:
-        """Whether the proof inserts x~ = N/D; False if the identity holds for any two points."""
+        """Whether the proof inserts x~ = N/D; False if the identity holds for arbitrary points x and x~."""
         return not getattr(self, "is_free", False)
 
 
 class EquationClaim(Claim):
-    """A claim that follows from the equation of the map without solving it for x~."""
+    """A claim that follows from the equation of the map, without solving the equation for x~."""
 
     is_free = True
 
 
 @dataclass(frozen=True)
 class InvariantTensor(Claim):
-    """A Poisson tensor (P_ij)/Q with Q(x~) L P(x) L^T = Q(x) M P(x~) M^T; the entries above the diagonal by (i, j).
+    """A Poisson tensor (P_ij)/Q with Q(x~) L P(x) L^T = Q(x) M P(x~) M^T; P_ij with i < j are stored by (i, j).
 
-    `is_free`: the identity holds for any two points.
+    `is_free`: whether the identity holds for arbitrary points x and x~.
     """
 
     upper: dict[tuple[int, int], fmpq_mpoly]
@@ -203,7 +203,7 @@ class InvariantTensor(Claim):
         return self.data.dim
 
     def entry(self, i: int, j: int) -> fmpq_mpoly:
-        """P_ij."""
+        """Return P_ij."""
         return self.upper[i, j] if i < j else -self.upper[j, i] if j < i else self.denominator * 0
 
     @property
@@ -215,30 +215,30 @@ class InvariantTensor(Claim):
 def map_data(
     equation: Sequence[Sequence[fmpq_mpoly]], variables: Sequence[str], new: Sequence[str], names: Sequence[str]
 ) -> MapData:
-    """The map given by the rows of (M | r), over Z and without common factors.
+    """Return the map with the rows of (M | r), made integral and divided by their common factors.
 
     Args:
         equation: n rows of n + 1 polynomials over Q in `names`.
         variables: the first n of `names`.
-        new: names for x~.
+        new: names for the coordinates of x~.
         names: the variables, the symbols and eps.
 
     Raises:
-        InputError: for more than six variables.
+        InputError: if there are more than six variables.
     """
     n = len(variables)
     if n > MAX_DIMENSION:
         raise InputError(f"expected a map in at most {MAX_DIMENSION} variables for a certificate, got {n}")
     multiples = (lcm(*(int(common_denominator(entry)) for entry in row)) for row in equation)
     rows = [[entry * multiple for entry in row] for row, multiple in zip(equation, multiples, strict=True)]
-    commons = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic: the quotients are over Z again after the next line
+    commons = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic; the next line makes the quotients integral again
     primitive = (common * common_denominator(common) for common in commons)
     divided = tuple(tuple(entry / c for entry in row) for row, c in zip(rows, primitive, strict=True))
     return MapData(tuple(variables), tuple(new), tuple(names), divided)
 
 
 def restricted(data: MapData, function: RationalFunction) -> MapData:
-    """The map of the least set of variables that determines the function along orbits, such as those of one plane."""
+    """Restrict the map to the fewest variables that determine the function along orbits, such as those of one plane."""
     n, names = data.dim, data.names
     used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
     while True:
@@ -259,10 +259,10 @@ def restricted(data: MapData, function: RationalFunction) -> MapData:
 
 
 def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalFunction]]) -> InvariantTensor:
-    """The identities that prove that the map is Poisson for a tensor, and the Jacobi identity.
+    """Return the identities that prove that a tensor is invariant under the map and satisfies the Jacobi identity.
 
     Raises:
-        FalseClaim: if one of them does not hold.
+        FalseClaim: if an identity does not hold.
         InputError: if an identity has too many terms.
     """
     n, context = data.dim, ring(data.names)
@@ -297,7 +297,7 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
 
 
 def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fmpq_mpoly]:
-    """The entries above the diagonal of factor A P A^T."""
+    """Return the entries of factor A P A^T with i < j."""
     n = len(P)
     zero = factor * 0
     AP = [[sum((times(row[k], P[k][j]) for k in range(n)), zero) for j in range(n)] for row in A]
@@ -306,7 +306,7 @@ def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fm
 
 
 def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
-    """D L(x, N/D), a matrix of polynomials, since L has degree at most 1 in x~."""
+    """Return D L(x, N/D), a matrix of polynomials, since L has degree at most 1 in x~."""
     n, context = data.dim, ring(data.names)
 
     def at_image(entry: fmpq_mpoly) -> fmpq_mpoly:
@@ -320,14 +320,14 @@ def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
 
 
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
-    """The determinant of a square matrix of polynomials. Raises InputError where it has too many terms."""
+    """Return the determinant of a square matrix of polynomials. Raises InputError if it has too many terms."""
     *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], times)
     signed: fmpq_mpoly = -last if len(matrix) % 2 else last  # the last of the signed minors
     return signed
 
 
 def letters_of(data: MapData, taken: str) -> dict[str, str]:
-    """Return names for the letters of a map in a script: x, x1, x1_new and eps stay as they are, others become v_NAME.
+    """Return names for the letters of a map in a script: x, x1, x1_new and eps do not change, others become v_NAME.
 
     `taken` is a regular expression for the names that the script itself defines.
     """
@@ -342,7 +342,7 @@ def letters_of(data: MapData, taken: str) -> dict[str, str]:
 
 
 def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmpq_mpoly:
-    """D^degree P(N/D), a polynomial. Raises InputError where it has too many terms."""
+    """Return D^degree P(N/D), a polynomial. Raises InputError if it has too many terms."""
     n, context, values = data.dim, ring(data.names), (*data.numerators, data.determinant)
     powers = [[value**0] for value in values]
     total, products = context.constant(0), 0
@@ -359,12 +359,12 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
 
 
 def occurring(polynomial: fmpq_mpoly) -> set[str]:
-    """The names that occur in the polynomial."""
+    """Return the names that occur in a polynomial."""
     return set(polynomial.context().names()) - set(polynomial.unused_gens())
 
 
 def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Return numerator and denominator in lowest terms, with integral coefficients, in `names`."""
+    """Return numerator and denominator in lowest terms, over Z, in the ring of `names`."""
     context = ring(names)
     P, Q = function.numerator, function.denominator
     if function.names != names:
@@ -381,13 +381,13 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
 
 
 def quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:
-    """product/factor, or None if it is not a polynomial."""
+    """Return product/factor, or None if it is not a polynomial."""
     quotient, remainder = divmod(product, factor)
     return None if remainder else quotient
 
 
 def times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
-    """The product. Raises InputError where it has too many terms."""
+    """Return the product. Raises InputError if it has too many terms."""
     product = left * right
     check_limits(len(product))
     return product

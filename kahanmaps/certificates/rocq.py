@@ -1,7 +1,7 @@
-"""A certificate for Coq 8.16 or newer (Rocq), with the standard library alone.
+"""A certificate for Coq 8.16 or newer (Rocq); it needs only the standard library.
 
 The theorems are stated for real numbers: for every point x, every x~ with M x~ = r and det M not 0, and all parameters
-and eps. Cramer's rule gives (det M) x~ = N, and `ring` proves identities of polynomials; no step is a search.
+and eps. Cramer's rule gives (det M) x~ = N, and `ring` proves polynomial identities; no step needs a search.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ Qed.
 
 
 class _Script:
-    """The lines of a script about one map, and the names that its letters have in it."""
+    """The lines of a script about one map, and the script's names for the variables and constants of the map."""
 
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
-        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are the script's own
+        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are defined by the script itself
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         self.third = [self.letters[f"{name}2"] for name in data.new]
@@ -58,16 +58,16 @@ class _Script:
 
     @property
     def cramer(self) -> str:
-        """The tactic that rewrites every coordinate of x~ by Cramer's rule."""
+        """Return the tactic that rewrites every coordinate of x~ by Cramer's rule."""
         return ", ".join(f"?cramer{i + 1}" for i in range(self.data.dim))
 
     def text(self, polynomial: fmpq_mpoly) -> str:
-        """The polynomial in Coq's syntax."""
+        """Return the polynomial in Coq's syntax."""
         letters = [self.letters[name] for name in names_of(polynomial)]
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """The text of det(M) x~: the letters of N, or the products, which Cramer's rule rewrites to N."""
+        """Return the text of det(M) x~: the names of N, or products that Cramer's rule rewrites to N."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
 
     @property
@@ -77,11 +77,11 @@ class _Script:
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
     def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
-        """Return definitions of functions of the same arguments."""
+        """Return definitions of functions with the same arguments."""
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
-        """The equation of the map as a relation between any two points, with the residuals e1, e2, ..."""
+        """Define the equation of the map as a relation between arbitrary points, with the residuals e1, e2, ..."""
         rows, arguments = (data or self.data).rows, " ".join([*self.old, *self.new])
         lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
         for i, row in enumerate(rows):
@@ -92,7 +92,7 @@ class _Script:
         return [*lines, f"Definition {relation} ({arguments} : R) : Prop := {equations}."]
 
     def unique(self, letter: str, data: MapData) -> list[str]:
-        """The lemma that a point has one image where det M is not 0, by the adjugates of the blocks of M."""
+        """State the lemma that a point with det M not 0 has one image; the proof uses adjugates of the blocks of M."""
         x, y, z = self.x, self.y, self.z
         goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
         one = ring(data.names).constant(1)
@@ -125,7 +125,7 @@ class _Script:
         return [*lines, "Qed."]
 
     def chain(self, claim: Chain, theorem: str) -> list[str]:
-        """The theorem that two points at the ends of chains of images are equal."""
+        """State the theorem that the last points of two chains of images are equal."""
         n, lines = self.data.dim, list[str]()
         for letter, data in claim.maps.items():
             lines += [*self.predicate(letter, f"{letter}_maps", data), *self.unique(letter, data)]
@@ -188,7 +188,7 @@ class _Script:
     def _without_denominators(
         self, polynomial: fmpq_mpoly, numerators: Sequence[str], denominators: Sequence[str]
     ) -> tuple[str, str]:
-        """The value of a polynomial at fractions, as a numerator and a product of powers of denominators."""
+        """Return the value of a polynomial at fractions as a numerator and a product of powers of denominators."""
         distinct = [q for q in dict.fromkeys(denominators) if q]
         count = len(numerators)
         constants = [self.letters[name] for name in names_of(polynomial)[count:]]
@@ -205,12 +205,12 @@ class _Script:
         return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
-        """The pattern that splits the hypothesis `maps` into its parts: (A1 & A2)."""
+        """Return the pattern that splits the hypothesis `maps` into its parts: (A1 & A2)."""
         names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
         return f"({' & '.join(names)})" if len(names) > 1 else names[0]
 
     def along_orbit(self, claim: OrbitIntegral, theorem: str) -> list[str]:
-        """The theorem that a function of x and x~ has the same value one step later."""
+        """State the theorem that a function of x and x~ has the same value one step later."""
         n = self.data.dim
         x, y, z = self.x, self.y, self.z
         residuals = [f"e{i + 1}" for i in range(n)]
@@ -235,7 +235,7 @@ class _Script:
         ]
 
     def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
-        """The theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
+        """State the theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
         n, is_own = self.data.dim, claim.target is claim.data
         x, y = self.x, self.y
         polynomials = self.data.at_points(*claim.image)
@@ -264,7 +264,7 @@ class _Script:
         return [*lines, "Qed."]
 
     def changed(self, claim: ChangedFunction, theorem: str) -> list[str]:
-        """The theorem that a function of x is another function of z, x = T z."""
+        """State the theorem that a function of x = T z equals another function of z."""
         z, names = self.x, ("num", "den", "num_z", "den_z")
         at = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
         return [
@@ -275,7 +275,7 @@ class _Script:
         ]
 
     def expand(self, *further: str) -> str:
-        """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
+        """Return the tactic that unfolds all definitions and proves a polynomial identity."""
         n = self.data.dim
         defined = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
@@ -285,7 +285,7 @@ class _Script:
         return f"{first}rewrite ?det_value; cbv delta [{' '.join(('d', *defined))}] beta; ring."
 
     def map(self, is_solved: bool) -> list[str]:
-        """The variables, the equation, and Cramer's rule where it is needed."""
+        """Write the variables, the equation of the map, and Cramer's rule if it is needed."""
         data, n = self.data, self.data.dim
         self.is_solved = is_solved
         lines = [
@@ -326,9 +326,9 @@ class _Script:
         return lines
 
     def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str = "", *also: str) -> list[str]:
-        """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value.
+        """State the lemma det^degree P(x~) = value, where `label` is the name of P; `also`: definitions in the value.
 
-        The default of the value is the homogenized P at N and det.
+        By default the value is the homogenized P at N and det.
         """
         n = self.data.dim
         constants = [self.letters[name] for name in self.data.names[n:]]
@@ -347,9 +347,9 @@ class _Script:
         ]
 
     def products(self, fraction: DarbouxProducts, *named: tuple[str, str]) -> list[str]:
-        """Definitions of the products, and the lemmas that the map multiplies these by their cofactors.
+        """Define the products of Darboux polynomials, and state the lemmas that the map multiplies them by cofactors.
 
-        `named` are the names of each product and of its cofactor.
+        `named` contains for each product its name and the name of its cofactor.
         """
         old, new, k = self.x, self.y, fraction.degree
         lines = [f"Definition c{j} : R := {self.text(c)}." for j, c in enumerate(fraction.letters, 1)]
@@ -383,7 +383,7 @@ class _Script:
         return lines
 
     def conserved(self, claim: ConservedFunction, theorem: str) -> list[str]:
-        """The theorem that the function has the same value at x and x~."""
+        """State the theorem that a function has the same value at x and x~."""
         old, new, k = self.x, self.y, claim.fraction.degree
         lines = [
             "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
@@ -401,7 +401,7 @@ class _Script:
         return lines
 
     def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
-        """The theorem that P(x~) is P(x) times the cofactor."""
+        """State the theorem that P(x~) is P(x) times the cofactor."""
         old, new, k = self.x, self.y, claim.product.degree
         return [
             "(* A Darboux polynomial, with its cofactor over a power of det. *)",
@@ -414,7 +414,7 @@ class _Script:
         ]
 
     def derivative(self) -> tuple[list[str], str]:
-        """The definitions of l11, l12, ..., the entries of L, and the list of these names."""
+        """Return the definitions of l11, l12, ..., the entries of L, and these names."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
         flat = [entry for row in self.data.derivative for entry in row]
@@ -432,9 +432,9 @@ class _Script:
         return lines, " ".join(names)
 
     def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
-        """The lemma that d, with this name, is a derivative: P(x + t e_s) = P(x) + t d + t^2 times a polynomial."""
+        """State the lemma that d (called `name`) is a derivative: P(x + t e_s) = P(x) + t d + t^2 (polynomial)."""
         names, spare, old = names_of(P), "t_", " ".join(self.old)
-        context = ring((*names, "".join(names) + "_"))  # t may be a variable: a name longer than all others
+        context = ring((*names, "".join(names) + "_"))  # t may be a variable, so take a name longer than all others
         *letters, t = context.gens()
         moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
         at = [polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s))]
@@ -447,7 +447,7 @@ class _Script:
         ]
 
     def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
-        """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
+        """State the theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
         n, k, old, new = claim.dim, claim.degree, self.x, self.y
         lines, flat = self.derivative()
         lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
@@ -457,7 +457,7 @@ class _Script:
         names = " ".join(functions)
 
         def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
-            """The entry i, j of A T A^T den; entries of A are its letter in the form `times`, those of T in `form`."""
+            """Return entry i, j of A T A^T den; `times` formats the entries `letter` of A, `form` those of T."""
             a = [[times.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
             minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in pairs.items())
             return " + ".join(
@@ -502,7 +502,7 @@ class _Script:
     def jacobi(
         self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
     ) -> list[str]:
-        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3."""
+        """State the Jacobi identities for i < j < k: the cyclic sum over T_is d/dx_s T_jk, times den^3, is 0."""
         old, lines = self.x, list[str]()
         for name, P in functions.items():
             for s in range(claim.dim):
@@ -526,7 +526,7 @@ class _Script:
         return lines
 
     def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
-        """The theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
+        """State the theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
         n, old, new = self.data.dim, self.x, self.y
         lines, flat = self.derivative()
         lines += [
@@ -549,7 +549,7 @@ class _Script:
             lines += self.functions(old, num=claim.numerator, den=claim.denominator)
             return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
         lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
-        # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
+        # Each row of L has degree 1 in x~, so det^n det L is a determinant whose rows contain det and det x~.
         scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
         common, left, right = map(_monomial_text, claim.balance)
         used, k = [f"c{j}" for j in range(1, len(claim.fraction.letters) + 1)], claim.fraction.degree
@@ -591,7 +591,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
     lines += [LIBRARY] if any(isinstance(claim, PositiveEntropy) for claim in claims) else []
-    groups: dict[tuple[int, ...], list[Claim]] = {}  # by map: its equation and Cramer's rule are stated once
+    groups: dict[tuple[int, ...], list[Claim]] = {}  # grouped by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
         own = k if isinstance(claim, Chain) else 0
         groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
@@ -630,9 +630,9 @@ _PROOFS: dict[type[Claim], tuple[Any, str]] = {
 
 
 def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> list[str]:
-    """The statements that are not `known`; a statement whose name is taken by another one gets the ending.
+    """Return the statements that are not `known`; `ending` is appended to a name that another statement already has.
 
-    A statement uses earlier ones only, so that a new name is known before it is used.
+    A statement uses earlier statements only, so that a changed name is known before it is used.
     """
     statements, renamed = list[str](), dict[str, str]()
     for line in lines:
@@ -666,17 +666,17 @@ def _power(exponent: int) -> str:
 
 
 def entries(letter: str, n: int) -> list[list[str]]:
-    """The names of the entries of a square matrix."""
+    """Return the names of the entries of an n x n matrix, such as a11, a12, ..."""
     return [[f"{letter}{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
 
 
 def powers_text(letters: Iterable[str], exponents: Iterable[Any], power: str = " ^ ") -> list[str]:
-    """The powers of the letters that are not 1."""
+    """Return the text of the powers of the letters with nonzero exponents."""
     return [name if k == 1 else f"{name}{power}{k}" for name, k in zip(letters, exponents, strict=True) if k]
 
 
 def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str = " * ", power: str = " ^ ") -> str:
-    """A polynomial with integral coefficients in the letters, as sums of products."""
+    """Return the text of a polynomial with integer coefficients in `letters`, as a sum of products."""
     pieces: list[str] = []
     for exponents, coefficient in polynomial.terms():
         factors = powers_text(letters, exponents, power)
@@ -688,7 +688,7 @@ def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str =
 
 
 def determinant_text(entries: Sequence[Sequence[str]]) -> str:
-    """The determinant of a matrix of texts, expanded along its first row."""
+    """Return the determinant of a matrix of texts, expanded along the first row."""
     if len(entries) == 1:
         return entries[0][0]
     pieces: list[str] = []
@@ -703,7 +703,7 @@ def determinant_text(entries: Sequence[Sequence[str]]) -> str:
 def _homogeneous_text(
     polynomial: fmpq_mpoly, letters: Sequence[str], degree: int, image: slice, det: str = "det ^ {}"
 ) -> str:
-    """det^degree P with (det x~)/det for x~: in the slice `image`, `letters` holds det x~, or N.
+    """Return det^degree P with (det x~)/det for x~; `letters` contains det x~, or N, in the slice `image`.
 
     Terms with the same powers of x~ are collected, so that `ring` computes each product of powers of N once.
     """
@@ -722,7 +722,7 @@ def _homogeneous_text(
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
-    """det times an entry of L, which has degree at most 1 in x~, with det(M) x~ (or N) in place of x~."""
+    """Return det times an entry of L (of degree at most 1 in x~), with det(M) x~, or N, in place of x~."""
     letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
     letters[image] = script.image_letters(at_n)
     return _homogeneous_text(entry, letters, 1, image, "det")

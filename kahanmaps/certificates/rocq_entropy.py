@@ -1,8 +1,8 @@
-"""The part of a certificate for Coq that is about positive entropy: polynomials as lists of terms, and one axiom.
+"""The part of a certificate for Coq about positive entropy, with polynomials as lists of terms, and one axiom.
 
 The axiom is the theorem of docs/mathematics.md, section "Positive entropy, proved in the plane", with the estimates of
-`entropy`: the degree of the n-th iterate from above by forms, that of the 2n-th from below by the image of a line
-modulo a prime, which Coq computes. Its hypotheses are proved, and its conclusion is about the degrees of all iterates.
+`entropy`: the degree of the n-th iterate is bounded above by forms, that of the 2n-th iterate below by the image of a
+line modulo a prime, which Coq computes. The script proves the hypotheses; the conclusion is about degrees of iterates.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ Axiom degrees_grow_exponentially : forall (F B G : triple) (g : form) (n d : nat
 
 
 def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator[str]:
-    """The lines that prove the hypotheses of the axiom; `script` is that of the map."""
+    """Yield the lines that prove the hypotheses of the axiom; `script` is the script about the map."""
     n, prime = len(claim.forms), _prime_for(claim)
     x, y, eps = (script.letters[name] for name in (*script.data.variables, script.data.names[-1]))
     for k, (triple, factor) in enumerate(zip(claim.forms, claim.factors, strict=True), 1):
@@ -171,13 +171,13 @@ def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator
 
 
 def _form(polynomial: fmpq_mpoly) -> str:
-    """A polynomial in x, y, eps and the last letter h as a list of terms."""
+    """Return a polynomial in x, y, eps and the homogenizing variable h as a list of terms."""
     terms = [(int(c.p), tuple(map(int, e))) for e, c in polynomial.terms()]
     return f"[{'; '.join(f'T ({c}) {e[0]} {e[1]} {e[-1]} {e[-2]}' for c, e in terms)}]"
 
 
 def _nonzero(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
-    """The lemma that a polynomial is not 0, at a point with small coordinates."""
+    """Yield the lemma that a polynomial is not 0, since its value is not 0 at a point with small coordinates."""
     for x, y, h, e in product(range(1, polynomial.total_degree() + 2), repeat=4):
         if value := polynomial(x, y, e, h):
             yield f"Lemma {name}_nonzero : nonzero {name}. Proof. exists {x}, {y}, {h}, {e}."
@@ -187,7 +187,7 @@ def _nonzero(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
 
 
 def _prime_for(claim: PositiveEntropy) -> int:
-    """A small prime at which the image of the line has the same degree as modulo the prime of the claim."""
+    """Return a small prime for which the image of the line has the same degree as for the prime of the claim."""
     for prime in islice((p for p in count(1009, 2) if fmpz(p).is_prime()), _MOST_PRIMES):
         if image_degree(claim.forms[0], 2 * len(claim.forms), prime) == claim.line_degree:
             return prime

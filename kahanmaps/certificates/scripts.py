@@ -1,8 +1,8 @@
 """Certificates for PARI/GP and for SymPy: each identity is expanded, and `true` is printed if it holds.
 
-The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it
-computes the polynomial D^k P(N/D) and compares it with C P. It ends with status 1 if an identity does not hold. Both
-languages get functions with the same names, so that the text of the checks differs only in the sign of powers.
+The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D if det M is not 0. Then it computes
+the polynomial D^k P(N/D) and compares it with C P. It ends with status 1 if an identity does not hold. Both languages
+get functions with the same names, so that the text of the checks differs only in the notation of powers.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _PARI_TOOLS = {
     "transposed": "transposed(A) = A~;",
     "scale": "scale(c, A) = c*A;",
     "act": "act(A, v) = (A*v~)~;",
-    "dot": "dot(v, w) = v*w~;",  # concat is a function of PARI
+    "dot": "dot(v, w) = v*w~;",  # no definition of concat follows: it is a function of PARI
     "derivative": "derivative(v, letters) = matrix(#v, #letters, i, j, deriv(v[i], letters[j]));",
     "bracket": """\
 bracket(P, Q, i, j, k) = {  \\\\ Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
@@ -193,7 +193,7 @@ _NEEDS = {"act": ("dot",), "images": ("image",)}
 
 @dataclass(frozen=True)
 class Language:
-    """How a program writes powers, definitions, vectors, matrices, comments, and the functions of the checks."""
+    """The syntax of a program for powers, definitions, vectors, matrices and comments, and its functions for checks."""
 
     start: str
     tools: dict[str, str]
@@ -227,7 +227,7 @@ class _Script:
         self.letters = letters_of(data, r"[hijknpqrst]|c\d+") | {homogenizing(data.names): "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
-        """The text of a polynomial; a long sum is split, since Python does not parse expressions of a great depth."""
+        """Return the text of a polynomial; a long sum is split, since Python cannot parse very deep expressions."""
         letters = [self.letters[name] for name in names_of(polynomial)]
         text = polynomial_text(polynomial, letters, "*", self.to.power)
         terms = re.split(r" (?=[+-] )", text)
@@ -235,35 +235,35 @@ class _Script:
         return text if self.to is GP or len(parts) == 1 else f"sum([{', '.join(parts)}])"
 
     def vector(self, entries: Sequence[fmpq_mpoly]) -> str:
-        """A vector."""
+        """Return the text of a vector of polynomials."""
         return self.to.vector.format(", ".join(map(self.text, entries)))
 
     def matrix(self, rows: Sequence[Sequence[str]]) -> str:
-        """A matrix of texts."""
-        if len(rows) == 1 and self.to is GP:  # [a] would be a vector
+        """Return the text of a matrix whose entries are texts."""
+        if len(rows) == 1 and self.to is GP:  # in GP, [a] would be a vector
             return f"Mat({rows[0][0]})"
         return self.to.matrix.format(self.to.next_row.join(", ".join(row) for row in rows))
 
     def polynomials(self, rows: Sequence[Sequence[fmpq_mpoly]]) -> str:
-        """A matrix of polynomials."""
+        """Return the text of a matrix of polynomials."""
         return self.matrix([[self.text(entry) for entry in row] for row in rows])
 
     def define(self, name: str, text: str) -> None:
-        """A definition; the text is a polynomial or any other expression."""
+        """Append a definition; `text` is a polynomial or any other expression."""
         self.lines.append(self.to.definition.format(name, text))
 
     def polynomial(self, name: str, polynomial: fmpq_mpoly) -> None:
-        """The definition of a polynomial."""
+        """Append the definition of a polynomial."""
         self.define(name, f"({self.text(polynomial)})" + " * one" * (self.to is PYTHON))
 
     def check(self, label: str, identity: str) -> None:
-        """A check; ^ stands for a power."""
+        """Append a check of an identity, in which ^ stands for a power."""
         identity = identity.replace("^", self.to.power)
         identity = identity.replace("&&", "and") if self.to is PYTHON else identity
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
 
     def begin(self, claim: Claim, count: int) -> None:
-        """The map of the claim, unless the previous claim has the same map, and the letters of points."""
+        """Append the map of the claim (unless the previous claim has the same map) and the names of points."""
         if claim.data is not self.data or not self.has_points:
             self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
             self.points(count)
@@ -276,7 +276,7 @@ class _Script:
         self.lines.append("")
 
     def points(self, count: int) -> None:
-        """The letters of x, x~ and, if requested, of the image of x~."""
+        """Append the names for x, x~ and, for `count` 3, the image of x~."""
         self.define("n", str(self.data.dim))
         points = {"old": self.data.variables, "new": self.data.new, "third": [f"{name}2" for name in self.data.new]}
         for name, letters in [*points.items()][:count]:
@@ -290,14 +290,14 @@ class _Script:
         self.lines[-1] += f"  {self.to.comment}0 where new is the image of old"
 
     def solution(self) -> None:
-        """N and D."""
+        """Append the definitions of N and D."""
         self.define("N", self.vector(self.data.numerators))
         self.polynomial("D", self.data.determinant)
         self.check("D is not 0", "D != 0")
         self.check("M N = D r", "act(M, N) == scale(D, r)")
 
     def claim(self, claim: Claim) -> None:
-        """The statement of a claim, and its proof."""
+        """Append the statement of a claim, and its proof."""
         label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
         self.lines.append(f"{self.to.comment}{label}: {_SAYS[type(claim)]}")
         self.prove(claim, label)
@@ -305,7 +305,7 @@ class _Script:
 
     @singledispatchmethod
     def prove(self, claim: Claim, label: str) -> None:
-        """The definitions and checks of a claim."""
+        """Append the definitions and checks of a claim."""
         raise NotImplementedError(type(claim))
 
     @prove.register
@@ -326,7 +326,7 @@ class _Script:
             says = f"det M is not 0 at point {source}"
             eps = self.letters[self.data.names[-1]]
             determinant = claim.maps[letter].determinant
-            if determinant.subs({"eps": 0}).is_constant():  # a Kahan map: det M is 1 at eps = 0, wherever it is taken
+            if determinant.subs({"eps": 0}).is_constant():  # det M of a Kahan map is 1 at eps = 0, at every point
                 self.check(f"{says}, as eps -> 0", f"put(det(M{letter}), [{eps}], [0*{eps}]) != 0")
                 self.check(f"point {source} is defined as eps -> 0", f"put(product({Q}), [{eps}], [0*{eps}]) != 0")
             else:
@@ -349,9 +349,9 @@ class _Script:
         self.products(claim.product, label, "P", [0])
 
     def products(self, fraction: DarbouxProducts, label: str, names: str, powers: Sequence[int]) -> list[str]:
-        """Each product with its identities, factor by factor; returns D^power P(N/D)/P for these powers.
+        """Append each product with its identities, factor by factor; return D^power P(N/D)/P for the given powers.
 
-        The exponents of a product are stated once, so that the checks depend on them.
+        The exponents of a product are written only once, so that all checks depend on the same exponents.
         """
         for j, letter in enumerate(fraction.letters, 1):
             self.polynomial(f"c{j}", letter)
@@ -381,7 +381,7 @@ class _Script:
         return cofactors
 
     def derivative(self, label: str) -> None:
-        """L, the derivative of r - M x~ in x at fixed x~; that of the map is M^-1 L."""
+        """Append L, the derivative of r - M x~ in x at fixed x~; the derivative of the map is M^-1 L."""
         self.define("L", self.polynomials(self.data.derivative))
         self.check(f"{label}: L is the derivative of r - M x~ in x", "derivative(scale(-1, E), old) == L")
 
@@ -456,7 +456,7 @@ class _Script:
 
     @prove.register
     def entropy(self, claim: PositiveEntropy, label: str) -> None:
-        """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
+        """Append the forms F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
         comment = self.to.comment
         n, x, y = len(claim.forms), *(self.letters[name] for name in self.data.variables)
         self.lines += [
@@ -492,24 +492,24 @@ class _Script:
         self.check(says, f"low > 1 && low^{n} + 1/low^{n} + 2 < {bound}")
 
     def number(self, value: Fraction) -> str:
-        """A rational number."""
+        """Return the text of a rational number."""
         text = f"{value.numerator}, {value.denominator}"
         return text.replace(", ", "/") if self.to is GP else f"QQ({text})"
 
     def fraction(self, claim: InvariantVolume | OrbitIntegral) -> None:
-        """The numerator P and the denominator Q."""
+        """Append the numerator P and the denominator Q."""
         self.polynomial("P", claim.numerator)
         self.polynomial("Q", claim.denominator)
         self.check("Q is not 0", "Q != 0")
 
 
 def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
-    """Write a script that expands the identities of the claims and compares both sides.
+    """Write a script that expands the identities of the claims and compares their two sides.
 
     Args:
         to: the language: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         claims: the statements to be checked.
-        header: the lines of the initial comment.
+        header: the lines of the comment at the beginning.
     """
     data = max((claim.data for claim in claims), key=lambda data: data.dim)
     script = _Script(to, data)

@@ -1,9 +1,9 @@
 """Certification of identities: by a theorem, by expansion, at random points, and along an exact orbit.
 
-Proof and experiment are independent: a proved claim that fails at a point shows an error in this program, and is
-reported as such. A false claim may pass at random points, with a probability that the evidence bounds. If both sides
-can be expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) also runs over
-the field of rational functions, within a budget of products of terms.
+Proof and experiment are independent: if a proved claim fails at a point, this program contains an error, and reports
+it as such. A false claim may pass at random points, with a probability that the evidence bounds. If both sides can be
+expanded, the expansion decides. It uses the code that evaluates an identity at points over Q and GF(p), over the field
+of rational functions, within a budget of products of terms.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
 METHOD = "expansion"
-# In larger dimensions the budget is never sufficient.
+# Above this dimension the budget never suffices for an expansion.
 MAX_DIMENSION = 6
 
 
@@ -50,8 +50,8 @@ def certify(
         proof: the evidence of a theorem that implies the claim; without it, the identity is expanded if possible.
         orbit: an exact orbit along which the identity is tried as well.
         formula, source: the formula and its reference, for the report.
-        control: whether the claim is expected to be refuted; then it is not expanded.
-        certified: the arguments of `certificate` for the claim.
+        control: whether the claim is a control, i.e. expected to be refuted; a control is not expanded.
+        certified: the arguments with which `certificate` writes a proof of the claim.
 
     Returns:
         The finding: proved by the theorem or by expansion, otherwise supported, refuted (with a witness) or undecided.
@@ -66,7 +66,7 @@ def certify(
         if decision.verdict is Certainty.REFUTED:
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
         if decision.evidence.data.get("poles_met") and decision.verdict is Certainty.UNDECIDED:
-            # A theorem on a map that is defined nowhere, with det(I - eps f') = 0 for all x, says nothing.
+            # If det(I - eps f') = 0 for all x, the map is defined nowhere, and a theorem says nothing about it.
             verdict, evidence = decision.verdict, decision.evidence
             return Finding(claim, verdict, evidence, (), None, formula, source, control, certified=certified or {})
         verdict, evidence, witness = Certainty.PROVED, proof, None
@@ -101,17 +101,17 @@ class NotEqual(ArithmeticError):
 def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     """Expand both sides over the field of rational functions; return the evidence that they are equal.
 
-    `budget` bounds the number of products of terms; its default is smaller for long coefficients. Returns None if it is
-    exceeded. Raises NotEqual if the two sides differ.
+    `budget` bounds the number of products of terms; the default is smaller for long coefficients. Returns None if the
+    expansion exceeds the budget. Raises NotEqual if the two sides differ.
     """
     if budget is None:
         if identity.dim > MAX_DIMENSION:
             return None
-        # The time of a product grows faster than its bits once the numbers exceed the processor's caches.
+        # Once numbers exceed the processor's caches, the time of a product grows faster than their length.
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
         if identity.scales_with_eps:
-            budget *= 2  # dimension 6 is within reach, as the integrals of paper_m3: 130 million products
+            budget *= 2  # dimension 6 is feasible, as for the integrals of paper_m3: 130 million products
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
     modulus = None if identity.root is None else identity.root.polynomial.coeffs()
     if modulus is not None:
@@ -119,7 +119,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     field = FunctionField(names, budget, modulus=modulus)
     eps = field.variables[identity.dim] if identity.eps is None else field.convert(identity.eps)
     if identity.scales_with_eps:
-        eps = field.one  # x stands for eps x: one variable less
+        eps = field.one  # replace eps x by x, which saves one variable
     try:
         sides = identity.at(field, field.variables[: identity.dim], eps)
         if sides is None:
@@ -140,7 +140,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """Decide by expansion a claim that random points support; return `decision` for other claims and if this fails."""
+    """Decide a claim supported by random points by expansion; return `decision` otherwise, or if expansion fails."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

@@ -2,7 +2,7 @@
 
 `proved`: exact, for this system and every eps (or the given eps). `refuted`: there is a witness, a point at which the
 two sides differ. `supported`: the claim held at random points over GF(p), with a stated error bound, or along an orbit.
-`undecided`: the reason is given. Each claim has exactly one of these verdicts.
+`undecided`: neither proved, refuted nor supported; the reason is given. Each claim has exactly one of these verdicts.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart
 
 
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
-    """The certainty of a claim. `holds` is its truth value; `bool` of a certainty is an error.
+    """The certainty of a claim. `holds` is its truth value; `bool` of a certainty raises TypeError.
 
-    Checks return one of the first four. DERIVED means that the statement follows exactly from the measured singularity
-    patterns; NOTE marks a remark, which has no certainty.
+    Checks return one of the first four values. DERIVED means that the statement follows exactly from the measured
+    singularity patterns; NOTE marks a remark, which has no certainty.
     """
 
     PROVED = "proved"
     REFUTED = "refuted"
-    SUPPORTED = "supported"  # at random points, with a bound for the probability of an error
+    SUPPORTED = "supported"  # at random points, with a bound on the probability of an error
     UNDECIDED = "undecided"
     DERIVED = "derived"  # from the measured singularity patterns
     MEASURED = "measured"  # modulo primes, or on orbits
@@ -55,17 +55,17 @@ class Witness(ResultPart):
     """A point at which a claim fails: x and eps, and the two sides that should be equal, all as exact text."""
 
     point: tuple[str, ...]
-    eps: str | None  # None for a map that does not depend on it
+    eps: str | None  # None if the map does not depend on eps
     left: tuple[str, ...]
     right: tuple[str, ...]
     left_label: str
     right_label: str
     field: str = "QQ"
-    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # other choices (vectors, numbers), by name
+    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # further vectors and numbers, by name
 
     @property
     def text(self) -> str:
-        """The point and the two sides."""
+        """The point and the values of the two sides."""
         at = "" if self.eps is None else f", eps = {self.eps}"
         sides = f"{self.left_label} = {', '.join(self.left)}, {self.right_label} = {', '.join(self.right)}"
         return f"x = ({', '.join(self.point)}){at}: {sides}"
@@ -93,9 +93,9 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
     formula: str = ""
     source: str = ""
     control: bool = False
-    place: Mapping[str, Any] = field(default_factory=dict)  # the place of the claim, as plain data
-    applies: bool = True  # False: the claim is for generic input and this input is special; its verdict does not count
-    # The arguments of `certificate` for this claim, or `why_not`: the reason why there is none.
+    place: Mapping[str, Any] = field(default_factory=dict)  # where the claim is stated, as plain data
+    applies: bool = True  # False for special input, if the claim is for generic input; its verdict does not count then
+    # The arguments with which `certificate` proves this claim, or `why_not`: the reason why there is no certificate.
     certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -105,7 +105,7 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
 
     @property
     def is_as_expected(self) -> bool:
-        """Whether a control was refuted; true for claims that are not controls."""
+        """Whether a control was refuted; always true for claims that are not controls."""
         return not self.control or self.verdict is Certainty.REFUTED
 
     def to_json(self) -> dict[str, Any]:
@@ -140,8 +140,8 @@ class Report(PrintableResult):
     findings: tuple[Finding, ...]
     context: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-    ended_early: bool = False  # an orbit that the user requested could not be completed
-    certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # as in a finding
+    ended_early: bool = False  # whether an orbit requested by the user could not be completed
+    certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # as in `Finding`
 
     @property
     def verdict(self) -> Certainty:
@@ -154,7 +154,7 @@ class Report(PrintableResult):
         return self.verdict.holds
 
     def rows(self) -> list[dict[str, str]]:
-        """Return a row for each claim, for example for `pandas.DataFrame(report.rows())`."""
+        """Return one row for each claim, for example for `pandas.DataFrame(report.rows())`."""
         return [
             {
                 "claim": finding.claim,
@@ -181,7 +181,7 @@ class Report(PrintableResult):
 def combined(verdicts: Iterable[Certainty]) -> Certainty:
     """Return the weakest of several verdicts, in the order refuted, undecided, supported, proved.
 
-    Without verdicts the result is undecided.
+    For no verdicts the result is undecided.
 
     >>> combined([Certainty.PROVED, Certainty.SUPPORTED])
     <Certainty.SUPPORTED: 'supported'>

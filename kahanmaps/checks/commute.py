@@ -25,9 +25,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SOURCE = "petrera-suris-2016, Theorem 9"
 SAME_STEP = fmpq(1)
-# The number of pairs that are also tried along an orbit and at random points; the proof covers all pairs.
+# The number of pairs of maps tried along an orbit and at random points as well; the proof covers all pairs.
 _PAIRS_TRIED = 30
-_PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where one pair takes many seconds
+_PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one pair takes many seconds
 
 
 def commutativity(
@@ -39,7 +39,7 @@ def commutativity(
 ) -> Identity:
     """Return Phi_f o Phi_g = Phi_g o Phi_f as an identity.
 
-    A system stands for its Kahan map. The map of g is taken at `ratio` times the eps of f.
+    A system stands for its Kahan map. The map of g is taken at eps times `ratio`, where eps belongs to the map of f.
     """
     first_map, second_map = as_map(f), as_map(g)
 
@@ -61,7 +61,7 @@ def commutativity(
 def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
     """Raise InputError if the map is the identity (as for f = 0), which commutes with every map.
 
-    The identity x~ = x is tested at random points, with an error below 2^-100.
+    The equation x~ = x is tested at random points, with an error probability below 2^-100.
     """
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
@@ -90,10 +90,10 @@ def check_commute(
 
     Args:
         system, other: the two systems or maps; a system stands for its Kahan map. Without `other`, `system` must be a
-            member of the family, and its associated maps are checked pairwise. Then the maps of H_0 and H_1, with
-            grad H_1 = A grad H_0, serve as a control: in general they do not commute.
-        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps must be
-            given, too. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
+            member of the family, and its associated maps are checked pairwise. A control follows: the maps of H_0 and
+            H_1, where grad H_1 = A grad H_0, which in general do not commute.
+        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps must also
+            be given. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.
@@ -126,7 +126,7 @@ def check_commute(
         ratio = eps2 / settings.eps
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
         if second.is_quadratic and isinstance(g, KahanFamily):
-            # Its Kahan map depends only on the product eps g.
+            # The Kahan map of g depends only on the product eps g.
             g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
@@ -203,7 +203,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     if len(pairs) > tried:
         notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
-        # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
+        # If chi is irreducible, f_0 and -f_0 are the only rational associated systems: a map and its inverse.
         only, inverse = associates[0].system, associates[0].system.scaled(-1)
         findings.append(
             certified(
@@ -226,7 +226,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
         verdict = Certainty.UNDECIDED if proof is None else Certainty.PROVED
         findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
-    # The control: Phi_{H_0} with Phi_{H_1}; for m = 1, where there is no H_1, the map with itself at twice the step.
+    # The control: Phi_{H_0} and Phi_{H_1}. For m = 1 there is no H_1: the map at eps and the same map at 2 eps.
     f, *others = (CubicHamiltonian(H, standard_structure(member.dim)).system for H in member.chain[:2])
     g, claim, names = f.scaled(2), "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
     if member.m > 1:

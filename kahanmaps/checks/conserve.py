@@ -37,17 +37,17 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-# The largest number of integrals that are also tried along an orbit.
+# The largest number of integrals that are tried along an orbit as well.
 _TRIED = 32
-_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where one integral takes many seconds
+_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
 
 
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """Return I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
-    cached: list[Any] = []  # a cache: along an orbit I(x~) at one point is I(x) at the next
+    cached: list[Any] = []  # along an orbit, I(x~) at one point is I(x) at the next point
     in_iterates = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
-    if in_iterates is not None:  # x is the middle one of the points that the identity contains
+    if in_iterates is not None:  # x is the middle one of the points in the identity
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -70,7 +70,7 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-    """Return the integrals that follow from theorems for the system, each with its proof and source."""
+    """Return the integrals that theorems give for the system, each with its proof and source."""
     integrals: list[tuple[PhaseFunction, Evidence | None, str]] = []
     member = file.member
     if member is None:
@@ -80,8 +80,8 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
             if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
                 integrals.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
         return integrals
-    # The modified H, its multiple H~, K~_s for every rational associated system, and those of the commutant. If
-    # chi has many factors, the K~ with several minus signs are linear combinations of those listed.
+    # The modified H, its multiple H~, K~_s for every rational associated system, and integrals from the commutant. If
+    # chi has many factors, the K~_s with several minus signs are linear combinations of the listed ones.
     associates = theorems.listed_associates(member)
     base = associates[0]
     proof = theorems.shared_integral(member, base)
@@ -92,7 +92,7 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
         integrals.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    # m - 1 further integrals, which are rational even if chi has irrational roots and the K~_s are not.
+    # m - 1 further integrals. They are rational, even if chi has irrational roots and the K~_s are irrational.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
     for k in range(1, member.m):
@@ -112,10 +112,10 @@ def functions_along(
         requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
             or "known" for all integrals that follow from theorems or are claimed by the file.
         in_floats: whether the orbit is in floating point.
-        taken: the names of other columns.
+        taken: the names of further columns of the table.
 
     Raises:
-        InputError: if a name occurs twice or is taken, and for functions that cannot be evaluated in floats.
+        InputError: if a name occurs twice or is in `taken`, or if a function cannot be evaluated in floats.
     """
     file = file.real_approximation if in_floats else file
     functions: list[PhaseFunction] = []
@@ -163,11 +163,11 @@ def check_integrals(
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
-        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        settings: eps, seed, error bound and orbit. If it is omitted, `extra` may be the second argument.
         extra: the claimed integrals, rational functions of the variables and eps: one, a list, or a mapping by name, as
             functions, text or SymPy expressions; or names of integrals of the file. By default the integrals that
-            follow from theorems and those of the file.
-        known: whether to check these default integrals in addition to `extra`.
+            theorems give, and those of the file.
+        known: whether these default integrals are checked in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
@@ -217,7 +217,7 @@ def check_integrals(
             reason = Evidence(
                 "constant", f"it is a constant{at_eps}: every map conserves constants, so this is no integral"
             )
-            is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
+            is_claimed = isinstance(integral, ClaimedIntegral)  # integrals from theorems do not count
             finding = Finding(claim, Certainty.UNDECIDED, reason, **details, applies=is_claimed)
         elif proof is not None and k >= tried and file.dim > 16:
             finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **details)
@@ -238,13 +238,13 @@ def check_integrals(
 def _certified(
     file: SystemFile, integral: PhaseFunction, settings: Settings, claims: Mapping[str, RationalFunction]
 ) -> dict[str, Any]:
-    """The arguments of `certificate` for an integral."""
+    """The arguments with which `certificate` proves that an integral is conserved."""
     if isinstance(integral, ClaimedFunction):
         if integral.name in claims:
             return settings.certified(file, integrals={integral.name: claims[integral.name]})
         return settings.certified(file, claims=[integral.name])
     assert isinstance(integral, ImageFunction)
-    if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # that of an associated system
+    if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # integral of an associated system
         why = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
         return {"why_not": f"{why}: type km.certificate(system, checker)"}
     power = integral.power if isinstance(integral, CommutantIntegral) else 0
@@ -255,18 +255,18 @@ def _certified(
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2.
 
-    True is exact; False is also returned if the function is too long to expand.
+    The answer True is exact; False is also returned if the function is too long to expand.
     """
     if isinstance(integral, ClaimedIntegral):
         return integral.is_constant
     if not isinstance(integral, ImageFunction):
         return False
     H = integral.hamiltonian
-    if isinstance(integral, CommutantIntegral):  # it begins with -2 x^T J C f, and C f = 0 makes C (x~ - x) = 0
+    if isinstance(integral, CommutantIntegral):  # leading term -2 x^T J C f; if C f = 0, then C (x~ - x) = 0
         return all(f.is_zero() for f in linear_combinations(integral.matrix, H.system.rhs))
     if H.is_homogeneous or H.dim > MAX_DIMENSION:
-        return H.H.is_zero()  # it begins with a multiple of H
-    # Equal values at two points mean little; expanded it is exact.
+        return H.H.is_zero()  # its leading term is a multiple of H
+    # Equal values at two points would be weak evidence; expansion is exact.
     rng = random.Random(f"constant {derive_seed(settings.seed, integral.subject, settings.eps)}")
     field = random_prime_field(rng)
     try:

@@ -1,14 +1,14 @@
 """The Schwartz-Zippel test of identities of rational functions at random points, with a bound on the error.
 
 With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. For each trial a prime
-p is drawn from [2^62, 2^63), and then a point over GF(p), by a hash of the identity and a seed, so that no identity can
-be constructed for given points (algebra/chance.py). If P is not the zero polynomial, the trial succeeds only if p
-divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a root (probability at most
-degree/(p - 1), and p - 1 >= 2^62). A point where a denominator vanishes is replaced by another; since such points have
-a probability below 1/2, the sum of both probabilities is doubled. Trials are independent, so the bounds multiply.
-Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
+p from [2^62, 2^63) and then a point over GF(p) are drawn by a hash of the identity and a seed, so that no identity can
+be constructed for given points (algebra/chance.py). If P is not the zero polynomial, a trial succeeds only if p divides
+all coefficients of P (at most bits/62 of more than 2^55 primes do) or the point is a root of P (probability at most
+degree/(p - 1), and p - 1 >= 2^62). A point at which a denominator vanishes is replaced by another one; such points
+have probability below 1/2, which is why the sum of the two probabilities is doubled. Trials are independent, so their
+bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
-A trial that fails refutes the identity; then a small rational point at which both sides differ is searched for.
+A trial that fails refutes the identity; then a small rational point is searched for at which the two sides differ.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
 
 METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
-# Rosser and Schoenfeld: at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
+# By Rosser and Schoenfeld there are at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
 _MAX_UNDEFINED_POINTS = 200
 _WITNESS_TRIES = 400
-_HIGH_TRIES = 20  # further tries with long numbers, at which a nonzero function hardly ever vanishes
+_HIGH_TRIES = 20  # further trials at points with long coordinates, where a nonzero function hardly ever vanishes
 _HIGH_BITS = 62
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
@@ -48,9 +48,9 @@ Sides = tuple[Sequence[Any], Sequence[Any]]
 class Identity:
     """An identity of two lists of rational functions on a space of dimension `dim`.
 
-    `sides(field, x, eps)` returns both lists of field elements; it returns None, or raises SingularStep, where they are
-    not defined. `eps` is the value for which the identity is stated, None for every eps. `subject` are the data that
-    determine the two sides, for `derive_seed`: random points are drawn by its hash.
+    `sides(field, x, eps)` returns both lists of field elements; at a point where they are not defined, it returns None
+    or raises SingularStep. `eps` is the value for which the identity is stated, None for every eps. `subject` contains
+    the data that determine the two sides; random points are drawn by a hash of these data (`derive_seed`).
     """
 
     dim: int
@@ -58,12 +58,12 @@ class Identity:
     eps: fmpq | None
     left_label: str = "left side"
     right_label: str = "right side"
-    entries: tuple[str, ...] = ()  # names of the entries, if a witness should show only one that differs
-    scope: str = ""  # the values for which it is stated, as text, if these are not only those of eps
+    entries: tuple[str, ...] = ()  # names of the entries, if a witness shows only one entry in which the sides differ
+    scope: str = ""  # the values for which the identity is stated, as text, if `eps` does not describe them
     has_eps: bool = True  # whether the sides depend on eps
     # Whether it is an identity in eps x, up to powers of eps: it then holds for every eps if it holds for eps = 1.
     scales_with_eps: bool = False
-    undefined_reason: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
+    undefined_reason: str = "a denominator seems to vanish identically"  # the likely reason if no point has two sides
     root: Root | None = None  # the algebraic number in the coefficients, if any
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
@@ -73,25 +73,25 @@ class Identity:
 
     @cached_property
     def bound(self) -> tuple[CoefficientSize, int]:
-        """Bounds for degree and coefficients of the differences of the sides, and for the degree of the denominators.
+        """Bounds for the difference of the two sides (degree, coefficients) and for the degree of the denominators.
 
-        They are computed by evaluating the two sides with bounds in place of numbers.
+        They are computed by evaluating the two sides with bounds instead of numbers.
         """
         field, before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        work.count_work(7 * (work.counted() - before))  # bounds take longer than the numbers that were counted
-        # If the sides are not defined there is no bound, and the identity cannot be supported.
+        work.count_work(7 * (work.counted() - before))  # bounds take longer than numbers, for which work was counted
+        # If the sides are not defined, there is no bound, and the identity cannot be supported.
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
-        """Return both sides, None where they are not defined."""
+        """Return both sides at a point; None if they are not defined there."""
         try:
             return self.sides(field, point, eps)
         except (SingularStep, SingularMatrix):
             return None
 
-    # The interface Decidable.
+    # The following members implement the protocol Decidable.
 
     name = "identity"
     max_failures = _MAX_UNDEFINED_POINTS
@@ -123,19 +123,19 @@ class Identity:
             if self.root is not None:
                 try:
                     self.root.over(field)
-                except BadPrime:  # only primes with a root count
+                except BadPrime:  # only primes modulo which g has a root are used
                     continue
             with suppress(BadPrime):
                 point = tuple(field.random(rng) for _ in range(self.dim))
                 eps = field.zero if self.eps is None else field.convert(self.eps)
                 while self.eps is None and eps == 0:
                     eps = field.random(rng)
-                sides = None if eps == 0 else self.at(field, point, eps)  # 0: the prime divides eps
+                sides = None if eps == 0 else self.at(field, point, eps)  # eps = 0 if the prime divides it
             if sides is None or _equal(field, sides):
                 yield Trial(None if sides is None else field.prime)
                 continue
             decision = fails_over_Q(self, seed)
-            if decision is None:  # the witness modulo p also refutes it
+            if decision is None:  # no rational witness was found; the witness modulo p also refutes the identity
                 summary = (
                     f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
                     f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
@@ -145,7 +145,7 @@ class Identity:
             yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence other than the bounds."""
+        """Return the data of the evidence except the bounds."""
         return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
 
 
@@ -160,7 +160,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """The result at one random point modulo `prime` (None: not defined there), with a `decision` if it refutes."""
+    """The result at one random point modulo `prime`; None if undefined there; with a `decision` if it refutes."""
 
     prime: int | None = None
     decision: Decision | None = None
@@ -169,8 +169,8 @@ class Trial:
 class Decidable(Protocol):
     """A statement that can be tested at random points: an identity, or a claim of the paper about its own objects.
 
-    `bound` is defined as for an identity, `conjugates` as for `log2_error`; the test gives up after `max_failures`
-    points at which the statement is not defined, or when `trials` ends.
+    `bound` and `conjugates` are defined as in `Identity`; the test ends without a result after `max_failures` points at
+    which the statement is not defined, or when `trials` ends.
     """
 
     @property
@@ -197,7 +197,7 @@ class Decidable(Protocol):
 
 
 def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
-    """Test a statement at random points over GF(p): supported with error below 2^-error_bits, refuted, or undecided."""
+    """Test a statement at random points over GF(p): supported (error below 2^-error_bits), refuted or undecided."""
     equation, pole_degree = statement.bound
     per_trial = log2_error(equation, pole_degree, statement.conjugates)
     is_bounded = not math.isinf(equation.bits)
@@ -251,16 +251,16 @@ def log2_error(equation: CoefficientSize, pole_degree: int, conjugates: int = 1)
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
-    at most `conjugates`, p is random among the primes that split there. It is assumed that there are at least half as
-    many of these as Chebotarev's density predicts; a prime divides a nonzero coefficient only if it divides its norm.
+    at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many
+    are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides the norm.
     """
     if max(equation.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
-        return 0.0  # no bound: too many points may be roots or poles
+        return 0.0  # no bound: too many points may be roots, or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
     bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)
     scale = 2.0**PRIME_BITS
-    # The factor 2 accounts for the condition that no denominator vanishes at the point: it holds with probability at
-    # least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
+    # The factor 2 accounts for the condition that no denominator vanishes at the point. It holds with probability at
+    # least 1/2: the denominators have degree below 2^60, and coefficients that fit into a computer's memory.
     return math.log2(2 * (bad_primes + equation.degree / scale))
 
 
@@ -293,7 +293,7 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
 
 
 def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:
-    """Return the two sides at a point as a witness; None if they are equal."""
+    """Return the two sides at a point as a witness; None if the sides are equal."""
     left, right = sides
     if _equal(field, sides):
         return None

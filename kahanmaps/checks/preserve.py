@@ -39,7 +39,7 @@ _NO_TENSOR = "the map seems to be defined nowhere, or the tensor or a denominato
 def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
     """Return the identity phi(x~) det M(x) = phi(x) det N(x, x~), which says that the measure dx/phi is invariant.
 
-    Here dPhi(x) = M^{-1} N. A system stands for its Kahan map, with M = I - eps f'(x) and N = I + eps f'(x~).
+    Here dPhi(x) = M^{-1} N. A system stands for its Kahan map, for which M = I - eps f'(x) and N = I + eps f'(x~).
     """
     map_ = as_map(system)
 
@@ -51,7 +51,7 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
             return None
         numerator, denominator = jacobian_determinant_fraction(map_at_eps, point, image)
         if field.is_zero(numerator) or field.is_zero(denominator):
-            return None  # if the map has no inverse, both sides may vanish, which says nothing about a measure
+            return None  # if the map has no inverse, both sides may be 0, which says nothing about a measure
         return [density_after * denominator], [density_before * numerator]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
@@ -65,15 +65,15 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
 
 
 def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return x~, after a test that it satisfies the defining equation.
+    """Return x~, after a test that it satisfies the equation of the map.
 
     The formula for dPhi follows from this equation. Without the test a wrong x~ would not be noticed, since for phi =
-    det(I - eps f') with Hamiltonian f, and for Pi of the family, the identities hold at any two points x and x~.
+    det(I - eps f') with Hamiltonian f, and for Pi of the family, the identities hold at arbitrary points x and x~.
     """
     image = map_at_eps.step(point)
     field = map_at_eps.field
     if not isinstance(map_at_eps, KahanMap) or (field is not QQ and not field.characteristic):
-        return image  # no test over other fields: the equation was tested at points, and expanding it takes long
+        return image  # other fields need no test: the equation was tested at points, and expanding it takes long
     factor = field.convert(2) * map_at_eps.eps
     means = map_at_eps.local.polarised(point, image)
     for x, after, mean in zip(point, image, means, strict=True):
@@ -96,10 +96,10 @@ def check_measure(
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
-        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        settings: eps, seed, error bound and orbit. If it is omitted, `extra` may be the second argument.
         extra: phi, as a function, text or SymPy expression. By default det(I - eps f') for Hamiltonian systems, and the
             [density] of the file.
-        known: whether to check these default densities in addition to `extra`.
+        known: whether these default densities are checked in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
@@ -210,7 +210,7 @@ def check_poisson(
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
-        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        settings: eps, seed, error bound and orbit. If it is omitted, `extra` may be the second argument.
         extra: the tensor, or a matrix of formulas. By default Pi(x) = J - eps^2 f'(x)^2 J, for Hamiltonian systems.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
@@ -218,8 +218,8 @@ def check_poisson(
         The report: the transformation law and the Jacobi identity.
 
     Raises:
-        InputError: if no tensor is given for a system without a Hamiltonian, and for a tensor that has another
-            dimension or is identically zero.
+        InputError: if the system has no Hamiltonian and no tensor is given, or if the tensor has another dimension or
+            is identically zero.
     """
     file = as_file(system)
     settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
@@ -259,7 +259,7 @@ def check_poisson(
     )
     jacobi = certify(
         f"{name} is a Poisson tensor{scope}",
-        jacobi_identity(tensor, settings.eps),  # contains only x, so an orbit would add nothing
+        jacobi_identity(tensor, settings.eps),  # it contains only x, so an orbit would add nothing
         settings,
         proof,
         formula=f"sum_l {name}_il d_l {name}_jk + cyclic = 0",

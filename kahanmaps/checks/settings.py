@@ -1,4 +1,4 @@
-"""The settings of a check, the exact orbit on which claims are tried, and the data to reproduce a report."""
+"""The settings of a check, the exact orbit along which claims are tried, and the data to reproduce a report."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
-MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
+MAX_STEPS = 10_000  # steps of the exact orbit, whose points are all stored
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Settings:
     """The settings of a check.
 
     `eps` is half the time step, None for every eps. Claims are also tested along `steps` steps of an exact orbit from
-    the initial point `start` (None: a random one), up to numbers of `max_digits` digits (None: a default that depends
-    on the dimension). `eps` and the coordinates may be any exact numbers: 1, Fraction(1, 10), "1/10"; coordinates also
-    elements of one number field. `orbit_is_requested` is true if the user gave the initial point or the number of
-    steps: then the report must say whether the orbit was completed.
+    the initial point `start` (None: a random point). The orbit ends at a number with more than `max_digits` digits
+    (None: a default that depends on the dimension). `eps` and the coordinates may be any exact numbers: 1,
+    Fraction(1, 10), "1/10"; coordinates may also be elements of one number field. `orbit_is_requested`: the user gave
+    the initial point or the number of steps, so that the report must say whether the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -69,7 +69,7 @@ class Settings:
 
     @classmethod
     def of(cls, settings: Settings | None, eps: Any, time_step: Any, h: Any = None) -> Settings:
-        """Return the settings (default: the default settings), with eps or the time step replaced if given."""
+        """Return the settings (None: the default settings), with eps replaced if eps or the time step is given."""
         settings, eps = settings or cls(), resolve_eps(eps, time_step, h)
         return settings if eps is None else replace(settings, eps=eps)
 
@@ -78,7 +78,7 @@ class Settings:
         return self.orbit_is_requested and not run.end.is_complete
 
     def certified(self, system: Any, **arguments: Any) -> dict[str, Any]:
-        """Return the arguments of `certificate` for a claim; at one eps the reason why there is none."""
+        """Return the arguments with which `certificate` proves a claim; at one eps, the reason why it cannot."""
         if self.eps is not None:
             return {"why_not": f"a certificate is about a map, for every eps: found a claim for eps = {self.eps}"}
         return {"system": system, **arguments}
@@ -121,7 +121,7 @@ class OrbitRun:
 def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
     """Yield random small rational points, determined by the seed.
 
-    No coordinate is 0: many systems leave x_i = 0 invariant, and a claim may hold there although it is false.
+    No coordinate is 0: many systems leave x_i = 0 invariant, and a claim that is false may hold on this subspace.
 
     >>> next(random_starts(2, seed=0))
     (1, -2/3)
@@ -137,18 +137,18 @@ def run_orbit(
     subject: Sequence[Any] = (),
     is_integrable: bool = False,
 ) -> OrbitRun:
-    """Compute the exact orbit of the given initial point, or of random ones until an orbit has no singular point.
+    """Compute the exact orbit of the given initial point, or of random points until an orbit has no singular point.
 
     A claim for every eps is tried at a random eps. Random choices depend on the system and on the claim (`subject`), so
-    no claim can be constructed for an orbit that is known in advance.
+    that no claim can be constructed for an orbit known in advance.
     """
     seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
     map_at_eps = as_map(system).at(eps, number_fields[0] if number_fields else QQ)
-    # Without a normal form, a claim that contains two more steps multiplies the number of digits by dim^2, and the
-    # elimination by dim again; for members of the family it hardly grows from step to step.
+    # Without a normal form, a claim that contains two more iterates multiplies the number of digits by dim^2, and the
+    # elimination by dim again. For members of the family the number of digits hardly grows from step to step.
     default_max_digits = 5_000 if is_integrable else max(100, 60_000 // map_at_eps.dim**2)
     max_digits = default_max_digits if settings.max_digits is None else settings.max_digits
     random_points = random_starts(map_at_eps.dim, seed)
@@ -161,7 +161,7 @@ def run_orbit(
             settings.progress(f"orbit: step {point.step} of {settings.steps}")
             points.append(point.x)
         end = orbit.end
-        if end is None:  # the loop above runs to its end, and then the orbit has one
+        if end is None:  # the loop above ran to its end, and the orbit has ended by now
             raise AssertionError("an orbit ended without a status")
         attempt += 1
         if end.status != "singular" or settings.start is not None or attempt >= 20:
@@ -199,13 +199,13 @@ def _orbit_data(run: OrbitRun, tried: int, undefined: int) -> Mapping[str, Any]:
     return {"points": tried, "undefined_at": undefined, "eps": format_number(run.eps)}
 
 
-# ---- claims as the user writes them: formulas as text or SymPy expressions ----------------------------------------
+# ---- claims as the user gives them: formulas as text or SymPy expressions -----------------------------------------
 
 
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
-    """Return (settings, claim), also if the claim was passed as settings; a given eps replaces that of the settings."""
+    """Return (settings, claim), even if the claim was passed as `settings`; a given eps replaces settings.eps."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:
@@ -214,9 +214,9 @@ def settings_and_claim(
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
-    """Convert a claim to a function of the variables of a file and eps (and iterates, if it contains x~).
+    """Convert a claim to a function of the variables of a file and eps (and of iterates, if it contains x~).
 
-    The claim is a function, a result of a search, a formula in variables, parameters and eps, or an integral's name.
+    A claim is a function, a result of a search, a formula in variables, parameters and eps, or the name of an integral.
     """
     claim = getattr(claim, "function", claim) if isinstance(claim, ResultPart) else claim
     if isinstance(claim, RationalFunction):
@@ -228,7 +228,7 @@ def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
 
 
 def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
-    """Convert claims to functions by name; claims without a name are called I1, I2, ..., skipping names in use."""
+    """Convert claims to functions by name; claims without a name are called I1, I2, ..., unless the name is in use."""
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class ClaimOption:
     """The command-line option for a claim; `read` converts its text to the argument `extra` of the check.
 
-    If `many`, it may be repeated, as EXPR or NAME=EXPR, and the check takes texts by name; the word "known" stands for
-    the claims that are checked without the option.
+    If `many`, the option may be repeated, as EXPR or NAME=EXPR, and the check takes texts by name. The word "known"
+    stands for the claims that are checked without the option.
     """
 
     flag: str
@@ -33,10 +33,10 @@ class ClaimOption:
 
 @dataclass(frozen=True)
 class Check:
-    """A check. `question` appears in lists, `headline` and `text` in the help of its command.
+    """A check. `question` is shown in lists, `headline` and `text` in the help of its command.
 
-    `function` is "module:name" of a function (file, settings, extra) that returns a Report; for a check of a pair of
-    systems (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
+    `function` is "module:name" of a function (file, settings, extra) that returns a Report; the function of a check of
+    two systems is (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
     """
 
     name: str
@@ -48,7 +48,7 @@ class Check:
     outcome: str
     claim: ClaimOption | None = None
     is_of_pair: bool = False
-    for_batch: str = ""  # the question in experiments, where no claim can be given
+    for_batch: str = ""  # the question in experiments, where the user cannot give a claim
 
     @property
     def command(self) -> str:
@@ -56,7 +56,7 @@ class Check:
         return f"check-{self.name}"
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:
-        """Run the check and return its report. Raises InputError if it does not apply."""
+        """Run the check and return its report. Raises InputError if the check does not apply to the system."""
         module, _, name = self.function.partition(":")
         report: Report = getattr(import_module(module), name)(*arguments, **options)
         return report

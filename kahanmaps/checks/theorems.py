@@ -1,7 +1,7 @@
-"""Proof by hypotheses: each function checks the finite hypotheses of a theorem exactly and returns evidence, or None.
+"""Proof by hypotheses: each function verifies the finitely many hypotheses of a theorem exactly.
 
-The theorems are those of petrera-suris-2016 and cmoq-2013. What is used beyond the paper (splitting without J,
-repeated roots, dimension 2) is proved in docs/mathematics.md.
+It returns evidence, or None. The theorems are from petrera-suris-2016 and cmoq-2013. What goes beyond these papers
+(splitting without J, repeated roots, dimension 2) is proved in docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
 PROVED = Certainty.PROVED
-# Number of factors of chi up to which all rational associated systems are compared: 128 systems, 8128 pairs.
+# Maximal number of factors of chi for which all rational associated systems are compared: 128 systems, 8128 pairs.
 MAX_FACTORS = 8
 
 
 def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
-    """The evidence that a theorem applies; None unless every hypothesis holds."""
+    """Return the evidence that a theorem applies; None unless every hypothesis holds."""
     checked = list(dict.fromkeys(hypotheses))
     if not all(holds for _, holds in checked):
         return None
@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """Return rational associated systems, f_0 first; for more than 8 factors only those with at most one minus sign."""
+    """Return the rational associated systems, f_0 first; for more than 8 factors those with at most one minus sign."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())
@@ -70,8 +70,8 @@ def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
 def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
-    The space is the sum of the eigenspaces of C for 1, -1 and 0. On these f splits into three separate systems, and g
-    is f, -f and 0: so Phi_g is Phi_f, its inverse and the identity there. The lemma also holds for inhomogeneous f and
+    The space is the sum of the eigenspaces of C for 1, -1 and 0. On these, f splits into three separate systems, and g
+    is f, -f and 0. So Phi_g is there Phi_f, its inverse, and the identity. The lemma also holds for inhomogeneous f and
     needs no Hamiltonian structure.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
@@ -92,7 +92,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
 
 
 def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evidence | None:
-    """Two members with the same A and H, whatever their signs, are associated (petrera-suris-2016, Theorem 9)."""
+    """Two members with equal A and equal H, with any signs, are associated (petrera-suris-2016, Theorem 9)."""
     if f.A != g.A or f.variables != g.variables or f.H != g.H:
         return None
     return evidence(
@@ -102,7 +102,7 @@ def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evid
 
 
 def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
-    """Over the splitting field of chi every choice of signs gives a B_s with B_s^2 = I, by Chinese remainders."""
+    """Over the splitting field of chi, every choice of signs gives a B_s with B_s^2 = I (Chinese remainder theorem)."""
     at_A = QQ.identity(member.dim)
     for factor in member.factors:
         at_A = at_A * evaluate_at_matrix(factor.polynomial, member.A) ** factor.multiplicity
@@ -117,7 +117,7 @@ def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
 
 
 def cubic_hamiltonian(hamiltonian: CubicHamiltonian) -> Evidence | None:
-    """For f = J grad H, H cubic, J constant and skew: modified H is conserved, and so is dx/det(I - eps f'(x)).
+    """For f = J grad H, H cubic, J constant and skew: the modified H and dx/det(I - eps f'(x)) are invariant.
 
     Source: cmoq-2013.
     """
@@ -143,7 +143,7 @@ def product_density_invariant(system: QuadraticSystem, phi: RationalFunction) ->
 
 
 def shared_integral(member: FamilyMember, associate: AssociatedSystem) -> Evidence | None:
-    """Phi of every associated system conserves K~ of every other (petrera-suris-2016, Theorem 11)."""
+    """The map of every associated system conserves K~ of each associated system (petrera-suris-2016, Theorem 11)."""
     return evidence(
         "Theorem 11 of Petrera and Suris",
         [
@@ -169,10 +169,10 @@ def commutant_integral(hamiltonian: CubicHamiltonian, integral: CommutantIntegra
 
 
 def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember | None) -> Evidence | None:
-    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor where A is not derogatory, and in dimension 2."""
+    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor if A is not derogatory, and in dimension 2."""
     if hamiltonian.dim == 2:
-        # f' is a traceless 2 x 2 matrix: f'^2 = -det f' I, so Pi = det(I - eps f') J, and this is the invariant
-        # measure.
+        # f' is a traceless 2 x 2 matrix: f'^2 = -det f' I, so Pi = det(I - eps f') J, and the claim is that the measure
+        # is invariant.
         return evidence("the invariant measure in dimension 2", _cubic_hypotheses(hamiltonian))
     if member is None:
         return None
@@ -187,7 +187,7 @@ def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember
 
 
 def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
-    """The constant matrix C with g = C f if the components of f are independent; otherwise I or -I if g is f or -f."""
+    """Return the constant C with g = C f if the components of f are independent; otherwise I or -I if g is f or -f."""
     if f.dim != g.dim:
         return None
     n = f.dim

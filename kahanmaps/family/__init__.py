@@ -1,4 +1,4 @@
-"""The commuting family of Petrera and Suris: skew-Hamiltonian matrices, their cubics, the associated systems.
+"""The commuting family of Petrera and Suris: skew-Hamiltonian matrices, their cubics, and the associated systems.
 
 The functions here have the names of the subcommands of `kahanmaps family`; `km.family(...)` is `km.family.new(...)`.
 """
@@ -30,9 +30,9 @@ def new(
     """Return a random member of the family.
 
     Args:
-        m: half the dimension; then rational eigenvalues are random or, with `generic`, an integer polynomial chi.
+        m: half the dimension; the eigenvalues are then random integers or, with `generic`, chi is a random polynomial.
         eigenvalues: the eigenvalues of A, m exact numbers.
-        chi: the characteristic polynomial in t, as text such as "(t - 1)*(t^2 - 2)".
+        chi: the polynomial with det(t - A) = chi(t)^2, as text such as "(t - 1)*(t^2 - 2)".
         size: a bound for the random integer coefficients.
         seed: the random seed.
 
@@ -64,7 +64,7 @@ def new(
 
 
 def show(system: Any) -> FamilyStructure | None:
-    """Return the structure that makes a system a member of the family, None if there is none."""
+    """Return the structure that makes a system a member of the family; None if no structure is found."""
     structure: FamilyStructure | None = import_module("kahanmaps.family.recognition").find_family_structure_of(system)
     return structure
 
@@ -82,12 +82,12 @@ def space(A: Any) -> CubicSpace:
 
 
 def associated(member: Any) -> list[AssociatedSystem]:
-    """Return all rational associated systems of a member, up to sign."""
+    """Return all rational associated systems of a member, one of each pair f, -f."""
     return list(_member(member).associated())
 
 
 def tensor(system: Any, algebra: Any) -> Any:
-    """Return a system over K = Q[t]/(algebra) as a system file over Q; `algebra` is text such as "t^2 - 2"."""
+    """Return a system over K = Q[t]/(algebra) as a system file over Q; `algebra` is a text such as "t^2 - 2"."""
     from kahanmaps.family.random_members import parse_chi
 
     polynomial = parse_chi(algebra) if isinstance(algebra, str) else algebra

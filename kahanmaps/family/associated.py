@@ -1,8 +1,8 @@
 """Members of the family and their associated systems.
 
-For signs s the matrix B_s is the polynomial in A with B_s = s_i on the part of A that belongs to the i-th
-irreducible factor of chi; then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps
-of associated systems commute. Source: petrera-suris-2016, Sect. 5; every m, and any chi, in docs/mathematics.md.
+For signs s, the matrix B_s is the polynomial in A that acts as s_i on the part of A belonging to the i-th irreducible
+factor of chi. Then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps of associated
+systems commute. Source: petrera-suris-2016, Sect. 5; for every m and any chi, docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ class AssociatedSystem(HtmlDisplay, ResultPart):
 
     @property
     def text(self) -> str:
-        """The signs and the dimension, in a phrase."""
+        """The signs and the dimension, as a phrase."""
         return f"signs {self.label}, dimension {self.B.nrows()}"
 
     @property
     def label(self) -> str:
-        """The signs as text, `++-`."""
+        """The signs as text, such as `++-`."""
         return "".join("+" if sign > 0 else "-" for sign in self.signs)
 
 
 @dataclass(frozen=True, eq=False)
 class ConjugateAssociate:
-    """An associated system over Q[t]/g: the signs are rational except at the `root` t of a factor g of chi.
+    """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at the `root` of g.
 
     `coefficients` are the coefficients in Q[t]/g of B as a polynomial in A; with the `chain` of H they give K.
     """
@@ -70,7 +70,7 @@ class ConjugateAssociate:
 
     @cached_property
     def name(self) -> str:
-        """A name for the root, different from the variables."""
+        """A name for the root, different from the names of the variables."""
         names = names_of(self.chain[0])
         candidates = itertools.chain(["t"], (f"t{k}" for k in itertools.count()))
         return next(name for name in candidates if name not in names)
@@ -96,8 +96,8 @@ class ConjugateAssociate:
 class FamilyMember(HtmlDisplay, ResultPart):
     """A member of the family: a skew-Hamiltonian A, a cubic H with A Hess(H) = Hess(H) A^T, and signs.
 
-    The signs determine an associated system, `chosen`; if all are positive it is f_0 itself. Raises HypothesisError if
-    A is not skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
+    The signs determine one associated system, `chosen`; if all signs are positive, it is f_0. Raises HypothesisError
+    if A is not skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
@@ -154,7 +154,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
     @cached_property
     def hamiltonians(self) -> tuple[CubicHamiltonian, ...]:
-        """The chain with the standard structure J."""
+        """The cubics of the chain, with the standard structure J."""
         return tuple(CubicHamiltonian(H, standard_structure(self.dim)) for H in self.chain)
 
     def associate(self, signs: Sequence[int]) -> AssociatedSystem:
@@ -174,22 +174,22 @@ class FamilyMember(HtmlDisplay, ResultPart):
         return AssociatedSystem(tuple(signs), coefficients, evaluate_at_matrix(polynomial, self.A), K)
 
     def associated(self) -> Iterator[AssociatedSystem]:
-        """Return all rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0."""
+        """Yield the rational associated systems, one of each pair f, -f: 2^(r-1) for r factors; f_0 is the first."""
         for other_signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
             yield self.associate((1, *other_signs))
 
     @cached_property
     def roots(self) -> dict[int, Root]:
-        """The roots of the factors of degree 2 or more with multiplicity 1, by the index of the factor."""
+        """One root of each factor with degree at least 2 and multiplicity 1, by the index of the factor."""
         factors = enumerate(self.factors)
         return {k: Root(f.polynomial) for k, f in factors if f.multiplicity == 1 and 2 <= f.degree <= MAX_DEGREE}
 
     def conjugate_associates(self) -> Iterator[ConjugateAssociate]:
-        """Return the associated systems with the opposite sign at one root t of a factor g of degree 2 or more.
+        """Yield the associated systems with the opposite sign at one root t of a factor g of degree 2 or more.
 
-        There is one over Q[t]/g for every such factor with multiplicity 1 and every choice of the signs at the other
-        factors, up to an overall sign. The conjugates of its B belong to other roots, and the product of two conjugates
-        has the opposite sign at both roots: with the rational ones they generate all B_s if no root is repeated.
+        There is one over Q[t]/g for every such g with multiplicity 1 and every choice of the signs at the remaining
+        factors, up to an overall sign. The conjugates of its B belong to the conjugate roots, and a product of two
+        conjugates has the opposite sign at both roots. With the rational B_s these generate all B_s if no root repeats.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
@@ -198,7 +198,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():
-            quotient = [root.number_field.one]  # chi/(x - t), the highest coefficient first
+            quotient = [root.number_field.one]  # chi/(x - t), leading coefficient first
             for c in chi(self.A).coeffs()[-2:0:-1]:
                 quotient.append(quotient[-1] * root.number_field.generator + c)
             at_root = sum(
@@ -212,7 +212,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
     @property
     def text(self) -> str:
-        """The factors of chi and the signs, in a phrase."""
+        """The factors of chi and the signs, as a phrase."""
         factors = "".join(f"({factor})" for factor in self.factors)
         return f"m = {self.m}, roots of {factors}, signs {self.chosen.label}"
 
@@ -238,9 +238,9 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
 
 def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
-    """Return the polynomial of degree < m that is s_i modulo the power of the i-th factor (Chinese remainders).
+    """Return the polynomial of degree < m that equals s_i modulo the power of the i-th factor (Chinese remainders).
 
-    Its square is 1 modulo chi, and chi(A) = 0, so B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
+    Its square is 1 modulo chi, and chi(A) = 0. So B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
     even if chi has repeated roots.
 
     >>> t = fmpq_poly([0, 1])

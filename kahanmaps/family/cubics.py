@@ -21,9 +21,9 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 
 @dataclass(frozen=True)
 class CubicSpace:
-    """The solutions of A (Hess H) = (Hess H) A^T among homogeneous cubics.
+    """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    `basis` has coprime integer coefficients; `unknowns` counts the monomials and `rank` is that of the linear system.
+    `basis` has coprime integer coefficients, `unknowns` is the number of monomials, `rank` that of the linear system.
     """
 
     basis: tuple[fmpq_mpoly, ...]
@@ -42,7 +42,7 @@ def default_variables(dim: int) -> tuple[str, ...]:
 
 
 def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicSpace:
-    """Compute the space of homogeneous cubics H with A Hess(H) = Hess(H) A^T, for any skew-Hamiltonian A; exact.
+    """Compute the space of homogeneous cubics H with A Hess(H) = Hess(H) A^T for a skew-Hamiltonian A; exact.
 
     >>> space = cubic_space(fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2]))
     >>> space.dimension, space.rank, space.unknowns
@@ -62,7 +62,7 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     zero = fmpq(0)
     flat: list[fmpq] = []
     equations = 0
-    # The matrix A Hess - Hess A^T is skew with entries linear in x: one equation for i < j and each variable l.
+    # The matrix A Hess - Hess A^T is skew and linear in x: it gives one equation for each i < j and each variable x_l.
     for i in range(n):
         for j in range(i + 1, n):
             for l in range(n):
@@ -89,7 +89,7 @@ def belongs(A: fmpq_mat, H: fmpq_mpoly) -> bool:
 
 
 def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
-    """Raise HypothesisError, with an entry that fails, unless H belongs to the cubics of A."""
+    """Raise HypothesisError unless A (Hess H) = (Hess H) A^T for a homogeneous cubic H; the message gives an entry."""
     if len(names_of(H)) != A.nrows():
         raise HypothesisError(
             f"A is {A.nrows()} x {A.ncols()} and H has {len(names_of(H))} variables, expected as many as A has rows"
@@ -121,7 +121,7 @@ def chain(A: fmpq_mat, H: fmpq_mpoly, length: int | None = None) -> tuple[fmpq_m
 
 
 def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
-    """Return the homogeneous cubic with this gradient, by Euler's formula 3 H = x . grad H.
+    """Return the homogeneous cubic H with this gradient, by Euler's formula 3 H = x . grad H.
 
     Raises HypothesisError if the quadratic forms are not a gradient.
     """
@@ -136,7 +136,7 @@ def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
 
 
 def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq, fmpq]]:
-    """Entries (i, j, variable l) where A T_l and T_l A^T differ, T_l the derivative of the Hessian along x_l."""
+    """Yield entries (i, j, variable l) in which A T_l and T_l A^T differ, where T_l is d(Hess H)/dx_l."""
     n = A.nrows()
     for l, third in enumerate(third_derivatives(H)):
         left = A * third
@@ -159,10 +159,10 @@ def third_derivatives(H: fmpq_mpoly) -> list[fmpq_mat]:
 
 
 def _indices(exponents: tuple[int, ...]) -> tuple[int, ...]:
-    """The variables of a cubic monomial, in increasing order."""
+    """Return the indices of the three variables in a cubic monomial, in increasing order."""
     return tuple(i for i, exponent in enumerate(exponents) for _ in range(exponent))
 
 
 def _symmetry(key: tuple[int, ...]) -> int:
-    """The third derivative of the monomial: 6 for x^3, 2 for x^2 y, 1 for x y z."""
+    """Return the third derivative of the monomial: 6 for x^3, 2 for x^2 y, 1 for x y z."""
     return {1: 6, 2: 2, 3: 1}[len(set(key))]

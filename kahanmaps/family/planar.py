@@ -1,17 +1,17 @@
 """The normal form of a member: one planar cubic over the algebra K = Q[t]/chi, for every chi without repeated roots.
 
-f' commutes with A^T, so Q^{2m} is a free K-module of rank 2, t acting as A^T. For a basis e1, e2 let S have the columns
-e1, A^T e1, ..., (A^T)^{m-1} e1, e2, A^T e2, ...; then x = S z, and z holds the coefficients of two elements X and Y of
-K. Let l(a) be the coefficient of t^(m-1) in a. Since A^T is self-adjoint for it, x^T J y = l(W(x, y)) with one
-K-bilinear alternating W; e1 and e2 are such that W(e1, e2) = 1. In the same way H(x) = l(h(X, Y)) with one binary cubic
+f' commutes with A^T, so Q^{2m} is a free K-module of rank 2, with t acting as A^T. For a basis e1, e2 let S have the
+columns e1, A^T e1, ..., (A^T)^{m-1} e1, e2, A^T e2, ...; then x = S z, and z contains the coefficients of two elements
+X, Y of K. Let l(a) be the coefficient of t^(m-1) in a. Since A^T is self-adjoint for J, x^T J y = l(W(x, y)) for one
+K-bilinear alternating W; e1 and e2 are chosen with W(e1, e2) = 1. Likewise, H(x) = l(h(X, Y)) for one binary cubic
 h = a X^3 + b X^2 Y + c X Y^2 + d Y^3 over K. The system x' = J grad H(x) becomes X' = dh/dY, Y' = -dh/dX, and its Kahan
 map, with the Hessian determinant D = h_XX h_YY - h_XY^2,
 
     X~ = (X + 2 eps dh/dY) / (1 + eps^2 D(X, Y)),     Y~ = (Y - 2 eps dh/dX) / (1 + eps^2 D(X, Y)).
 
-At a rational root r of chi, X, Y and h take the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a separate
-planar system over Q. If chi splits there are m of them, and H = sum of h_r(u, v)/chi'(r), for l(a) = sum of
-a(r)/chi'(r) (Euler, Jacobi). Elements of K are polynomials of degree < m.
+At a rational root r of chi, X, Y and h have the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a separate
+planar system over Q. If chi splits, there are m such systems, and H is the sum of h_r(u, v)/chi'(r), since l(a) is the
+sum of a(r)/chi'(r) (Euler, Jacobi). Elements of K are polynomials of degree < m.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Quadruple = tuple[fmpq_poly, fmpq_poly, fmpq_poly, fmpq_poly]
 class PlanarPart:
     """The planar system at a rational root of chi: u' = dh/dv, v' = -dh/du, with u = X(root) and v = Y(root).
 
-    `h` is h(root; u, v) in the variables u, v, without a factor; H contains it times the weight 1/chi'(root).
+    `h` is h(root; u, v) in the variables u, v, without a factor; its term in H is h times the weight 1/chi'(root).
     """
 
     root: fmpq
@@ -55,17 +55,17 @@ class PlanarPart:
 
     @property
     def hamiltonian(self) -> CubicHamiltonian:
-        """h with the standard structure of the plane."""
+        """The cubic h with the standard structure of the plane."""
         return CubicHamiltonian(self.h, standard_structure(2))
 
     @property
     def text(self) -> str:
-        """h as text."""
+        """The cubic h as text."""
         return format_polynomial(self.h)
 
     @property
     def D(self) -> fmpq_mpoly:
-        """h_uu h_vv - h_uv^2; the Kahan map of this system conserves h/(1 + eps^2 D)."""
+        """h_uu h_vv - h_uv^2; the Kahan map of this planar system conserves h/(1 + eps^2 D)."""
         derivative = self.h.derivative
         mixed = derivative(0).derivative(1)
         return derivative(0).derivative(0) * derivative(1).derivative(1) - mixed * mixed
@@ -103,7 +103,7 @@ class NormalForm(HtmlDisplay, ResultPart):
 
     @property
     def text(self) -> str:
-        """chi and h."""
+        """The polynomial chi and the cubic h, as text."""
         return f"chi = {self.chi_text}, h = {self.h_text}"
 
     @property
@@ -123,7 +123,7 @@ class NormalForm(HtmlDisplay, ResultPart):
 
     @cached_property
     def S_inverse(self) -> fmpq_mat:
-        """S^{-1}, z = S^{-1} x."""
+        """S^{-1}, so that z = S^{-1} x."""
         return self.S.inv()
 
     @cached_property
@@ -134,34 +134,34 @@ class NormalForm(HtmlDisplay, ResultPart):
         return p, q, r
 
     def coordinates(self, x: Sequence[Any]) -> tuple[fmpq_poly, fmpq_poly]:
-        """The elements X and Y of K that belong to a rational point x."""
+        """Return the elements X and Y of K that belong to a rational point x."""
         if isinstance(x, str) or len(x) != self.dim:
             raise InputError(f"found {x!r}, expected a sequence of {self.dim} numbers")
         z = (self.S_inverse * fmpq_mat(self.dim, 1, [rational(entry) for entry in x])).entries()
         return fmpq_poly(z[: self.m]), fmpq_poly(z[self.m :])
 
     def point(self, X: Any, Y: Any) -> tuple[fmpq, ...]:
-        """The rational point x with these coordinates in K (polynomials in t, or numbers)."""
+        """Return the rational point x for X and Y in K (polynomials in t, or numbers)."""
         X, Y = self._elements(X, Y)
         z = [element[k] for element in (X, Y) for k in range(self.m)]
         return tuple((self.S * fmpq_mat(self.dim, 1, z)).entries())
 
     def h(self, X: Any, Y: Any) -> fmpq_poly:
-        """h(X, Y), an element of K."""
+        """Return h(X, Y), an element of K."""
         X, Y = self._elements(X, Y)
         a, b, c, d = self.coefficients
         XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
         return self._reduced((a * X + b * Y) % self.chi * XX + (c * XY + d * YY) % self.chi * Y)[0]
 
     def D(self, X: Any, Y: Any) -> fmpq_poly:
-        """The determinant of the planar f' at (X, Y), which is the Hessian determinant of h, an element of K."""
+        """Return the determinant of the planar f' at (X, Y), i.e. the Hessian determinant of h, an element of K."""
         X, Y = self._elements(X, Y)
         p, q, r = self.D_coefficients
         XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
         return self._reduced(p * XX + q * XY + r * YY)[0]
 
     def vector_field(self, X: Any, Y: Any) -> tuple[fmpq_poly, fmpq_poly]:
-        """dh/dY and -dh/dX at (X, Y)."""
+        """Return dh/dY and -dh/dX at (X, Y)."""
         X, Y = self._elements(X, Y)
         a, b, c, d = self.coefficients
         XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
@@ -187,7 +187,7 @@ class NormalForm(HtmlDisplay, ResultPart):
 
     @cached_property
     def parts(self) -> tuple[PlanarPart, ...]:
-        """The planar systems at the rational roots of chi, by increasing root; m of them if chi splits over Q."""
+        """The planar systems at the rational roots of chi, by increasing root; there are m of them if chi splits."""
         u, v = ring(["u", "v"]).gens()
         chi_prime = self.chi.derivative()
         parts = []
@@ -198,12 +198,12 @@ class NormalForm(HtmlDisplay, ResultPart):
 
     @property
     def chi_text(self) -> str:
-        """chi as text, `t^2 - 2`."""
+        """The polynomial chi as text, such as `t^2 - 2`."""
         return format_univariate(self.chi)
 
     @property
     def h_text(self) -> str:
-        """h as text, `X^3 + (t - 1)*X*Y^2`."""
+        """The cubic h as text, such as `X^3 + (t - 1)*X*Y^2`."""
         return _format_form(self.coefficients, _CUBIC)
 
     @property
@@ -212,17 +212,17 @@ class NormalForm(HtmlDisplay, ResultPart):
         return _format_form(self.D_coefficients, _QUADRATIC)
 
     def verify(self) -> None:
-        """Verify the normal form exactly. Raises AssertionError if it is wrong, which would be an error in kahanmaps.
+        """Verify the normal form exactly. Raises AssertionError if it is wrong, which means an error in kahanmaps.
 
-        The conditions are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of
-        l(W), which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
+        The conditions are: A^T S = S diag(C, C) for the companion matrix C of chi; S^T J S is the Gram matrix of l(W),
+        which is invertible; and H(S z) = l(h) as symmetric trilinear forms.
         """
         n, m = self.dim, self.m
         if (self.S.nrows(), self.S.ncols(), len(names_of(self.H))) != (n, n, n):
             raise AssertionError("normal form: the sizes of A, H and S differ")
         if any(coefficient.degree() >= m for coefficient in self.coefficients):
             raise AssertionError("normal form: a coefficient of h is not reduced modulo chi")
-        # Multiplication by t in the basis 1, t, ..., t^(m-1), for both coordinates.
+        # Multiplication by t in the basis 1, t, ..., t^(m-1), for both X and Y.
         companion = companion_matrix(self.chi)
         times_t = two_blocks(companion, companion)
         if self.A.transpose() * self.S != self.S * times_t:
@@ -233,7 +233,7 @@ class NormalForm(HtmlDisplay, ResultPart):
             raise AssertionError("normal form: S^T J S is not the Gram matrix of l")
         a, b, c, d = self.coefficients
         table = [self._functional_of_powers(third, 3 * m - 2) for third in (6 * a, 2 * b, 2 * c, 6 * d)]
-        # The trilinear form in the coordinates z: one matrix for each column of S.
+        # The trilinear form of H in the coordinates z: one matrix for each column of S.
         transposed, tensors = self.S.transpose(), third_derivatives(self.H)
         for i, column in enumerate(transposed.tolist()):
             third = transposed * combination_of(column, tensors) * self.S
@@ -244,7 +244,7 @@ class NormalForm(HtmlDisplay, ResultPart):
                 raise AssertionError("normal form: H(S z) is not l(h)")
 
     def _functional_of_powers(self, element: fmpq_poly, count: int) -> list[fmpq]:
-        """l(element t^k) for k < count."""
+        """Return l(element t^k) for 0 <= k < count."""
         t, values = fmpq_poly([0, 1]), []
         for _ in range(count):
             values.append(element[self.m - 1])
@@ -262,8 +262,8 @@ def normal_form(member: FamilyMember) -> NormalForm:
     """Return the normal form of the associated system given by the signs of the member.
 
     If a sign is negative, `H` of the result is K. The vector e1 is a unit vector or a small combination of unit
-    vectors, and e2 a short vector with W(e1, e2) = 1, found by LLL; among 2m such choices the one with the shortest
-    numbers is used. Exact. Raises HypothesisError if chi has repeated roots.
+    vectors, and e2 a short vector with W(e1, e2) = 1 found by LLL. At most 2m vectors e1 are tried; the result with the
+    shortest numbers is returned. Exact. Raises HypothesisError if chi has repeated roots.
     """
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
@@ -286,10 +286,10 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """Yield for each unit vector a sum with few small multiples of other unit vectors that generates a free K-module.
+    """Yield for each unit vector its sum with few small multiples of other unit vectors that generates a free K-module.
 
-    A multiple c of another unit vector makes the module as large as the two allow for all but at most m values of c:
-    on the part of every factor of chi, where K is a field, at most one c is bad.
+    For all but at most m values of c, adding c times a unit vector gives the largest module that both vectors allow: on
+    the part that belongs to an irreducible factor of chi, K is a field, and at most one c fails.
     """
     n = t.nrows()
     m = n // 2
@@ -310,9 +310,9 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
 def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
-    The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank m.
-    With weights beyond the bounds of LLL for short vectors of both lattices, the first m vectors of a reduced basis
-    have s = 0 and the next one has the least s > 0, up to sign; then e2 = y/s.
+    The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1; those with s = 0, one of rank m.
+    With weights above the bounds of LLL for short vectors of both lattices, the first m vectors of a reduced basis have
+    s = 0, and the next vector has the least s > 0, up to sign; then e2 = y/s.
     """
     n = t.nrows()
     m = n // 2
@@ -335,13 +335,13 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
 
 
 def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadruple:
-    """h from the third derivatives of H along the columns of S: l(t^k 6a) = H'''(t^k e1, e1, e1), and so on."""
+    """Return h from the third derivatives of H along the columns of S: l(t^k 6a) = H'''(t^k e1, e1, e1) etc."""
     n, m = S.nrows(), chi.degree()
     rows = S.transpose().tolist()
     module = [fmpq_mat(rows[:m]), fmpq_mat(rows[m:])]
     vectors = [fmpq_mat(n, 1, rows[0]), fmpq_mat(n, 1, rows[m])]
     hessians = [combination_of(rows[0], tensors), combination_of(rows[m], tensors)]
-    # The basis dual to 1, t, ..., t^(m-1) under l(a b).
+    # The basis dual to 1, t, ..., t^(m-1) under the form (a, b) -> l(a b).
     dual = [fmpq_poly([chi[j] for j in range(k + 1, m + 1)]) for k in range(m)]
 
     def third(i: int, j: int, k: int) -> fmpq_poly:
@@ -352,7 +352,7 @@ def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadr
 
 
 def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
-    """The columns v, t v, ..., t^{m-1} v."""
+    """Return the matrix with the columns v, t v, ..., t^{m-1} v."""
     columns = [vector]
     for _ in range(t.nrows() // 2 - 1):
         columns.append(t * columns[-1])
@@ -369,7 +369,7 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
     for coefficient, monomial in zip(coefficients, monomials, strict=True):
         if coefficient.is_zero():
             continue
-        # A coefficient with one term, or with negative terms only, is written with its sign outside the brackets.
+        # A coefficient with one term, or with negative terms only, is printed with its sign before the brackets.
         terms = [c for c in coefficient.coeffs() if c != 0]
         negative = all(c < 0 for c in terms)
         element = format_univariate(-coefficient if negative else coefficient)

@@ -1,9 +1,9 @@
 """Random members of the family, reproducible from a seed.
 
-In normal form A = diag(W^T, W) with W = diag(eigenvalues), or W the companion matrix of chi, and the cubics of A are
-known explicitly: sums of planar cubics in the first case; in the second the t^(m-1)-coefficient of a cubic form in
-X = q_1 + q_2 t + ... and Y over Q[t]/chi. The normal form is transformed by a random symplectic integer matrix, so all
-numbers are small integers for every m.
+In the normal form, A = diag(W^T, W) with W = diag(eigenvalues) or W the companion matrix of chi, and the cubics of A
+are known explicitly. In the first case they are sums of planar cubics; in the second case they are the coefficients of
+t^(m-1) in cubic forms over Q[t]/chi in X = q_1 + q_2 t + ... and Y. The normal form is transformed by a random
+symplectic integer matrix, so that all numbers are small integers for every m.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.skew_hamiltonian import companion_matrix, random_symplectic, symplectic_inverse, two_blocks
 from kahanmaps.family.tensor import GENERATOR, components, split_names
 
-MAX_M = 16  # beyond, H may be longer than the texts that system files allow
+MAX_M = 16  # for larger m, H may be longer than the texts that system files allow
 
 
 def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
@@ -49,7 +49,7 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
     for i in range(m):
         u, v = forms[i], forms[m + i]
         a = b = c = d = 0
-        while _discriminant(a, b, c, d) == 0:  # a cubic with a double root is special
+        while _discriminant(a, b, c, d) == 0:  # a cubic with a double root is not generic
             a, b, c, d = (rng.randint(-size, size) for _ in range(4))
         H += a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3
     return FamilyMember(_in_original_coordinates(normal, S), H)
@@ -73,14 +73,14 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
     S = random_symplectic(m, rng)
     forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
     zero = forms[0].context().constant(0)
-    # Y in the basis dual to 1, t, ..., t^(m-1) under (a, b) -> coefficient of t^(m-1) in a b, so that J is standard.
+    # Y is in the basis dual to 1, t, ..., t^(m-1) under (a, b) -> coefficient of t^(m-1) in a b, so J is standard.
     Y = [zero] * m
     for j in range(m):
         for k in range(j, m):
             coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
             Y[k - j] = Y[k - j] + coefficient * forms[m + j]
     drawn: list[list[int]] = []
-    # The discriminant has to be invertible: then the cubic has no double root at any root of chi.
+    # The discriminant must be invertible: then the cubic has no double root, for any root of chi.
     while not drawn or _discriminant(*map(fmpq_poly, drawn)).gcd(chi).degree() != 0:
         drawn = []
         while len(drawn) < 4:
@@ -110,7 +110,7 @@ def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
 
 
 def parse_chi(text: str) -> fmpq_poly:
-    """Parse a polynomial in t of degree at least 1, for `random_member_with_chi`.
+    """Parse chi for `random_member_with_chi`, a polynomial in t of degree at least 1.
 
     >>> parse_chi("(t - 1)*(t^2 - 2)")
     x^3 + (-1)*x^2 + (-2)*x + 2
@@ -135,17 +135,17 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
 
 
 def _in_original_coordinates(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
-    """A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
+    """Return A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
     return symplectic_inverse(S).transpose() * normal * S.transpose()
 
 
 def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> tuple[fmpq_mpoly, ...]:
-    """The rows of `matrix` as linear forms."""
+    """Return the rows of `matrix` as linear forms in the variables."""
     return linear_combinations(matrix, ring(variables).gens())
 
 
 def _discriminant(a: Any, b: Any, c: Any, d: Any) -> Any:
-    """The discriminant of a x^3 + b x^2 y + c x y^2 + d y^3."""
+    """Return the discriminant of a x^3 + b x^2 y + c x y^2 + d y^3."""
     return b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
 
 

@@ -1,13 +1,13 @@
 """Recognition of members of the family: the search for a matrix A, given only H and J.
 
-x' = J grad H(x) with a homogeneous cubic H and a constant invertible skew J belongs to the family through every A with
+x' = J grad H(x), with a homogeneous cubic H and a constant invertible skew J, belongs to the family for every A with
 
     A^T J = J A   and   A Hess(H) = Hess(H) A^T.
 
 These are linear conditions on the skew matrix S = J A: S T_l J is symmetric for each l, where T_l is the derivative of
-Hess(H) along x_l. The multiples of I always solve them. If H depends on all variables, the solutions form a commutative
-algebra, and the factors of this algebra give the finest splitting of H; otherwise solutions need not commute, and
-idempotents are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
+Hess(H) along x_l. The multiples of I are always solutions. If H depends on all variables, the solutions form a
+commutative algebra, whose factors give the finest splitting of H. Otherwise solutions need not commute, and idempotents
+are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from kahanmaps.family.skew_hamiltonian import Factor, bits_of, evaluate_at_matri
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
-MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns
-_DRAWS = 24  # small combinations that are tried beside the basis
+MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns in dimension n
+_DRAWS = 24  # small combinations that are tried besides the basis vectors
 _TRIAL_DIVISION = 1000
 _T = fmpq_poly([0, 1])
 
 
 @dataclass(frozen=True, eq=False)
 class FamilyStructure(ResultPart):
-    """The structure of a Hamiltonian system as a member: `member` is the system in the coordinates y with x = T y.
+    """The structure of a Hamiltonian system as a member: `member` is the system in coordinates y with x = T y.
 
-    T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
-    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. It is constructed by `find_family_structure`, and the
-    constructor verifies exactly that `member` is the system. Raises HypothesisError otherwise.
+    T is rational and invertible with J = T [[0, I], [-I, 0]] T^T; T = I for the standard J. `dimension` is that of the
+    space of all A with A^T J = J A and A Hess(H) = Hess(H) A^T. `find_family_structure` constructs the structure. The
+    constructor verifies exactly that `member` is the system, and raises HypothesisError otherwise.
     """
 
     hamiltonian: CubicHamiltonian
@@ -62,7 +62,7 @@ class FamilyStructure(ResultPart):
 
     @cached_property
     def A(self) -> fmpq_mat:
-        """A in the coordinates x: T^{-T} A_y T^T."""
+        """The matrix A in the coordinates x: T^{-T} A_y T^T."""
         return self.T.inv().transpose() * self.member.A * self.T.transpose()
 
     @property
@@ -72,7 +72,7 @@ class FamilyStructure(ResultPart):
 
     @property
     def is_standard(self) -> bool:
-        """Whether T = I: the member has the coordinates of the system."""
+        """Whether T = I, so that the coordinates of the member are those of the system."""
         return bool(self.T == QQ.identity(self.member.dim))
 
     @property
@@ -96,8 +96,8 @@ class FamilyStructure(ResultPart):
 def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     """Return a basis of all A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
 
-    H is a homogeneous cubic. The result is a reduced lattice basis of all integer solutions; the identity lies in its
-    span. Exact.
+    H is a homogeneous cubic. The result is a reduced basis of the lattice of all integer solutions; the identity lies
+    in its span. Exact.
 
     Raises InputError unless H is a homogeneous cubic, J an invertible skew matrix, and the dimension at most 32.
 
@@ -120,7 +120,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     n = J.nrows()
     inverse = J.inv()
     conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
-    # A few random combinations of the conditions are almost always equivalent to all of them.
+    # A few random combinations of the conditions are almost always equivalent to all conditions.
     rng = random.Random(n)
     combinations = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (combinations, conditions):
@@ -134,12 +134,12 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
     """Search for a matrix A that makes the system a member of the family, with as many distinct roots as possible.
 
-    Returns None if H is not a homogeneous cubic or J not invertible, and if only the multiples of I satisfy A Hess(H) =
-    Hess(H) A^T. (In dimension 2 the result is A = I, for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
-    r. The member is verified exactly. No other A has more distinct roots if H depends on all variables (proved);
-    otherwise the A is the best of many small combinations.
+    Returns None if H is not a homogeneous cubic, J is not invertible, or only multiples of I satisfy A Hess(H) =
+    Hess(H) A^T. (In dimension 2 the result is A = I for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
+    r. The member is verified exactly. If H depends on all variables, no A has more distinct roots (proved); otherwise
+    A is the best of many small combinations.
 
-    Raises InputError beyond dimension 32.
+    Raises InputError above dimension 32.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
@@ -157,7 +157,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     _require_size(hamiltonian.dim)
     T = QQ.identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
     names, letters = hamiltonian.variables, "y"
-    if not hamiltonian.is_standard:  # y1, y2, ..., or yy1, ... where the system itself uses these
+    if not hamiltonian.is_standard:  # new variables y1, y2, ..., or yy1, ... if the system uses these names
         while any(name.startswith(letters) for name in names):
             letters += "y"
         names = tuple(f"{letters}{i + 1}" for i in range(len(names)))
@@ -169,7 +169,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
-    """Return H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none.
+    """Return H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if no such H exists.
 
     The result is exact. Other structures J are not tried.
 
@@ -187,13 +187,13 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     for i, component in enumerate(field):
         for exponent, coefficient in component.terms():
             raised = tuple(power + (i == j) for j, power in enumerate(exponent))
-            # Euler's formula, for each degree separately.
+            # Euler's formula for homogeneous functions, for each degree separately.
             H = H + context.from_dict({raised: coefficient / sum(raised)})
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
 
 def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure | None:
-    """Apply `find_family_structure` to a system x' = J grad H with the standard J; return None for others.
+    """Apply `find_family_structure` to a system x' = J grad H with the standard J; return None for other systems.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
     >>> print(find_family_structure_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
@@ -204,7 +204,7 @@ def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure |
 
 
 def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
-    """Return a sentence that says why a system is not a member; pass None for a system without a Hamiltonian."""
+    """Return a sentence that says why a system is not a member; `hamiltonian` is None if the system has none."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
     return _unsupported_reason(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
@@ -238,9 +238,9 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
 
 @dataclass(frozen=True)
 class _Part:
-    """An idempotent E of the space, not split further, and X = E X E: zero, nilpotent, or a generator of a field.
+    """An idempotent E of the space, not split further, and X = E X E, which is zero, nilpotent, or generates a field.
 
-    The distinct roots of X on the part are those of `factor`, which is t where X is zero or nilpotent.
+    The distinct roots of X on the image of E are the roots of `factor`, which is t if X is zero or nilpotent.
     """
 
     E: fmpq_mat
@@ -249,10 +249,10 @@ class _Part:
 
 
 def _with_most_eigenvalues(space: Sequence[fmpq_mat]) -> fmpq_mat:
-    """Return an element with as many distinct eigenvalues as possible and small entries."""
+    """Return an element of the space with as many distinct eigenvalues as possible and small entries."""
     parts = list(_parts(space, QQ.identity(space[0].nrows())))
     A = fmpq_mat(space[0].nrows(), space[0].nrows())
-    # The largest idempotent gets the eigenvalue 1: then A = I + ..., in which it does not occur.
+    # The idempotent of largest rank gets the eigenvalue 1: then A = I + ... without a term for this idempotent.
     simple = sorted((part for part in parts if part.factor.degree() == 1), key=lambda part: -_size(part.E))
     for value, part in enumerate(simple, start=1):
         A = A + part.E * value + part.X
@@ -269,8 +269,8 @@ def _with_most_eigenvalues(space: Sequence[fmpq_mat]) -> fmpq_mat:
 
 
 def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
-    """Split the idempotent E of the space by elements E X E, as far as possible; return each part with its best X."""
-    if trace(E) == 2:  # self-adjoint in a symplectic plane: scalar
+    """Split the idempotent E of the space by elements E X E as far as possible; yield each part with its best X."""
+    if trace(E) == 2:  # a self-adjoint matrix in a symplectic plane is scalar
         yield _Part(E, E * 0, _T)
         return
     for X in space:
@@ -282,7 +282,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
     if len(part_basis) == 1:
         yield _Part(E, E * 0, _T)
         return
-    # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
+    # In a commutative algebra the trace form has the rank of the semisimple part, i.e. the number of roots to be found.
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(part_basis, 2))
     flat, transposed = (
         fmpq_mat([M.entries() for M in matrices]) for matrices in (part_basis, [X.transpose() for X in part_basis])
@@ -290,7 +290,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
     target = rank(QQ, flat * transposed.transpose()) if is_commutative else 0
     parts: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     rng = random.Random(len(part_basis))
-    # The basis, then combinations with small coefficients, which grow slowly.
+    # First the basis, then combinations with coefficients that grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
     combinations = (combination_of([rng.randint(-bound, bound) for _ in part_basis], part_basis) for bound in bounds)
     for tried, X in enumerate(itertools.chain(part_basis, combinations)):
@@ -300,7 +300,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
             return
         polynomial = _factors_on(X, E)[0].polynomial
         value, power, length = evaluate_at_matrix(polynomial, X) * E, E, 0
-        while power != 0 * power:  # the least k with polynomial(X)^k E = 0, times the degree
+        while power != 0 * power:  # length = the degree times the least k with polynomial(X)^k E = 0
             power, length = power * value, length + polynomial.degree()
         for Y, minimal in _variants(X, E, polynomial):
             height = sum(map(bits_of, minimal.coeffs()))
@@ -313,7 +313,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
 
 
 def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
-    """The idempotents into which X = E X E splits E, one for each irreducible factor; E itself if there is only one."""
+    """Return the idempotents into which X = E X E splits E, one for each irreducible factor; E if there is only one."""
     factors = _factors_on(X, E)
     if len(factors) == 1:
         return [E]
@@ -335,7 +335,7 @@ def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
 
 
 def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
-    """X, with its irreducible polynomial, and (X - a E)/b for integers a, b such that the polynomial stays integral."""
+    """Yield X with its irreducible polynomial, and (X - a E)/b for integers a, b that keep the polynomial integral."""
     yield X, polynomial
     d = polynomial.degree()
     if d == 1:
@@ -352,14 +352,14 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
 
 
 def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
-    """The skew S with S F symmetric for each F of `conditions`: a basis."""
+    """Return a basis of the skew matrices S for which S F is symmetric for each F in `conditions`."""
     position = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
     rows = []
     for condition in conditions:
         columns = condition.transpose().tolist()
         for i, j in position:
             row = [fmpz(0)] * len(position)
-            for k in range(n):  # S[i, k] F[k, j] - S[j, k] F[k, i]
+            for k in range(n):  # the entry i, j of S F - (S F)^T contains S[i, k] F[k, j] - S[j, k] F[k, i]
                 if k != i:
                     row[position[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
                 if k != j:
@@ -375,11 +375,11 @@ def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
 
 
 def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
-    """A reduced basis of all integer matrices in the span; empty for zeros."""
+    """Return a reduced basis of all integer matrices in the span of `matrices`; it is empty if all of them are 0."""
     lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
     rows = lattice.tolist()
     is_alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
-    # Where every row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
+    # If each row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
     if not all(any(single and abs(entry) == 1 for entry, single in zip(row, is_alone, strict=True)) for row in rows):
         reduced = lattice.lll()
         d = lattice.rank()
@@ -388,7 +388,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
         )
         if d == 0:
             return []
-        # c B is integral exactly if c G is, G the d x d Hermite form of the columns: G^-1 B generates all such c B.
+        # c B is integral if and only if c G is, where G is the d x d Hermite form of the columns: G^-1 B is a basis.
         G = fmpz_mat(lattice.transpose().hnf().tolist()[:d]).transpose()
         lattice = (fmpq_mat(G).inv() * fmpq_mat(lattice)).numer_denom()[0]
     shape = matrices[0].nrows(), matrices[0].ncols()
@@ -396,7 +396,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
 
 
 def _unsupported_reason(hamiltonian: CubicHamiltonian) -> str:
-    """Return why the search for A does not apply to a system; empty if it does."""
+    """Return why the search for A does not apply to a system; empty if it applies."""
     if hamiltonian.dim % 2:
         return f"the dimension is {hamiltonian.dim}, expected an even one"
     if not hamiltonian.is_homogeneous:
@@ -412,7 +412,7 @@ def _require_size(dim: int) -> None:
 
 
 def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:
-    """H(T y) in the variables `names`."""
+    """Return H(T y) as a polynomial in the variables `names`."""
     context = ring(names)
     if T == QQ.identity(T.nrows()):
         return context.from_dict(H.to_dict())

@@ -1,7 +1,7 @@
 """Skew-Hamiltonian matrices: A^T J = J A, with J = [[0, I], [-I, 0]].
 
-In blocks A = [[W, X], [Y, W^T]] with X and Y skew. The characteristic polynomial is a square chi^2 with chi of
-degree m; A is generic when chi has no repeated root. Source: petrera-suris-2016, eqs. (cond A), (cond2);
+In blocks, A = [[W, X], [Y, W^T]] with X and Y skew. The characteristic polynomial is a square chi^2 with chi of degree
+m; A is generic if chi has no repeated root. Sources: petrera-suris-2016, eqs. (cond A), (cond2);
 fassbender-1999.
 """
 
@@ -31,7 +31,7 @@ class Factor:
 
     @property
     def root(self) -> fmpq | None:
-        """The root of a linear factor."""
+        """The root if the factor is linear, otherwise None."""
         return -self.polynomial[0] if self.degree == 1 else None
 
     def __str__(self) -> str:
@@ -39,7 +39,7 @@ class Factor:
 
 
 def defects(A: fmpq_mat) -> list[str]:
-    """Return the conditions that A violates, entry by entry; empty if A is skew-Hamiltonian.
+    """Return the conditions for a skew-Hamiltonian matrix that A violates, entry by entry; empty if there are none.
 
     >>> defects(fmpq_mat([[1, 2], [0, 1]]))
     ['entry (1,2) is 2, expected 0: the upper right block must be skew']
@@ -48,7 +48,7 @@ def defects(A: fmpq_mat) -> list[str]:
     if n != A.ncols() or n % 2 or n == 0:
         return [f"A is {n} x {A.ncols()}, expected a square matrix of even size 2m"]
     m, J = n // 2, standard_structure(n)
-    expected = -(J * A.transpose() * J)  # equal to A exactly for A^T J = J A
+    expected = -(J * A.transpose() * J)  # equal to A if and only if A^T J = J A
     skew = "block must be skew"
     messages = []
     for rule, top, left in (
@@ -79,8 +79,8 @@ def require_skew_hamiltonian(A: fmpq_mat) -> None:
 def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
     """Return the irreducible factors of chi, where det(t - A) = chi(t)^2.
 
-    The signs that define an associated system have the same order: linear factors come first, by increasing root, then
-    factors by degree and by the coefficients of the monic polynomial, constant term first.
+    The signs that define an associated system are in the same order: linear factors come first, by increasing root,
+    then the others by degree, and by the coefficients of the monic polynomial, constant term first.
     """
     require_skew_hamiltonian(A)
     _, pairs = A.charpoly().factor()
@@ -108,7 +108,7 @@ def chi(A: fmpq_mat) -> fmpq_poly:
 
 
 def diagnosis(A: fmpq_mat) -> str:
-    """Describe how chi factors over Q, and the consequences for A and its associated systems."""
+    """Describe how chi factors over Q, and what this means for A and its associated systems."""
     factors = factors_of_chi(A)
     repeated = [factor for factor in factors if factor.multiplicity > 1]
     product = " ".join(
@@ -141,7 +141,7 @@ def diagnosis(A: fmpq_mat) -> str:
 
 
 def minimal_degree(A: fmpq_mat) -> int:
-    """Return the degree of the minimal polynomial of A: m, or less if A is derogatory.
+    """Return the degree of the minimal polynomial of A; it is m, or less if A is derogatory.
 
     >>> minimal_degree(fmpq_mat([[3, 0], [0, 3]]))
     1
@@ -180,13 +180,13 @@ def two_blocks(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     """Return a random integer matrix S with S^T J S = J and small entries, a product of elementary symplectic matrices.
 
-    Each factor adds only a few entries, so that transformed systems keep small coefficients.
+    Each factor has only a few nonzero off-diagonal entries, so that transformed systems keep small coefficients.
     """
     n = 2 * m
     S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
 
     def add(to: int, source: int, times: int) -> None:
-        """Apply the row operation S[to] += times S[source] from the left."""
+        """Add `times` times row `source` of S to row `to`."""
         nonlocal S
         elementary = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
         elementary[to, source] = elementary[to, source] + times
@@ -197,15 +197,15 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
         rng.shuffle(order)
         for i, j in zip(order, order[1:] + order[:1], strict=True):
             sign = rng.choice((-1, 1))
-            if i != j:  # q_i += s q_j goes with p_j -= s p_i
+            if i != j:  # q_i += s q_j requires p_j -= s p_i
                 add(i, j, sign)
                 add(m + j, m + i, -sign)
             shear = rng.choice((-1, 1))
-            if rng.random() < 0.5:  # q += X p with X symmetric
+            if rng.random() < 0.5:  # q += X p for a symmetric X
                 add(i, m + j, shear)
                 if i != j:
                     add(j, m + i, shear)
-            else:  # p += Y q with Y symmetric
+            else:  # p += Y q for a symmetric Y
                 add(m + i, j, shear)
                 if i != j:
                     add(m + j, i, shear)
@@ -213,7 +213,7 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
 
 
 def bits_of(number: fmpq) -> int:
-    """Return the bit length of a number: 1 for 1, 0 for zero."""
+    """Return the bit length of a rational number: 1 for the number 1, and 0 for 0."""
     return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
 
 

@@ -1,7 +1,7 @@
-"""The normal form of a system, by which fast orbits and the n-th iterate are computed.
+"""The normal form of a system, which makes orbits fast and gives the n-th iterate directly.
 
-A member of the family has a normal form if chi has no repeated root. A system that was not declared as a member is
-recognized as one if linear algebra finds an A for its Hamiltonian (recognition.py).
+A member of the family has a normal form if chi has no repeated root. A system that is not declared as a member is
+recognized as a member if linear algebra finds a matrix A for its Hamiltonian (recognition.py).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _MAX_DIMENSION = 32
 
 @dataclass(frozen=True, eq=False)
 class SystemNormalForm(ResultPart):
-    """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
+    """A normal form with x = T S z; `T` is None if the form is in the system's own coordinates.
 
-    `declared` says whether the system was given as a member of the family; `text` describes the membership.
+    `declared` says whether the system was given as a member of the family; `text` describes its membership.
     """
 
     form: NormalForm
@@ -37,13 +37,13 @@ class SystemNormalForm(ResultPart):
 
     @property
     def A(self) -> fmpq_mat:
-        """A in the system's own coordinates, as in `FamilyStructure`."""
+        """The matrix A in the system's own coordinates, as in `FamilyStructure`."""
         return self.form.A if self.T is None else self.T.inv().transpose() * self.form.A * self.T.transpose()
 
 
 @dataclass(frozen=True)
 class NoNormalForm(ResultPart):
-    """The reason why there is no normal form; `text` and `T` are given for a member whose chi has a repeated root."""
+    """The reason why there is no normal form; `text` and `T` are set for a member whose chi has a repeated root."""
 
     reason: str
     text: str = field(default="", compare=False)
@@ -53,9 +53,9 @@ class NoNormalForm(ResultPart):
 def system_normal_form(
     system: QuadraticSystem | Any, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
 ) -> SystemNormalForm | NoNormalForm:
-    """Compute the normal form of a system, or the reason why there is none; exact.
+    """Compute the normal form of a system, or the reason why it has none; exact.
 
-    The structure as a member of the family, or the Hamiltonian, may be given, so that it need not be searched for.
+    If the membership in the family or the Hamiltonian is known, pass it, so that it need not be searched for.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> system = random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system
@@ -79,7 +79,7 @@ def system_normal_form(
         f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
     )
     text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
-    from kahanmaps.family.planar import normal_form  # loaded for members only
+    from kahanmaps.family.planar import normal_form  # imported for members only
 
     try:
         form = normal_form(member)

@@ -6,18 +6,18 @@ from enum import StrEnum
 
 
 class Growth(StrEnum):
-    """A kind of growth, slower ones first; a finite number of heights supports it, but does not prove it."""
+    """A kind of growth, slower kinds first; finitely many heights or degrees support a kind, but do not prove it."""
 
-    ZERO = "zero"  # from some term on
-    PERIODIC = "periodic"  # the orbit returned to its initial point: exact
+    ZERO = "zero"  # all degrees are 0 from some step on
+    PERIODIC = "periodic"  # the orbit returned to its initial point: this is exact
     BOUNDED = "bounded"
     LOGARITHMIC = "logarithmic"
     LINEAR = "linear"
     QUADRATIC = "quadratic"
     POLYNOMIAL = "polynomial"
     EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"  # degrees without a recurrence
-    UNDECIDED = "undecided"  # heights that match no rule
+    UNKNOWN = "unknown"  # for degrees that satisfy no recurrence found
+    UNDECIDED = "undecided"  # for heights that match no rule
 
 
 OF_DEGREES = tuple(kind for kind in Growth if kind not in (Growth.PERIODIC, Growth.LOGARITHMIC, Growth.UNDECIDED))

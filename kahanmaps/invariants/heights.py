@@ -1,37 +1,37 @@
 """Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
 
 The height of a rational point x = (p_1 : ... : p_d : q), with integers without a common factor, is here the bit length
-of the largest of them, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: within one bit of the logarithmic projective
-height.
+of the largest of these integers, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: within one bit of the logarithmic
+projective height.
 
-Over a number field Q[t]/g of degree m it is the height of the rational point of all coefficients of 1, t, t^2, ... Up
-to a constant this lies between the height of the point and m times it (denominators are ideals, and the least positive
-integer in an ideal is at most its norm), so that the kind of growth is the same.
+Over a number field Q[t]/g of degree m, it is the height of the rational point that consists of all coefficients of
+1, t, t^2, ... Up to a constant, it lies between the height of the point and m times this height (denominators are
+ideals, and the least positive integer in an ideal is at most its norm), so that the kind of growth is the same.
 
 Theory. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): growth is at most exponential. If an
 orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a component. On a rational
-curve this is a Moebius map: heights grow linearly, or logarithmically if there is one fixed point, or the orbit is
-periodic. On an elliptic curve of degree d in projective space that the map translates by T,
+curve, this is a Moebius map: heights grow linearly, or logarithmically if it has one fixed point, or the orbit is
+periodic. On an elliptic curve of degree d in projective space, on which the map is a translation by T,
 
     h_n = c n^2 + b n + O(1),        c = d hhat(T)/log 2,
 
-by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form d
-= 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of infinite orbits are unbounded
+by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form,
+d = 3 and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of infinite orbits are unbounded
 (Northcott).
 
-There is a formula for c up to a bounded error. Over Q(gamma) the height pairing <T, T> of that point is 1/12
-(docs/mathematics.md, by shioda-1990), so hhat(T) = (log 2) h(gamma)/24 + O(1) at rational gamma (tate-1983), and
+There is a formula for c up to a bounded error. Over Q(gamma) the height pairing <T, T> is 1/12 (docs/mathematics.md,
+by shioda-1990), so hhat(T) = (log 2) h(gamma)/24 + O(1) for rational gamma (tate-1983), and
 
     c = h(gamma)/8 + O(1),       gamma = 1 - disc(h) level^2,
 
-where h(gamma) is the height of a rational number in bits. The O(1) is bounded, but we know no explicit bound; measured
-values are -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So longer coefficients,
-eps or initial points mean faster growth.
+where h(gamma) is the height of a rational number in bits. The O(1) is bounded, but no explicit bound is known to us;
+measured values are -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So longer
+coefficients, eps or initial points mean faster growth.
 
-Measured, not proved: for a member of the family c is the sum of the constants of its m planes (six members with m = 1,
-2, 3: at n = 120 to 3 parts in 10^5). This is plausible as long as the denominators of different planes have few common
-factors. Two planes with the same cubic and the same initial point have equal denominators, and c is the constant of one
-plane.
+Measured, not proved: for a member of the family, c is the sum of the constants of its m planes (six members with m = 1,
+2, 3; at n = 120 the difference is 3 parts in 10^5). This is plausible as long as the denominators of different planes
+have few common factors. If two planes have the same cubic and the same initial point, their denominators are equal, and
+c is the constant of one plane.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
-MIN_HEIGHTS = 9  # for a decision; exponential growth needs fewer, and a budget of digits allows no more
+MIN_HEIGHTS = 9  # needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
 _MIN_FOR_EXPONENTIAL = 6
 _MIN_FOR_LOGARITHMIC = 32
-_NOISE = 4  # bits: smaller deviations of the rise of a quarter from a rule are ignored
+_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
 _MAX_SHOWN = 20
 _NOT_GIVEN = NoNormalForm("none was given")
 
@@ -70,22 +70,22 @@ class HeightGrowth(ResultPart):
     """The heights of an orbit at the steps 0, every, 2 every, ..., and how the orbit ended.
 
     The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
-    increases over the last four intervals of w steps: each is w times the slope of a least-squares line, since single
-    heights fluctuate by a few bits, some by the logarithm of n. Let e_j = r_{j+1} - r_j. The first matching rule holds:
+    increases over the last four intervals of w steps. Each r_j is w times the slope of a least-squares line, since
+    single heights fluctuate by a few bits or by the logarithm of n. Let e_j = r_{j+1} - r_j. The first rule that holds:
 
     * periodic: the orbit returned to its initial point; * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2,
       and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 = e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is
       less than 0.9 e_2^2.)
-    * quadratic: all e_j > 0, none more than 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (c n^2 + b n has equal e_j,
-      wherever its minimum is; n^3 has 1 : 2 : 3, and at least 1 : 1.8 if the last four intervals leave steps out.)
-    * logarithmic: at least 32 heights, the largest of the last interval above that of the first, and from the second
-      interval on a change of less than 1/8 bit from one height to the next. (Linear growth is faster: a Moebius map of
+    * quadratic: all e_j > 0, no e_j exceeds 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (For c n^2 + b n all e_j are
+      equal, wherever its minimum is; for n^3 they are 1 : 2 : 3, or at least 1 : 1.8 if the intervals omit steps.)
+    * logarithmic: at least 32 heights; the largest height in the last interval exceeds that in the first; and from the
+      second interval on, the mean change per height is less than 1/8 bit. (Linear growth is faster: a Moebius map of
       infinite order with two fixed points increases heights by at least 1/2 bit in each step, since its multiplier has
       a Mahler measure of at least 2.)
-    * bounded: the second half has neither a larger nor a smaller height than the first;
+    * bounded: no height in the second half is larger or smaller than all heights in the first half;
     * linear: all r_j > 0, and they differ by at most a quarter of the least, and by at most 4 bits or 1/32 of the
-      least, whichever is more;
-    * undecided otherwise, or with fewer than 9 heights (6 for exponential growth); n log n is undecided, too.
+      least, whichever is larger;
+    * undecided otherwise, or with fewer than 9 heights (6 for exponential growth); n log n is undecided as well.
     """
 
     heights: tuple[int, ...]
@@ -105,7 +105,7 @@ class HeightGrowth(ResultPart):
 
     @property
     def reason(self) -> str:
-        """The measurement that decided the kind, as a phrase."""
+        """The measurement that determined the kind of growth, as a phrase."""
         return self._decision[1]
 
     @cached_property
@@ -113,10 +113,10 @@ class HeightGrowth(ResultPart):
         """The constant c in bits: h_n ~ c n^2 for quadratic growth, h_n ~ c n for linear growth; otherwise None.
 
         It is the leading coefficient of the least-squares polynomial through all heights. If h_n is c n^2 + b n up to
-        fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent ones of
-        standard deviation s; for linear growth 3 s/n and 3.5 s/n^1.5. The second difference of the heights at n/3, 2n/3
-        and n would have 18 s/n^2 and 11 s/n^2: on six members with known c its error at n = 120 was 2 to 18 parts in
-        10^5, that of the polynomial less than 3. Leaving out the first tenth or third of the heights gained nothing.
+        fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent fluctuations
+        of standard deviation s; for linear growth, 3 s/n and 3.5 s/n^1.5. For the second difference of the heights at
+        n/3, 2n/3 and n the errors are 18 s/n^2 and 11 s/n^2: for six members with known c its error at n = 120 was 2 to
+        18 parts in 10^5, less than 3 for the polynomial. Omitting the first tenth or third of the heights is no gain.
         """
         match self.kind:
             case Growth.QUADRATIC:
@@ -127,7 +127,7 @@ class HeightGrowth(ResultPart):
 
     @property
     def ratio(self) -> Fraction | None:
-        """The quotient of the last two heights: for exponential growth the factor of `every` steps."""
+        """The quotient of the last two heights; for exponential growth, the growth factor in `every` steps."""
         return Fraction(self.heights[-1], self.heights[-2]) if len(self.heights) > 1 else None
 
     def __str__(self) -> str:
@@ -146,7 +146,7 @@ class HeightGrowth(ResultPart):
         return f"{', '.join(phrases)}; {self.reason}"
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: heights at the steps 0, 1, 2, 4, 8, ... (times `every`) and the last; numbers rounded as text."""
+        """Return plain data: the heights at 0, 1, 2, 4, 8, ... times `every` and the last; rounded numbers as text."""
         last = len(self.heights) - 1
         shown = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN:]
         return {
@@ -175,15 +175,15 @@ class HeightGrowth(ResultPart):
 
 
 def height(point: Sequence[Any]) -> int:
-    """Return the height in bits of a point with exact coordinates (over Q[t]/g, of the point of all coefficients).
+    """Return the height in bits of a point with exact coordinates (over Q[t]/g, that of the point of coefficients).
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
     if isinstance(point, str) or not hasattr(point, "__len__"):
         raise wrong_kind(point, "the coordinates of a point", 'write a list, e.g. [3, "1/2"]')
-    # These integers have no common factor: a prime that divides the least common denominator to its full power divides
-    # the denominator of one fraction to this power, and not its numerator.
+    # These integers have no common factor: if a prime p divides the least common denominator exactly k times, p divides
+    # the denominator of some fraction k times, and not the numerator of this fraction.
     numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]
     return IntegerPoint.from_rationals([number for row in numbers for number in row]).bits
 
@@ -192,7 +192,7 @@ def height_of(point: OrbitPoint) -> int:
     """Return the height of a point of an orbit over Q, without forming fractions."""
     value = point.value
     if isinstance(value, IntegerPoint):
-        return value.bits  # an IntegerPoint is in lowest terms
+        return value.bits  # the coordinates of an IntegerPoint are in lowest terms
     if isinstance(value, tuple):
         return height(value)
     return value.height
@@ -214,15 +214,15 @@ def height_growth(
         kahan_map: a map over Q at one eps.
         start: the initial point, exact.
         steps: the number of steps.
-        normal_form: the normal form of the system, if known (family.system_normal_form). It is faster, and for large
-            `every` points are computed directly. Each height then costs a gcd: three planes take about 0.2 s for 100
-            steps and 8 s for 300, but 0.8 s with `every` = 15, which is nearly as informative.
-        every: the number of steps between heights.
-        max_digits: the orbit ends at a number with more digits; None for no limit.
-        budget: the work limit, at which the orbit ends after the current step.
+        normal_form: the normal form of the system, if known (family.system_normal_form). It makes steps faster, and for
+            large `every` points are computed directly. Each height then takes a gcd: for three planes 100 steps take
+            0.2 s and 300 steps 8 s, but 0.8 s with `every` = 15, which is nearly as informative.
+        every: the number of steps from one height to the next.
+        max_digits: the orbit ends at a number with more digits than this; None means no limit.
+        budget: the work limit; when it is spent, the orbit ends after the current step.
 
     Returns:
-        The heights, exact, up to the end of the orbit, and their measured kind of growth.
+        The exact heights up to the end of the orbit, and their measured kind of growth.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -241,14 +241,14 @@ def height_growth(
     start_height = height(kahan_map.point(start))
     bits = start_height if kahan_map.eps is None else max(start_height, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
-        # A single step could take minutes, and its numbers would usually be over the budget as well.
+        # A single step could take minutes, and its numbers would usually exceed the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((start_height,), end, every)
     normal_form = _NOT_GIVEN if normal_form is None else normal_form
     method = choose_method(None, "exact", normal_form, None if every == 1 else requested_steps).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
         iterates = Orbit(kahan_map, start, at=requested_steps, normal_form=normal_form, max_digits=max_digits)
-        # A return to the initial point shows at a multiple of the period, since steps are left out.
+        # Since steps are omitted, a return to the initial point is found only at a multiple of the period.
         heights: list[int] = []
         origin, return_step = None, None
         for point, bits in _within(iterates, 1, budget):
@@ -257,7 +257,7 @@ def height_growth(
             elif return_step is None and point.value == origin:
                 return_step = point.step
             heights.append(bits)
-        if not heights:  # the initial point alone is over the budget; step by step it would still be listed
+        if not heights:  # the initial point exceeds the budget; step by step, its height would still be listed
             heights.append(height(iterates.start))
         assert iterates.end is not None
         end = iterates.end
@@ -275,32 +275,32 @@ def height_growth(
 
 
 def decimal_text(value: Fraction, digits: int = 6) -> str:
-    """Round a number to this number of significant digits, ties to even; the text is the same on every machine.
+    """Round a number to this number of significant digits, ties to even; the text is equal on all machines.
 
     >>> decimal_text(Fraction(1, 3)), decimal_text(Fraction(-20, 3), 2), decimal_text(Fraction(5))
     ('0.333333', '-6.7', '5')
     """
     context = decimal.Context(prec=digits, rounding=decimal.ROUND_HALF_EVEN)
-    # Decimal(int) is exact, so the quotient is rounded once.
+    # Decimal(int) is exact, so only the quotient is rounded.
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
 def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
-    """Yield the points at multiples of `every` with their heights until the budget is spent; count their work."""
+    """Yield the points at multiples of `every` with their heights until the budget is spent, and count the work."""
     bits = rise = 0
     for point in orbit:
         if point.step % every == 0:
             before, bits = bits, height_of(point)
             rise = max(0, bits - before)
             yield point, bits
-        # Steps that multiply heights need gcds of longer numbers than steps of slow growth.
+        # If steps multiply the heights, their gcds are of longer numbers than those of steps with slow growth.
         count_work(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
 
 
 def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
-    """Apply the rules in the docstring of HeightGrowth."""
+    """Apply the rules stated in the docstring of HeightGrowth."""
     if len(heights) < _MIN_FOR_EXPONENTIAL:
         return Growth.UNDECIDED, _too_few(heights)
     width = (len(heights) - 1) // 4
@@ -338,7 +338,7 @@ def _too_few(heights: Sequence[int]) -> str:
 def _leading_coefficient(values: Sequence[int], degree: int) -> Fraction:
     """Return the leading coefficient of the least-squares polynomial of degree 1 or 2 through values at 0, 1, 2, ...
 
-    It is computed by projection to the orthogonal polynomial of this degree on these points.
+    The coefficient is computed by projection to the orthogonal polynomial of this degree on these points.
     """
     n = len(values) - 1
     if degree == 1:

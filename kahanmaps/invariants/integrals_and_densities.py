@@ -1,12 +1,12 @@
-"""Integrals and densities of a map as functions of a point and of eps: claimed ones, and those given by theorems.
+"""Integrals and densities of a map as functions of a point and of eps: claimed functions, and those from theorems.
 
-For f = J grad H with a cubic H and any constant skew J the Kahan map Phi_f conserves
+For f = J grad H, with a cubic H and any constant skew J, the Kahan map Phi_f conserves
 
     H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
 
-and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. The map has the
-invariant volume form dx/phi, phi(x~) = phi(x) det dPhi(x), with the denominator phi = det(I - eps f'(x)), which is
-called the density here.
+and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. The map preserves
+the volume form dx/phi, i.e. phi(x~) = phi(x) det dPhi(x), for phi = det(I - eps f'(x)); the denominator phi is called
+the density here.
 Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH), (eq: CMOQ measure).
 """
 
@@ -45,22 +45,22 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_MAX_CONDITION = 200  # characters
+_MAX_CONDITION = 200  # characters of a condition
 
 
 class PhaseFunction(ABC):
-    """A function of x and eps, with a name and a formula to print."""
+    """A function of x and eps, with a name and a printed formula."""
 
     name: str
     formula: str
-    condition: str = ""  # for which eps it is defined and not 0, in the form of `where`
-    scales_with_eps: bool = False  # whether it is known to be eps^k times a function of eps x
+    condition: str = ""  # the eps for which it is defined and not 0, as text returned by `where`
+    scales_with_eps: bool = False  # whether it is known to be a power of eps times a function of eps x
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """Return the value at a point over `field`, None at a pole.
+        """Return the value at a point over `field`; None at a pole.
 
-        Raises SingularStep at an indeterminacy point of a map that the function contains.
+        Raises SingularStep if the function contains a map and the point is an indeterminacy point of this map.
         """
 
     @property
@@ -72,7 +72,7 @@ class PhaseFunction(ABC):
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    With a `root`, the variable before eps represents it. The map is required if the function contains x~.
+    If there is a `root`, the variable before eps represents it. The map is needed if the function contains x~.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class ClaimedFunction(PhaseFunction):
             raise InputError(f"found {name}, a function of x and its iterates, expected one of x alone here")
 
     @property
-    def scales_with_eps(self) -> bool:  # type: ignore[override]  # computed here
+    def scales_with_eps(self) -> bool:  # type: ignore[override]  # computed from the function
         weights = [1] * (len(self.function.names) - 1) + [-1]
         if self.root is not None:
             weights[-2] = 0
@@ -107,7 +107,7 @@ class ClaimedFunction(PhaseFunction):
         return self.on(field, eps, points)
 
     def on(self, field: Field, eps: Any, points: Sequence[Sequence[Any]]) -> Any:
-        """Return the value on successive points of an orbit (one more than it has iterates), None at a pole."""
+        """Return the value at successive points of an orbit (as many as the function needs); None at a pole."""
         with field.working():
             values = () if self.root is None else (self.root.over(field),)
             coordinates = [entry for point in points[: self.iterates + 1] for entry in point]
@@ -115,9 +115,9 @@ class ClaimedFunction(PhaseFunction):
 
 
 def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
-    """Return an orbit of `length` steps with x in the middle or, if the inverse is not known, at the beginning.
+    """Return an orbit of `length` steps with x in the middle, or at the beginning if the inverse map is not known.
 
-    With x in the middle the formulas of the points have lower degrees.
+    With x in the middle, the formulas of the points have lower degrees.
     """
     points, steps_back = [x], 0
     try:
@@ -135,9 +135,9 @@ def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[
 def at_eps(
     function: RationalFunction, eps: fmpq | None, root: Root | None = None, k: int = 0
 ) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Return numerator and denominator, at eps if it is given; the denominator may then be 0.
+    """Return numerator and denominator, at eps if it is given; the denominator may become 0.
 
-    With a `root`, which the k-th variable represents, they are reduced modulo its minimal polynomial.
+    If there is a `root`, represented by the k-th variable, they are reduced modulo its minimal polynomial.
     """
     numerator, denominator = function.numerator, function.denominator
     if eps is not None:
@@ -146,11 +146,11 @@ def at_eps(
 
 
 def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
-    """Return a condition on symbols and eps for the polynomials not to be identically 0; empty if there is none.
+    """Return the condition on symbols and eps that no polynomial is identically 0; empty if it always holds.
 
     Args:
-        dim: the dimension; the further variables of the polynomials are symbols, and eps, which is not 0.
-        polynomials: nonzero polynomials. For a sequence of polynomials, at least one of them is not to be 0.
+        dim: the number of variables; the remaining variables of the polynomials are symbols, and eps, which is not 0.
+        polynomials: nonzero polynomials. For a sequence of polynomials, the condition is that not all of them are 0.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y, a, b, eps = ring(["x", "y", "a", "b", "eps"]).gens()
@@ -166,7 +166,7 @@ def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
 def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
     names = names_of(polynomials[0])
     coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
-    if "eps" in names[dim:]:  # the last variable: divide each coefficient by its power of eps, which is not 0
+    if "eps" in names[dim:]:  # eps, the last variable, is not 0: divide each coefficient by its power of eps
         lowest_orders = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
         coefficients = [
             c.context().from_dict({(*m[:-1], int(m[-1]) - order): value for m, value in c.terms()})
@@ -174,7 +174,7 @@ def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
         ]
     symbols = {name for c in coefficients for name in names if name not in c.unused_gens()}
     if len(symbols) == 1:
-        # In one symbol the common zeros are those of the greatest common divisor.
+        # Polynomials in one symbol have the common zeros of their greatest common divisor.
         coefficients = [reduce(lambda common, c: common.gcd(c), coefficients)]
     if any(c.is_constant() for c in coefficients):
         return ""
@@ -201,7 +201,7 @@ def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Seq
 
 
 class ModifiedHamiltonian(ImageFunction):
-    """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image under the Kahan map of J grad H."""
+    """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image of x under the Kahan map of J grad H."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
         super().__init__(hamiltonian)
@@ -224,7 +224,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^, as in the paper: the map of J grad H may be another map of the class than the one that conserves H~.
+        # x^, as in the paper: H~ is also conserved by maps of other associated systems, which are not the map x -> x^.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -246,10 +246,10 @@ class PaperIntegral(ImageFunction):
 
 
 class CommutantIntegral(ImageFunction):
-    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x); it is defined over Q for all roots of chi.
+    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x); it is rational for arbitrary roots of chi.
 
-    With C = I this is H~. Over the splitting field of chi, the functions for k < m span the same space as the K~_s of
-    all associated systems. Proof in docs/mathematics.md.
+    For C = I it is H~. Over the splitting field of chi, the functions for k < m span the same space as the functions
+    K~_s of all associated systems; the proof is in docs/mathematics.md.
     """
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
@@ -273,7 +273,7 @@ class CommutantIntegral(ImageFunction):
 class ClaimedIntegral(ClaimedFunction):
     """A rational function of the variables and eps that is claimed to be conserved, at `eps` or (None) at every eps.
 
-    `condition` says for which eps it is defined, `is_constant` whether it is a constant there.
+    `condition` says for which eps it is defined, `is_constant` whether it is constant for the given eps.
     """
 
     def __init__(
@@ -298,10 +298,10 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
         integral: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
         eps: half the time step, an exact number, or None for every eps.
-        root: the algebraic number that the only symbol represents, if any.
+        root: the algebraic number that the only symbol stands for, if any.
 
     Returns:
-        The condition as text; empty if I is defined for all of them, or for none.
+        The condition as text; empty if I is defined for all symbols and eps, or for none.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("x/((10*eps - 1)*y)", "x/y"):
@@ -314,9 +314,9 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
 
 
 def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
-    """Whether the quotient of two polynomials does not depend on the first `dim` variables; `denominator` is not 0."""
+    """Whether the quotient of two polynomials is independent of the first `dim` variables; `denominator` is not 0."""
     monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
-    # The coefficient of this monomial in each of them, a polynomial in the other variables.
+    # The coefficients of this monomial in numerator and denominator, polynomials in the remaining variables.
     for polynomial in (numerator, denominator):
         terms = {(*(0,) * dim, *m[dim:]): value for m, value in polynomial.terms() if m[:dim] == monomial}
         coefficients.append(polynomial.context().from_dict(terms))
@@ -329,7 +329,7 @@ class DeterminantDensity(PhaseFunction):
 
     name = "phi"
     formula = "phi = det(I - eps f'(x))"
-    # No condition: phi is 1 at eps = 0, and if it is identically 0 at an eps, there is no map and no claim.
+    # No condition: phi is 1 at eps = 0, and if it is identically 0 at some eps, there is no map and no claim.
 
     def __init__(self, system: QuadraticSystem) -> None:
         self.map = KahanFamily(system)
@@ -345,7 +345,7 @@ class DeterminantDensity(PhaseFunction):
 class ClaimedDensity(ClaimedFunction):
     """A rational function of the variables and eps that is claimed to be a density, at `eps` or (None) at every eps.
 
-    `condition` is that of `density_condition`. Raises InputError as `density_condition` does.
+    `condition` is computed by `density_condition`. Raises InputError like `density_condition`.
     """
 
     def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
@@ -355,20 +355,20 @@ class ClaimedDensity(ClaimedFunction):
 
 
 def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """Return the hypothesis that phi is defined and not 0, since for phi = 0 the law for dx/phi holds trivially.
+    """Return the condition that phi is defined and not 0, since for phi = 0 the law for dx/phi holds trivially.
 
     Args:
         phi: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
         eps: half the time step, an exact number, or None for every eps.
-        root: the algebraic number that the only symbol represents, if any.
+        root: the algebraic number that the only symbol stands for, if any.
 
     Returns:
-        The condition on symbols and eps that neither phi nor its denominator is identically 0, as text; empty if it
-        holds for all of them.
+        The condition on symbols and eps that neither phi nor its denominator is identically 0, as text; empty if the
+        condition always holds.
 
     Raises:
-        InputError: if phi is identically 0 or 0/0, at the given eps and root.
+        InputError: if phi is identically 0 or 0/0 at the given eps and root.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
@@ -395,7 +395,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
 def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
     """Return numerator and denominator of det dPhi(x); for a Kahan map det(I + eps f'(x~)) and det(I - eps f'(x)).
 
-    For a map with several factors they are the products over the factors.
+    For a map with several factors, both are products over the factors.
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerator = [
@@ -409,10 +409,10 @@ def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequ
 
 @dataclass(frozen=True)
 class Normalized:
-    """An integral `function` = (alpha I + beta)/gamma for an integral I, and its limit `leading` for eps -> 0.
+    """An integral `function` = (alpha I + beta)/gamma for an integral I, and its limit `leading` as eps -> 0.
 
-    The `coefficients` alpha, beta and gamma are polynomials in the symbols and eps without common factor. `leading` is
-    None if I is a constant.
+    The `coefficients` alpha, beta and gamma are polynomials in the symbols and eps without a common factor. `leading`
+    is None if I is constant.
     """
 
     function: RationalFunction
@@ -421,7 +421,7 @@ class Normalized:
 
     @property
     def is_shifted(self) -> bool:
-        """Whether a constant was subtracted, because the limit of I is constant."""
+        """Whether a constant was subtracted, because I tends to a constant."""
         return not self.coefficients[1].is_zero()
 
     def combination(self, name: str) -> str:
@@ -445,8 +445,8 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         dim: the number of variables.
 
     Returns:
-        The integral, exact; I itself if it is a constant. The limit is in lowest terms, and its numerator and
-        denominator have coprime integer coefficients, the leading ones positive. Normalized integrals stay unchanged.
+        The normalized integral, exact; I itself if it is constant. The limit is in lowest terms; its numerator and
+        denominator have coprime integer coefficients and positive leading ones. Normalized integrals do not change.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> result = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
@@ -461,7 +461,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         return unchanged
     while True:
         count_work(20 + len(P) + len(Q))
-        # Divide by factors that are free of x: they are conserved trivially.
+        # Divide by factors that do not contain x: they are conserved trivially.
         numerator, denominator = _content(P, dim), _content(Q, dim)
         P, Q = P / numerator, Q / denominator
         alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
@@ -470,8 +470,8 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         p, q = p / common, q / common
         if degree_in(p, dim) or degree_in(q, dim):
             break
-        # P/Q = p/q + O(eps) with constants p and q; without content neither is divisible by eps. The loop ends, since I
-        # is not a function of eps alone: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds that in q P - p Q.
+        # P/Q = p/q + O(eps) with constants p and q; without their content, p and q are not divisible by eps. The loop
+        # ends since I depends on x: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds the power in q P - p Q.
         P, alpha, beta = q * P - p * Q, q * alpha, q * beta - p * gamma
         if P.is_zero():
             return unchanged
@@ -486,7 +486,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
 def measured_integrals(file: SystemFile) -> dict[str, RationalFunction]:
     """Return the integrals that a file claims, by name, in the form in which they are measured along orbits.
 
-    An integral with a constant limit for eps -> 0 is replaced by a combination that tends to an integral of the flow.
+    An integral whose limit as eps -> 0 is constant is replaced by a combination that tends to an integral of the flow.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(measured_integrals(load("euler_top"))), list(measured_integrals(load("volterra_periodic_3")))
@@ -503,13 +503,13 @@ def measured_integrals(file: SystemFile) -> dict[str, RationalFunction]:
 
 
 def _content(polynomial: fmpq_mpoly, dim: int) -> fmpq_mpoly:
-    """Return the greatest common divisor of the coefficients in the first `dim` variables; 1 if it is a number."""
+    """Return the gcd of the coefficients of all monomials in the first `dim` variables; 1 if the gcd is a number."""
     content = reduce(lambda left, right: left.gcd(right), coefficients_in(polynomial, dim))
     return content / content if content.is_constant() else content
 
 
 def _lowest_order_terms(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-    """Return the terms of lowest order in eps, divided by this power of eps."""
+    """Return the terms of lowest order in eps, divided by the power of eps that they contain."""
     order = min(int(monomial[-1]) for monomial in polynomial.monoms())
     terms: dict[tuple[int, ...], fmpq] = {}
     for monomial, value in polynomial.terms():

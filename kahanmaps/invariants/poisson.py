@@ -1,12 +1,12 @@
-"""Poisson tensors P(x), and the transformation law by which a map preserves one.
+"""Poisson tensors P(x), and the transformation law of a tensor that a map preserves.
 
 A map Phi is Poisson for P if dPhi(x) P(x) dPhi(x)^T = P(x~). If M(x) x~ = r(x) defines the map, then dPhi = M^{-1} N,
-and the law becomes, without denominators except those of x~ and P,
+and the law becomes, with no denominators except those in x~ and P,
 
     N(x, x~) P(x) N(x, x~)^T = M(x) P(x~) M(x)^T;
 
-for Kahan maps M = I - eps f'(x) and N = I + eps f'(x~). There are two kinds of tensors: explicit matrices, and
-Pi(x) = J - eps^2 f'(x)^2 J of Hamiltonian systems. Source: petrera-suris-2016, Theorem 12.
+for Kahan maps M = I - eps f'(x) and N = I + eps f'(x~). Two kinds of tensors are implemented: explicit matrices, and
+Pi(x) = J - eps^2 f'(x)^2 J for Hamiltonian systems. Source: petrera-suris-2016, Theorem 12.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def poisson_tensor(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point:
 
 
 class PoissonTensor(ABC):
-    """A skew matrix of functions of x and eps: a Poisson tensor, if the Jacobi identity holds."""
+    """A skew matrix of functions of x and eps; it is a Poisson tensor if the Jacobi identity holds."""
 
     dim: int
     name: str
     formula: str
     has_eps: bool = True
-    symbols: tuple[str, ...] = ()  # further arguments: their values follow those of the variables
+    symbols: tuple[str, ...] = ()  # names of symbols; their values follow the coordinates in `point`
 
     @property
     @abstractmethod
@@ -57,7 +57,7 @@ class PoissonTensor(ABC):
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """Return the matrix P(x), None at a pole."""
+        """Return the matrix P(x); None at a pole."""
 
     @abstractmethod
     def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
@@ -89,9 +89,9 @@ class HamiltonianTensor(PoissonTensor):
 
 
 class MatrixPoissonTensor(PoissonTensor):
-    """A skew matrix of rational functions of the variables, symbols (if any) and, as their last variable, eps.
+    """A skew matrix of rational functions of the variables, then symbols (if any), then eps.
 
-    Raises InputError for a matrix that is not square or not skew.
+    Raises InputError for a matrix that is not square or not skew-symmetric.
 
     >>> MatrixPoissonTensor.from_text([["0", "x*y"], ["-x*y", "0"]], ["x", "y"]).formula
     '{x,y} = x*y'
@@ -139,7 +139,7 @@ class MatrixPoissonTensor(PoissonTensor):
     def read(cls, path: str | Path, variables: Sequence[str], parameters: Mapping[str, fmpq]) -> MatrixPoissonTensor:
         """Read a tensor from a TOML file: the rows `tensor` of the section [poisson], with numbers or text as entries.
 
-        Raises InputError for a file that cannot be read or has another form.
+        Raises InputError if the file cannot be read or has another form.
         """
         document = _TENSOR_FILE.document(_TENSOR_FILE.read(path), str(path))
         section = document.get("poisson")
@@ -152,19 +152,19 @@ class MatrixPoissonTensor(PoissonTensor):
         return cls.from_text([[str(entry) for entry in row] for row in rows], variables, parameters)
 
     def toml_section(self) -> str:
-        """Return the tensor as a section [poisson] of a TOML file, as `read` expects it."""
+        """Return the tensor as a section [poisson] of a TOML file, in the form that `read` expects."""
         rows = [", ".join(f'"{format_rational_function(entry)}"' for entry in row) for row in self.rows]
         return "\n".join(["[poisson]", "tensor = [", *(f"  [{row}]," for row in rows), "]", ""])
 
     @property
     def brackets(self) -> dict[tuple[str, str], RationalFunction]:
-        """The brackets {x_i, x_j} = P_ij for i < j that are not 0."""
+        """The nonzero brackets {x_i, x_j} = P_ij with i < j."""
         names = self.rows[0][0].names if self.rows else ()
         return {(names[i], names[j]): entry for (i, j), entry in self._upper.items()}
 
     @property
     def formula(self) -> str:  # type: ignore[override]
-        """The brackets that are not 0."""
+        """The nonzero brackets as text."""
         equations = [f"{{{a},{b}}} = {format_rational_function(entry)}" for (a, b), entry in self.brackets.items()]
         return ", ".join(equations) or "P = 0"
 
@@ -223,17 +223,17 @@ class MatrixPoissonTensor(PoissonTensor):
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
-    """Return the hypothesis that P is defined and not 0, since for P = 0 the laws for tensors hold trivially.
+    """Return the condition that P is defined and not 0, since for P = 0 the laws for tensors hold trivially.
 
     Args:
         tensor: P, a matrix of functions of the variables, symbols and eps.
         eps: half the time step, an exact number, or None for every eps.
 
     Returns:
-        The condition on symbols and eps that P is defined and not identically 0, as text; empty if it holds for all.
+        The condition on symbols and eps that P is defined and not identically 0, as text; empty if it always holds.
 
     Raises:
-        InputError: if P is identically 0, at the given eps.
+        InputError: if P is identically 0 at the given eps.
 
     >>> for entry in ("(10*eps - 1)*x", "x/(10*eps - 1)", "x + 10*eps - 1"):
     ...     tensor = MatrixPoissonTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"])
@@ -245,7 +245,7 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     entries = [at_eps(entry, eps) for entry in tensor.brackets.values()]
     numerators = [numerator for numerator, _ in entries if not numerator.is_zero()]
     if any(denominator.is_zero() for _, denominator in entries):
-        return ""  # P is not defined at this eps, which the verdict reports
+        return ""  # P is not defined at this eps; the verdict says so
     if not numerators:
         which = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
         raise InputError(f"found the tensor {which}, expected one that is not zero: every map preserves 0")
@@ -255,10 +255,10 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
 def transformation_sides(
     map_: Map, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
-    """Return both sides of the transformation law of this module, at x = `point` and x~ = `image`.
+    """Return both sides of the transformation law stated in the module docstring, at x = `point` and x~ = `image`.
 
-    `values` are those of the symbols. Returns None at a pole of the tensor, and if it is 0 at both points, where the
-    law is trivial. For several factors of a map it is the law of the last one, with P(x) transformed by the others.
+    `values` are the values of the symbols. Returns None at a pole of the tensor, and if P is 0 at both points, where
+    the law is trivial. For a composition, the law is that of the last factor, and the other factors transform P(x).
     """
     field, eps = map_.field, map_.eps
     P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))
@@ -275,9 +275,9 @@ def transformation_sides(
 
 
 def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequence[Any]) -> list[Any] | None:
-    """Return sum_l P_il d_l P_jk + cyclic in i, j, k, for all i < j < k: zero if P is a Poisson tensor.
+    """Return sum_l P_il d_l P_jk + cyclic in i, j, k, for all i < j < k; all are zero if P is a Poisson tensor.
 
-    Returns None at a pole, and where P is 0, since the sum is then 0 for every tensor.
+    Returns None at a pole, and if P is 0 at the point, since the sums are then 0 for every tensor.
     """
     n = tensor.dim
     P = tensor.value(field, eps, point)
@@ -295,5 +295,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    """Whether the matrix is 0. Over bounds the answer is no: the bounds of both sides of the law cover this case."""
+    """Whether the matrix is 0. Over bounds the answer is False: the bounds of both sides of the law cover this case."""
     return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

@@ -1,1 +1,1 @@
-"""Kahan maps and their orbits: over any field, exactly over Q, in floating point."""
+"""Kahan maps and their orbits over any field: exact over Q, and in floating point."""

@@ -1,4 +1,4 @@
-"""A map with an algebraic number in its coefficients: a map with a symbol, and the root that is its value."""
+"""A map whose coefficients contain an algebraic number: a map with a symbol, and the root as value of the symbol."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):
-    """The map `given` with the value `root` for its only symbol, if any; over Q it is a map over the field Q[t]/g.
+    """The map `given`, with the value `root` for its only symbol, if any; over Q it is a map over the field Q[t]/g.
 
-    `at_number` returns the map with a rational number for the symbol, for float computations with a rounded root.
+    `at_number` returns the map with a rational value of the symbol, for float computations with a rounded root.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
@@ -49,7 +49,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with a rational number next to the root. Raises InputError where the root is not real."""
+        """The map with a rational number near the root. Raises InputError if the root is not real."""
         return self._at_number(self.root.real_approximation())
 
     @property
@@ -57,7 +57,7 @@ class AlgebraicMap(MapFamily):
         raise InputError(self.unsupported_reason)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """The map over a field in which the polynomial of the root has a root. Raises BadPrime where it has none."""
+        """Return the map over a field that contains a root of g. Raises BadPrime if GF(p) contains none."""
         over = self.root.number_field if over is QQ else over
         if self._last is None or self._last[0] is not over:
             self._last = over, self.root.over(over)
@@ -65,7 +65,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def _name(self) -> str:
-        """The name of the root: the symbol of the map, or t if the map does not contain the root."""
+        """The name of the root: the symbol of the map; t if the map does not contain the root."""
         return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class AlgebraicMap(MapFamily):
 
 
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:
-    """The map on points over Q[t]/g, t the root. Raises InputError if another root occurs in its coefficients."""
+    """Return the map on points over Q[t]/g. Raises InputError if the coefficients contain another root than `root`."""
     if map_.root is None:
         return AlgebraicMap(map_, root, lambda _: map_)
     if map_.root != root:

@@ -1,7 +1,7 @@
-"""Discretizations given by equations that are linear in the old point and linear in the new one.
+"""Discretizations given by equations that are linear in the old point x and linear in the new point x~.
 
-Among them are Kahan's method and its adjusted and pseudo-Kahan variants, with other coefficients or with skew terms
-like x Y - X y. The inverse map has the equations with the two points exchanged.
+Among them are Kahan's method, and its adjusted and pseudo-Kahan variants with other coefficients or with skew terms
+like x Y - X y. The inverse map has the same equations with x and x~ exchanged.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
 
     Args:
         variables: the names of the n coordinates of x.
-        equations: n polynomials over Q in the n coordinates of x, then the n of x~, then symbols (if any), then eps.
+        equations: n polynomials over Q in the coordinates of x, then of x~ (n each), then symbols (if any), then eps.
 
     Returns:
         The map, exact; its inverse is known.
 
     Raises:
-        InputError: if there are not n equations, or one of them is not linear in each point.
+        InputError: if the number of equations is not n, or an equation is not linear in x and in x~.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> equation = parse_polynomial("X - x - 2*eps*x*X", ["x", "X", "eps"])

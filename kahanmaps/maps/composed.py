@@ -1,7 +1,7 @@
 """Compositions of maps and of their inverses, evaluated factor by factor.
 
-A composition is not defined at a point where one of its steps is not defined, even if the expanded formulas are defined
-there. Formulas are expanded only for output.
+A composition is not defined at a point if one of its steps is not defined there, even if the expanded formulas of the
+composition are defined. Formulas are expanded only for output.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
-_BUDGET = 20_000_000  # products of terms
+_BUDGET = 20_000_000  # products of terms in an expansion
 _TRIES = 20
 
 
@@ -37,7 +37,7 @@ class MapFactor:
 
     @property
     def subject(self) -> tuple[Any, ...]:
-        """The data that determine the factor."""
+        """The data that determine the factor, including its direction."""
         return (int(self.is_inverse), *self.map_and_values)
 
     @property
@@ -46,7 +46,7 @@ class MapFactor:
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
-        """The map over a field. Raises BadPrime, and InputError where a value of a symbol is a pole."""
+        """Return the map over a field. Raises BadPrime; raises InputError if the value of a symbol has a pole."""
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:
@@ -80,13 +80,13 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum over the factors if they are one map and its inverse; otherwise 0, as there is no common flow."""
+        """The sum over the factors, if they are powers of one map; otherwise 0, since they have no common flow."""
         letters = self._letters
         return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
 
     @property
     def _letters(self) -> list[tuple[Any, int]]:
-        """The elementary factors, with compositions expanded, and the signed number of time steps of each."""
+        """The elementary factors, with compositions expanded, each with its signed number of time steps."""
         all_letters: list[tuple[Any, int]] = []
         for part in self.parts:
             part_letters = [(part.map_and_values, part.map.time_steps)]
@@ -100,7 +100,7 @@ class ComposedMap(MapFamily):
         return sum(part.map.digits for part in self.parts)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime if a factor has no reduction."""
+        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if a factor has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
             parts = [part.at(element, over, values) for part in self.parts]
@@ -119,14 +119,14 @@ class ComposedMap(MapFamily):
 
     @property
     def multiplied_out(self) -> ImplicitMap:
-        """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if they are too long."""
+        """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if these are too long."""
         if self._multiplied_out is None:
             raise TooLarge(_too_large(self.parts))
         return self._multiplied_out
 
     @property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names. Raises InputError where they are long."""
+        """The coordinates of x~ as functions of the names. Raises InputError if they are too long."""
         return self.multiplied_out.image
 
     @property
@@ -182,15 +182,15 @@ def composed_map(
 
     Args:
         maps: the maps in the order in which they are applied, or pairs (map, power) with any integer as power.
-        variables: names for the coordinates, by default those of the first map; the others are matched by position.
-        symbols: the symbols of the composition, by default all those of the maps; equal names mean the same symbol.
+        variables: names for the coordinates, by default those of the first map; maps are matched by position.
+        symbols: the symbols of the composition, by default those of all maps; equal names mean the same symbol.
         values: for each map the values of its symbols, rational functions of `symbols`; by default each symbol itself.
 
     Returns:
         The map, exact; its inverse is known if all the maps have one.
 
     Raises:
-        InputError: for maps of different dimensions or with the same variables in another order, and for a negative
+        InputError: if the maps have different dimensions or the same variables in another order, and for a negative
             power of a map without inverse.
 
     >>> from kahanmaps.maps.kahan import KahanFamily
@@ -222,7 +222,7 @@ def composed_map(
         given_parts += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
     if not given_parts:
         raise InputError("found no map to compose, expected at least one")
-    parts: list[MapFactor] = []  # after cancellation of neighbours that are inverse to each other
+    parts: list[MapFactor] = []  # adjacent factors that are inverse to each other are cancelled
     for part in given_parts:
         if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
             parts.pop()
@@ -238,7 +238,7 @@ def composed_map(
             orders = f"{', '.join(first.variables)} and {', '.join(part.map.variables)}"
             raise InputError(f"the maps must have their variables in the same order: got {orders}")
         if part.is_inverse:
-            _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError where there is none
+            _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError if there is no inverse
     variables = first.variables if variables is None else tuple(variables)
     if len(variables) != first.dim:
         raise InputError(f"found {len(variables)} variables for maps of dimension {first.dim}, expected as many")
@@ -246,7 +246,7 @@ def composed_map(
 
 
 def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
-    """The inverses in the opposite order."""
+    """Return the inverses of the factors in the opposite order."""
     return [MapFactor(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
 
 
@@ -269,9 +269,9 @@ def is_involution(map_: MapFamily) -> bool:
 
 
 def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
-    """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms.
+    """Return the image of (x_1, ..., x_n) as functions of the names (eps is the last), in lowest terms.
 
-    None if this takes too many products of terms.
+    Returns None if the expansion takes too many products of terms.
     """
     field = FunctionField(names, _BUDGET, reduces=True)
     n = parts[0].map.dim

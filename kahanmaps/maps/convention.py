@@ -1,7 +1,7 @@
 """The convention for eps and the time step of a map, and the sentences that state it.
 
-A step of a map advances the flow that it approximates by `time_steps` times 2 eps: once for a Kahan map, k times for
-its k-th power. A product of maps of different fields approximates no flow with one time, and has no time step.
+A step of a map advances the flow that it approximates by the time `time_steps` * 2 eps: once 2 eps for a Kahan map,
+k times 2 eps for its k-th power. A composition of maps of different vector fields has no flow and no time step.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def either(hint: str = "", **given: Any) -> Any:
 
 
 def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:
-    """Return eps, which is given as `eps` or by the time step 2 eps, as `time_step` or `h`; None if none is given.
+    """Return eps, given as `eps`, or by the time step 2 eps as `time_step` or `h`; None if none of these is given.
 
-    With `floats`, for floating-point orbits, a float stands for the decimal number that Python prints: 0.1 for 1/10.
+    With `floats`, for floating-point orbits, a float means the decimal number that Python prints: 0.1 means 1/10.
     """
     number = either(": the time step is h = 2 eps", eps=eps, time_step=time_step, h=h)
     if floats and isinstance(number, float):
@@ -41,18 +41,18 @@ def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False
 
 
 def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:
-    """Return the distinct numbers of time steps of the maps, without 0."""
+    """Return the distinct nonzero values of `time_steps` of the maps."""
     return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
 
 
 def time_step(eps: Any, *maps: MapFamily) -> Any:
-    """Return the time step at eps, a number or an element of a field; None if the maps have none, or different ones."""
+    """Return the time step at eps, a number or an element of a field; None unless all maps have the same time step."""
     steps = _time_steps(maps)
     return 2 * steps[0] * eps if len(steps) == 1 else None
 
 
 def convention(*maps: MapFamily) -> str:
-    """Return the sentence about eps for a record about these maps."""
+    """Return the sentence about eps and the time step, for a record about these maps."""
     if maps and not any(map_.has_eps for map_ in maps):
         return NO_EPS
     steps = [f"{2 * steps} eps" for steps in _time_steps(maps)]
@@ -62,16 +62,16 @@ def convention(*maps: MapFamily) -> str:
 
 
 def describe_eps(map_: MapFamily) -> str:
-    """Return a sentence such as "eps is half the time step" for a map; empty if it has no time step."""
+    """Return a sentence such as "eps is half the time step" for a map; empty if the map has no time step."""
     if not map_.time_steps:
         return ""
     return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"
 
 
 def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
-    """Return the entries of a record about eps (None: every eps): its value, the time step and the convention.
+    """Return the entries of a record about eps (None: every eps): the value of eps, the time step and the convention.
 
-    The value is None where the maps do not depend on eps.
+    The value is None if the maps do not depend on eps.
     """
     meaning, step = convention(*maps), time_step(1 if eps is None else eps, *maps)
     return {
@@ -82,7 +82,7 @@ def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
 
 
 def eps_record_suffix(context: Mapping[str, Any]) -> str:
-    """Return the text for the eps of a record and its time step, to follow the name of the map."""
+    """Return the text about eps and the time step in a record, to be appended to the name of the map."""
     meaning = context.get("convention", CONVENTION)
     if meaning == NO_EPS:
         return ""
@@ -93,7 +93,7 @@ def eps_record_suffix(context: Mapping[str, Any]) -> str:
 
 
 def eps_suffix(eps: fmpq | None, *maps: MapFamily) -> str:
-    """Return the text for eps and the time step of these maps, to follow a name.
+    """Return the text about eps and the time step of these maps, to be appended to a name.
 
     >>> eps_suffix(fmpq(1, 10)), eps_suffix(None)
     (', eps = 1/10 (time step 2 eps = 1/5)', ', every eps (the time step is 2 eps)')

@@ -1,7 +1,7 @@
 """The equation of a map over a field: the matrix (M | -r), whose entries are forms of the same degree in (X : Z).
 
-All evaluators use it: integer points (orbits/integer_steps.py), floating-point numbers (floats/steps.py), curves and
-forms in projective space (projective.py).
+All evaluators use this equation: for integer points (orbits/integer_steps.py), for floating-point numbers
+(floats/steps.py), and for curves and forms in projective space (projective.py).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
 from kahanmaps.errors import InputError
 
-_MAX_TERMS = 400  # up to this number of terms explicit forms are faster than minors
+_MAX_TERMS = 400  # explicit forms with at most this number of terms are faster than minors
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, Any], ...]
@@ -29,8 +29,8 @@ Terms = tuple[tuple[int, Any], ...]
 class Equation:
     """The matrix L = (M | -r) over a field, whose entries are forms of the same degree in (X_1, ..., X_n, Z).
 
-    `exponents` lists the monomials of that degree; entry (i, j) of L is the sum of c times monomial k over the pairs
-    (k, c) of `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
+    `exponents` lists the monomials of this degree; entry (i, j) of L is the sum of c times monomial k over the pairs
+    (k, c) in `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
     """
 
     over: Field
@@ -48,7 +48,7 @@ class Equation:
         return int(sum(self.exponents[0]))
 
     def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
-        """Return the monomials at (X_1, ..., X_n, Z), elements of any ring with the multiplication `times`."""
+        """Return the values of the monomials at (X_1, ..., X_n, Z), elements of any ring multiplied by `times`."""
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
@@ -64,7 +64,7 @@ class Equation:
         return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
-        """Return L at the point where the monomials have these values."""
+        """Return L at the point at which the monomials have these values."""
         return [
             [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
              for entry in row]
@@ -72,9 +72,9 @@ class Equation:
         ]  # fmt: skip
 
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
-        """Return the image of (X_1 : ... : X_n : Z) over any ring, the kernel of L, perhaps with a common factor.
+        """Return the image of (X_1 : ... : X_n : Z) over any ring, perhaps with a common factor: the kernel of L.
 
-        It is computed by explicit forms if there are short ones, otherwise by the minors of L.
+        Short explicit forms are evaluated if there are such forms, otherwise the minors of L.
         """
         if self.explicit is None:
             minors = kernel_minors(self.rows(self.monomials(X, times), None), times)
@@ -91,8 +91,8 @@ class Equation:
     def explicit(self) -> Equation | None:
         """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the only row of an equation.
 
-        They have no common factor. None if the map is not explicit or they are long, and over fields other than QQ,
-        GF(p).
+        They have no common factor. None if the map is not explicit or these forms are long, and over fields other than
+        QQ and GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None
@@ -103,7 +103,7 @@ class Equation:
             return None
         denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
         forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
-        # The fractions need not be in lowest terms: their common denominator may share a factor with all numerators.
+        # If fractions are not in lowest terms, their common denominator may share a factor with all numerators.
         common = reduce(lambda P, Q: P.gcd(Q), forms)
         forms = [form / common for form in forms]
         degree = forms[-1].total_degree()
@@ -132,14 +132,14 @@ class Equation:
         ]
 
     def transposed(self) -> Equation:
-        """Return the equation of the inverse map, with x and x~ exchanged (and the sign changed); in degree 1 only."""
+        """Return the equation of the inverse map, with x and x~ exchanged (up to sign); only for degree 1."""
         if self.degree != 1:
             raise InputError(f"found an equation of degree {self.degree} in the point, expected degree 1")
         n = self.dim
         terms = []
         for row in self.terms:
             columns: list[list[tuple[int, Any]]] = [[] for _ in range(n + 1)]
-            with self.over.working():  # otherwise the negative of a ball would have FLINT's default precision
+            with self.over.working():  # outside of this context, the negative of a ball has FLINT's default precision
                 for j, entry in enumerate(row):
                     for k, coefficient in entry:
                         columns[k].append((j, -coefficient))
@@ -171,7 +171,7 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     else:
         monomials = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in monomials]
-    drops_zeros = over is QQ or over.characteristic > 0  # balls may only contain 0
+    drops_zeros = over is QQ or over.characteristic > 0  # a ball that contains 0 need not be 0
     position = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
         tuple(tuple((position[m], c) for m, c in entry.items() if not drops_zeros or c != 0) for entry in row)

@@ -1,6 +1,6 @@
-"""Maps that are given by rational functions: x~_i = P_i(x, eps)/Q_i(x, eps).
+"""Maps given by rational functions: x~_i = P_i(x, eps)/Q_i(x, eps).
 
-As an equation M is the diagonal of the denominators Q_i and r the column of the numerators P_i.
+In the equation M x~ = r, M is the diagonal matrix of the denominators Q_i, and r the column of the numerators P_i.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ def explicit_map(
     """Return the map x -> (P_1/Q_1, ..., P_n/Q_n) with these rational functions as coordinates of the image.
 
     Args:
-        variables: the names of the n coordinates; or a dict {variable: function}, without `image`.
+        variables: the names of the n coordinates; or a dict {variable: function}, then without `image`.
         image: n rational functions of the variables, then symbols (if any), then eps; or texts, or SymPy expressions.
-        inverse: the functions of the inverse map, if known; they are not tested here.
+        inverse: the functions of the inverse map, if known; they are not verified here.
 
     Returns:
-        The map, exact. Without `inverse` the inverse is computed by elimination on demand, if the map is birational.
+        The map, exact. Without `inverse`, the inverse is computed by elimination when it is needed, if it exists.
 
     Raises:
-        InputError: if there are not n functions, or they contain other names.
+        InputError: if the number of functions is not n, or they contain other names.
 
     >>> explicit_map(["x", "y"], ["y", "(y + 2)/x"])([1, 3]), explicit_map({"x": "y", "y": "(y + 2)/x"})([1, 3])
     ((3, 5), (3, 5))

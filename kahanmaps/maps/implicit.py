@@ -1,18 +1,18 @@
 """Birational maps given by an equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
 
 M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' and r = (I + eps B) x + 2 eps c; for a
-map given by rational functions M is the diagonal matrix of their denominators; other discretizations that are linear in
-the new point already have this form. There are three kinds of objects:
+map given by rational functions, M is the diagonal matrix of their denominators. Other discretizations that are linear
+in the new point have this form as well. There are three kinds of objects:
 
 * `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
   `ImplicitMap`.
 * `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
   (usually one), each an `ElementaryMap` with an equation.
-* `Equation` contains the coefficients of M and r over that field (equation.py), from which the evaluators start; the
-  generic evaluator, over any field, is in this module.
+* `Equation` contains the coefficients of M and r over that field (equation.py), which all evaluators use; the generic
+  evaluator, over any field, is in this module.
 
 In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix L =
-(M | -r) of forms of one degree. If that degree is 1, exchanging the two points gives the inverse map.
+(M | -r) of forms of one degree. If this degree is 1, exchanging the two points gives the inverse map.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 
 class Map(LatexDisplay):
-    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different ones.
+    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different eps.
 
-    A map that does not depend on eps has `has_eps` False, and some eps.
+    For a map that does not depend on eps, `has_eps` is False and `eps` is arbitrary.
     """
 
     field: Field
@@ -63,17 +63,17 @@ class Map(LatexDisplay):
 
     @cached_property
     def factors(self) -> tuple[ElementaryMap, ...]:
-        """The elementary maps of which this one is composed, in the order of application."""
+        """The elementary maps whose composition is this map, in the order of application."""
         return tuple(factor for part in self.parts for factor in part.factors)
 
     @cached_property
     def inverse(self) -> Map:
-        """The inverse map. Raises InputError if it is not known."""
+        """The inverse map. Raises InputError if the inverse is not known."""
         return Map([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
 
     @cached_property
     def flow(self) -> tuple[Any, Any] | None:
-        """The flow that the map approximates, as (vector field, time); None if there is none."""
+        """The flow that the map approximates, as (vector field, time); None if it approximates none."""
         flows = [part.flow for part in self.parts]
         known_flows = [flow for flow in flows if flow is not None]
         if len(known_flows) < len(flows) or any(field != known_flows[0][0] for field, _ in known_flows):
@@ -87,7 +87,7 @@ class Map(LatexDisplay):
         return f"Map({', '.join(self.variables)}; {eps}{step}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
-        """Return the map as plain data; eps is None if factors have different ones, time_step if there is no flow."""
+        """Return the map as plain data; eps is None for factors with different eps, time_step if there is no flow."""
         eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
         return {"map": repr(self), "eps": eps, "time_step": step}
 
@@ -98,25 +98,25 @@ class Map(LatexDisplay):
 
     @property
     def is_bilinear(self) -> bool:
-        """Whether all equations are linear in the old point (they are linear in the new one)."""
+        """Whether all equations are linear in the old point (all are linear in the new point)."""
         return all(equation.degree == 1 for equation in self.equations)
 
     def denominator_name(self, backward: bool) -> str:
-        """Return the name of the matrix M(x) of the map, or of its inverse."""
+        """Return the name of the matrix M(x) of the map, or of its inverse if `backward`."""
         return "M'(x)" if backward else "M(x)"
 
     def point(self, values: Any) -> tuple[Any, ...]:
-        """Convert a sequence, {variable: value} or text "1,2" to a point over the field.
+        """Convert a sequence, {variable: value} or a text such as "1,2" to a point over the field.
 
-        Raises InputError for a wrong length or inexact numbers.
+        Raises InputError for a wrong number of coordinates and for inexact numbers.
         """
         return coordinates(values, self.field, self.variables, self.dim)
 
     def __call__(self, *point: Any, **named: Any) -> Any:
         """Return the image of a point: phi((1, 2)), phi(1, 2), phi("1,2"), phi({"x": 1, "y": 2}) or phi(x=1, y=2).
 
-        An array of floats, of shape (dim,) or (points, dim), has an array of floats as image, with NaN where the map is
-        not defined. Calling without arguments returns the map itself, so `phi.inverse()` works.
+        The image of an array of floats, of shape (dim,) or (points, dim), is an array of floats, with NaN if the map is
+        not defined. Calling without arguments returns the map itself, so that `phi.inverse()` works.
         """
         if not point and not named:
             return self
@@ -126,21 +126,21 @@ class Map(LatexDisplay):
         return self.step(x)
 
     def orbit(self, x0: Any, steps: int, **options: Any) -> Any:
-        """Return the orbit of a point under this map, as `km.orbit(phi, x0, steps=steps)` does."""
+        """Return the orbit of a point under this map, like `km.orbit(phi, x0, steps=steps)`."""
         return import_module("kahanmaps.maps.orbits.orbit").orbit(self, x0, steps=steps, **options)
 
     @property
     def time_step(self) -> Any:
-        """The time step of the flow that the map approximates, None if there is none."""
+        """The time step of the flow that the map approximates; None if it approximates none."""
         return None if self.flow is None else self.flow[1]
 
     @property
     def h(self) -> Any:
-        """Short for `time_step`."""
+        """A short name for `time_step`."""
         return self.time_step
 
     def __matmul__(self, other: Map) -> Map:
-        """Return the composition: first `other`, then this map. Raises InputError for another dimension or field."""
+        """Return the composition: first `other`, then this map. Raises InputError if dimension or field differ."""
         if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
@@ -149,13 +149,13 @@ class Map(LatexDisplay):
         return Map([other, self], eps, self.variables)
 
     def __pow__(self, power: int) -> Map:
-        """Return a power of the map: for a negative exponent a power of the inverse, for 0 the identity."""
+        """Return a power of the map: a power of the inverse for a negative exponent, the identity for 0."""
         power = integer(power, "the power")
         if power:
             return Map([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
         n, one = self.dim, self.field.one
         units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
-        rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
+        rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # x~ - x = 0
         flow = self.flow and (self.flow[0], self.field.zero)
         return ElementaryMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
 
@@ -182,9 +182,9 @@ class Map(LatexDisplay):
         return self.generic_step(x)
 
     def integer_step(self, point: IntegerPoint, max_bits: int | None = None) -> IntegerPoint | None:
-        """Return the image of an integer point, for maps over QQ; None if the map is not defined there.
+        """Return the image of an integer point, for maps over QQ; None if the map is not defined at the point.
 
-        If an intermediate point has more than `max_bits` bits, that point is returned instead.
+        If an intermediate point of a composition has more than `max_bits` bits, it is returned instead of the image.
         """
         for factor in self.factors:
             image = factor.integer_steps.step(point)
@@ -205,24 +205,24 @@ class Map(LatexDisplay):
         return image
 
     def inverse_step(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the preimage of a point. Raises SingularStep if the inverse map is not defined there."""
+        """Return the preimage of a point. Raises SingularStep if the inverse map is not defined at the point."""
         return self.inverse.step(point)
 
     def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
-        """Yield each factor with the point that it is applied to. Raises SingularStep."""
+        """Yield each factor with the point to which it is applied. Raises SingularStep."""
         x = self.point(point)
         for k, factor in enumerate(self.factors):
             x = self.factors[k - 1].step(x) if k else x
             yield factor, x
 
     def determinant(self, point: Sequence[Any]) -> Any:
-        """Return det M(x), the denominator of the map; for several factors the product at the intermediate points."""
+        """Return det M(x), the denominator of the map; for several factors, the product at the intermediate points."""
         first, *others = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
             return reduce(mul, others, first)
 
     def jacobian(self, point: Sequence[Any]) -> Any:
-        """Return the Jacobi matrix dPhi(x), for one factor M(x)^{-1} N(x, x~). Raises SingularStep."""
+        """Return the Jacobi matrix dPhi(x); it is M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
         jacobians = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
             return reduce(lambda total, slope: slope * total, jacobians)
@@ -243,8 +243,8 @@ class Map(LatexDisplay):
 class ElementaryMap(Map):
     """The map of a single equation M(x) x~ = r(x) over a field.
 
-    `backward` returns the equation of the inverse; if it is None, the equation must have degree 1, so that exchanging
-    the two points gives the inverse. Subclasses with a faster way to compute the matrices (KahanMap) override them.
+    `backward` returns the equation of the inverse. If it is None, the inverse exchanges the two points, which needs an
+    equation of degree 1. Subclasses that compute the matrices faster (KahanMap) override these methods.
     """
 
     def __init__(
@@ -265,17 +265,17 @@ class ElementaryMap(Map):
 
     @property
     def flow(self) -> tuple[Any, Any] | None:
-        """The flow that the map approximates, as (vector field, time); None if it is not known."""
+        """The flow that the map approximates, as (vector field, time); None if no flow is known."""
         return self._flow
 
     @property
     def equation(self) -> Equation:
-        """The equation of a step."""
+        """The equation M(x) x~ = r(x)."""
         return self._equation
 
     @cached_property
     def inverse(self) -> ElementaryMap:
-        """The inverse map. Raises InputError if it is not known."""
+        """The inverse map. Raises InputError if the inverse is not known."""
         backward = self._equation.transposed() if self._backward is None else self._backward()
         inverse = ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
         inverse.has_eps = self.has_eps
@@ -294,13 +294,13 @@ class ElementaryMap(Map):
         return self.linear_system(self.point(point))[0]
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """Return N(x, x~) = d(r - M x~)/dx at fixed x~, with which dPhi(x) = M(x)^{-1} N(x, x~)."""
+        """Return N(x, x~) = d(r - M x~)/dx at fixed x~, so that dPhi(x) = M(x)^{-1} N(x, x~)."""
         one, zero, n = self.field.one, self.field.zero, self.dim
         X, X_image = [*point, one], [*image, one]
         columns = []
         with self.field.working():
             for k in range(n):
-                derivatives = []  # of the monomials, by X_k
+                derivatives = []  # the derivatives of the monomials with respect to X_k
                 for exponent in self._equation.exponents:
                     derivative = self.field.convert(exponent[k])
                     if exponent[k]:
@@ -328,7 +328,7 @@ class ElementaryMap(Map):
 
     @cached_property
     def integer_steps(self) -> IntegerSteps:
-        """The stepper on integer points, for maps over QQ."""
+        """The object that computes steps on integer points, for maps over QQ."""
         equation = self.equation
         return IntegerSteps(equation.exponents, equation.terms)
 
@@ -338,7 +338,7 @@ class ElementaryMap(Map):
 
 
 def det_of(name: str) -> str:
-    """Return the text for the determinant of a matrix with this name.
+    """Return the text for the determinant of the matrix with this name.
 
     >>> det_of("M(x)"), det_of("I - eps f'(x)")
     ('det M(x)', "det(I - eps f'(x))")
@@ -350,8 +350,8 @@ class MapFamily(LatexDisplay, ABC):
     """A birational map over Q in named variables, which may depend on eps and on symbolic parameters."""
 
     variables: tuple[str, ...]
-    title: str  # the kind of map, in a word or two
-    time_steps: int = 1  # a step approximates the flow for the time `time_steps` * 2 eps; 0 if there is no flow
+    title: str  # the kind of map, in one or two words
+    time_steps: int = 1  # a step approximates the flow for the time `time_steps` * 2 eps; 0 if it approximates none
     denominator_name = "det M"
     root: Root | None = None  # the algebraic number in the coefficients, if any
 
@@ -367,7 +367,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The generators of the ring of its formulas: the variables, then the symbols, then eps."""
+        """The names of the generators of the ring of its formulas: the variables, then the symbols, then eps."""
         return (*self.variables, *self.symbols, "eps")
 
     @property
@@ -377,7 +377,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def scales_with_eps(self) -> bool:
-        """Whether eps Phi(x, eps) is known to depend on eps x only, so that eps = 1 represents every eps."""
+        """Whether eps Phi(x, eps) is known to depend on eps x only, so that results at eps = 1 hold for every eps."""
         return False
 
     @property
@@ -387,12 +387,12 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with rational coefficients that float computations use. Raises InputError if it is not real."""
+        """The map with rational coefficients for float computations. Raises InputError if a coefficient is not real."""
         return self
 
     @property
     def unsupported_reason(self) -> str:
-        """The reason why methods for rational coefficients do not apply; empty if they do."""
+        """The reason why methods for rational coefficients do not apply; empty if they apply."""
         if self.root is None:
             return ""
         return (
@@ -424,7 +424,7 @@ class MapFamily(LatexDisplay, ABC):
         """
 
     def __call__(self, *point: Any, **named: Any) -> Any:
-        """Return the image of a point under a map that does not depend on eps, as `Map.__call__` does."""
+        """Return the image of a point under a map that does not depend on eps, like `Map.__call__`."""
         if self.has_eps or self.symbols:
             raise InputError('found no eps, expected an exact number: map.at("1/10")(x)')
         return self.at(1)(*point, **named)
@@ -437,17 +437,17 @@ class MapFamily(LatexDisplay, ABC):
         return composed
 
     def __pow__(self, power: int) -> MapFamily:
-        """Return a power of the map: for a negative exponent a power of the inverse, for 0 the identity."""
+        """Return a power of the map: a power of the inverse for a negative exponent, the identity for 0."""
         power = integer(power, "the power")
         powers = [(self, power)] if power else [(self, 1), (self, -1)]
         composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(*powers)
         return composed
 
-    rows: Rows  # of (M | -r), polynomials in the `names`
+    rows: Rows  # the rows of (M | -r), whose entries are polynomials in the `names`
 
     @property
     def inverse_rows(self) -> Rows:
-        """The rows of the inverse map, computed by elimination. Raises InputError if that fails."""
+        """The rows of the inverse map, computed by elimination. Raises InputError if the elimination fails."""
         return inverse_rows(self.rows)
 
     @property
@@ -465,9 +465,9 @@ class ImplicitMap(MapFamily):
     """The map of an equation M(x, eps) x~ = r(x, eps), given by the `rows` of (M | -r).
 
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
-    inverse map, if known; otherwise it is computed by exchanging the points if M and r have degree 1 in the variables,
-    and by elimination if not. `title` is the kind of map in a word or two. `time_steps` is 1 if a step approximates a
-    flow over the time 2 eps, namely that of the vector field `of_field`, if given, in the first variables; otherwise 0.
+    inverse map, if known. Otherwise the inverse is computed: by exchanging the points if M and r have degree 1 in the
+    variables, else by elimination. `title` is the kind of map in one or two words. `time_steps` is 1 if a step
+    approximates a flow for the time 2 eps (that of `of_field`, if given, in the first variables); otherwise 0.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -496,7 +496,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def has_eps(self) -> bool:
-        """Whether eps occurs."""
+        """Whether eps occurs in the equation."""
         return any("eps" not in entry.unused_gens() for row in self.rows for entry in row)
 
     @property
@@ -505,12 +505,12 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def inverse_rows(self) -> Rows:
-        """The rows of the inverse map, given or computed by elimination. Raises InputError if that fails."""
+        """The rows of the inverse map, given or computed by elimination. Raises InputError if elimination fails."""
         return inverse_rows(self.rows) if self.backward is None else self.backward
 
     @cached_property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """The polynomials M x~ - r in x, in the coordinates of x~ (named x_new, ...), the symbols and eps.
+        """The polynomials M x~ - r in x, in the coordinates of x~ (named x_new, ...), in the symbols and eps.
 
         >>> x, eps = ring(["x", "eps"]).gens()
         >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
@@ -532,7 +532,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names, if M is diagonal; otherwise None."""
+        """The coordinates of x~ as functions of the names, if M is diagonal, otherwise None."""
         if any(not entry.is_zero() for i, row in enumerate(self.rows) for j, entry in enumerate(row[:-1]) if i != j):
             return None
         return tuple(RationalFunction(-row[-1], row[i]) for i, row in enumerate(self.rows))
@@ -559,7 +559,7 @@ class ImplicitMap(MapFamily):
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
         map_at_eps = ElementaryMap(equation, element, backward, self.variables)
         map_at_eps.has_eps = self.has_eps
-        self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with values of symbols are not cached
+        self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with symbols are not cached
         return map_at_eps
 
     def __repr__(self) -> str:
@@ -580,11 +580,11 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 
 
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
-    """Return the error in a map given by the user, tested at random points modulo primes; empty if there is none.
+    """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
 
-    The map must be defined and dominant, and an inverse map that is given must be the inverse. A wrong map passes one
-    of the three points with probability below 2^-40. If `root` is given, the only symbol stands for it, and primes are
-    chosen modulo which it has a root.
+    The map must be defined and dominant, and a given inverse map must be its inverse. A wrong map passes each of the
+    three points with probability below 2^-40. If `root` is given, it is the value of the only symbol, and only primes
+    modulo which it exists are used.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     tried = 0

@@ -1,11 +1,11 @@
 """The inverse of a map M(x) x~ = r(x), computed by elimination.
 
 The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so each
-polynomial may be replaced by its irreducible factor that vanishes on the graph, which is found by a random point of the
-graph modulo a prime. An unknown x_k that occurs with degree 1 is solved for and substituted into the other equations;
-if there is none, resultants eliminate an unknown. The equation of the last unknown is its minimal polynomial over the
-field of functions of x~: degree 1 gives a coordinate of the inverse map, degree d > 1 means that a generic point of the
-image has at least d preimages.
+polynomial may be replaced by its irreducible factor that vanishes on the graph; a random point of the graph modulo a
+prime shows which factor this is. An unknown x_k that occurs with degree 1 is solved for and substituted into the other
+equations; if there is no such unknown, resultants eliminate one. The equation of the last unknown is its minimal
+polynomial over the field of functions of x~: degree 1 gives a coordinate of the inverse map, degree d > 1 means that a
+generic point of the image has at least d preimages.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix
 
 Rows = tuple[tuple[fmpq_mpoly, ...], ...]
-Quotient = tuple[Any, Any]  # of polynomials
-Solution = dict[int, Quotient]  # the unknowns, by their index among the variables
+Quotient = tuple[Any, Any]  # two polynomials
+Solution = dict[int, Quotient]  # for each unknown, given by its index among the variables, its value
 
-_MAX_TERMS = 3000  # of a polynomial
-_BITS = 30  # of primes: python-flint sorts factors by their coefficients, which must be C integers
-_MAX_RESULTANT = 60_000  # product of the numbers of terms times the sum of the degrees
+_MAX_TERMS = 3000  # terms of a polynomial
+_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, which must be C integers
+_MAX_RESULTANT = 60_000  # product of the numbers of terms, times the sum of the degrees
 
 
 class NotBirational(InputError):
@@ -62,7 +62,7 @@ def inverse_rows(rows: Rows) -> Rows:
     n, names = len(rows), names_of(rows[0][-1])
     context = ring(
         (*(f"{name}." for name in names[:n]), *names)
-    )  # x, then x~ under the names of x, then symbols and eps
+    )  # the variables are x, then x~ (under the names of x), then symbols and eps
     old = [*context.gens()[:n], *context.gens()[2 * n :]]
     new = [*context.gens()[n : 2 * n], context.constant(1)]
     equations = [
@@ -115,10 +115,10 @@ def why_not_birational(rows: Rows) -> str:
 
 
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
-    """Return a random point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
+    """Return a random point (x, x~) of the graph modulo a random prime, followed by the values of symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
-    while True:  # ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
+    while True:  # this ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         arguments = [field.random(rng) for _ in names]
         try:
@@ -167,7 +167,7 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
         solution = _solve(others, [v for v in unknowns if v != u], on_graph)
         (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-constant, factor))
         return solution | {u: _in_lowest_terms(a * d, b * c)}
-    # No equation is linear in an unknown: resultants eliminate one.
+    # If no equation is linear in an unknown, resultants eliminate an unknown.
     if len(unknowns) == 1:
         raise NotBirational(
             "the map is not birational: a generic point of its image has at least "
@@ -191,7 +191,7 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
 
 
 def _coefficients(polynomial: Any, u: int) -> list[Any]:
-    """Return the coefficients of the powers of a variable, the lowest first."""
+    """Return the coefficients of the powers of a variable, starting with the constant term."""
     context = polynomial.context()
     terms_by_power: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
     for monomial, coefficient in polynomial.terms():
@@ -210,7 +210,7 @@ def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> A
 
 
 def _substitute_solution(polynomial: Any, solution: Solution) -> Quotient:
-    """Substitute the solution for the unknowns."""
+    """Substitute the values in `solution` for the unknowns."""
     denominator = polynomial.context().constant(1)
     for u, (numerator, denominator_of_unknown) in solution.items():
         denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])

@@ -4,11 +4,11 @@ Conventions, for the whole library: `eps` is the paper's epsilon and the time st
 
     (x~ - x) / (2 eps) = Q(x, x~) + B (x + x~)/2 + c,
 
-which is linear in x~; explicitly Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} f(x). Its inverse is Phi(., -eps), its
-Jacobi matrix (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
+which is linear in x~; explicitly, Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} f(x). Its inverse is Phi(., -eps), and
+its Jacobi matrix is (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
 gen), (Jac).
 
-Like every map (implicit.py) it has an equation M(x) x~ = r(x): M = I - eps f' and r = (I + eps B) x + 2 eps c.
+Like every map (implicit.py), it has an equation M(x) x~ = r(x), with M = I - eps f' and r = (I + eps B) x + 2 eps c.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class HasMap(Protocol):
     def map(self) -> MapFamily: ...
 
 
-# The arguments of `as_map`.
+# The values that `as_map` accepts.
 SystemLike: TypeAlias = (
     "str | Path | Mapping[Any, Any] | Sequence[Any] | HasMap | QuadraticSystem | MapFamily | Map | CubicHamiltonian "
     "| FamilyMember | AssociatedSystem"
@@ -54,10 +54,10 @@ class KahanMap(ElementaryMap):
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
     It is also substituted for eps in the coefficients of the system; the other symbols take the `values`, elements of
-    the field. Results are exact over QQ and GF(p), and enclosures over RR(bits). For a system over a field, a
-    `SystemOver`, eps may be any element.
+    the field. Results are exact over QQ and GF(p), and enclosures over RR(bits). If the system is already over a field
+    (`SystemOver`), eps may be any element of it.
 
-    M and r are computed from the tensor f'', which is faster over most fields than evaluating the equation.
+    M and r are computed from the tensor f'', which over most fields is faster than evaluating the equation.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
     >>> phi = KahanMap(system, "1/2")
@@ -78,7 +78,7 @@ class KahanMap(ElementaryMap):
         time_step: Any = None,
         h: Any = None,
     ) -> None:
-        """For an inverse map, `inside` is the value of eps in the coefficients, since the step is -eps."""
+        """If this is an inverse map, its step is -eps, and `inside` is the eps in the coefficients."""
         if eps is None:
             eps = resolve_eps(eps, time_step, h)
         if not isinstance(system, QuadraticSystem | SystemOver):
@@ -100,8 +100,8 @@ class KahanMap(ElementaryMap):
 
     @cached_property
     def inverse(self) -> KahanMap:
-        """The inverse map Phi(., -eps) of the same vector field (eps in its coefficients is unchanged)."""
-        with self.field.working():  # otherwise -eps would be a ball of FLINT's default precision
+        """The inverse map Phi(., -eps) of the same vector field (an eps in the coefficients does not change)."""
+        with self.field.working():  # outside of this context, -eps would have FLINT's default precision
             return KahanMap(self._given[0], -self.eps, *self._given[1:])
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
@@ -130,7 +130,7 @@ class KahanMap(ElementaryMap):
         """The equation (I - eps f'(x)) x~ - (I + eps B) x - 2 eps c = 0."""
         field, eps, n = self.field, self.eps, self.dim
         exponents = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
-        # Linear terms are averaged, B (x + x~)/2, so that eps B occurs in the matrix and on the right-hand side.
+        # Linear terms are averaged, B (x + x~)/2, so that eps B occurs in the matrix and in the right-hand side.
         with field.working():
             tensor = (self.local.tensor * -eps).entries()
             B, c = (self.local.B * eps).entries(), (self.local.c * (-2 * eps)).entries()
@@ -162,7 +162,7 @@ class KahanMap(ElementaryMap):
 
 
 class KahanFamily(MapFamily):
-    """The Kahan map of a quadratic system; if eps is among its symbols, the map is an adjusted Kahan map.
+    """The Kahan map of a quadratic system; if its coefficients contain eps, the map is an adjusted Kahan map.
 
     >>> KahanFamily(QuadraticSystem.from_text(["x"], ["x^2"])).at("1/2").step(["1/5"])
     (1/4,)
@@ -225,15 +225,15 @@ class KahanFamily(MapFamily):
 def as_map(value: SystemLike) -> MapFamily:
     """Convert a value to a map; a system stands for its Kahan map.
 
-    The value is a map (one at a fixed eps is a map that does not depend on eps), a system, a system file, a member of
-    the family, a catalogue name, a path, or equations: text, a dictionary {variable: expression}, or a list of
-    equations of SymPy.
-    Raises InputError for anything else.
+    The value is a map (a map at a fixed eps becomes a map that does not depend on eps), a system, a system file, a
+    member of the family, a catalogue name, a path, or equations: text, a dictionary {variable: expression}, or a list
+    of equations of SymPy.
+    Raises InputError for any other value.
     """
     if isinstance(value, QuadraticSystem):
         return KahanFamily(value)
     if isinstance(value, MapFamily):
         return value
-    # Names and paths are read by a higher layer, which is imported only on demand.
+    # Names and paths are read by a higher layer, which is imported only if needed.
     map_: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
     return map_

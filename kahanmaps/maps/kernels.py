@@ -18,8 +18,8 @@ def has_numba() -> bool:
 
 @cache
 def has_llvm() -> bool:
-    """Return whether the compiler of numba is installed in a sufficient version: llvmlite 0.45 (numba 0.62)."""
-    from importlib.metadata import PackageNotFoundError, version  # takes longer to load than the rest of this file
+    """Return whether numba's compiler is installed in a sufficient version: llvmlite 0.45 (numba 0.62)."""
+    from importlib.metadata import PackageNotFoundError, version  # loading it takes longer than the rest of this file
 
     try:
         return tuple(map(int, version("llvmlite").split(".")[:2])) >= (0, 45)
@@ -28,7 +28,7 @@ def has_llvm() -> bool:
 
 
 def choose_kernel(requested: str | None, is_long: bool) -> str:
-    """Return the requested kernel, by default numba if it is installed and `is_long`. Raises InputError otherwise.
+    """Return the requested kernel; by default numba if it is installed and `is_long`. InputError if it is missing.
 
     >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')

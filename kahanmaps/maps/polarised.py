@@ -4,7 +4,7 @@ For x' = f(x) let F be the symmetric d-linear form, in (x, 1), with F(x, ..., x)
 
     (x_{k+d-1} - x_k) / ((d - 1) h) = F(x_k, x_{k+1}, ..., x_{k+d-1}),      h = 2 eps,
 
-is linear in the last point and in the first: a birational map of (x_k, ..., x_{k+d-2}). For d = 2 it is Kahan's.
+is linear in the last and in the first point: a birational map of (x_k, ..., x_{k+d-2}). For d = 2 it is Kahan's map.
 Source: cmoq-2015.
 """
 
@@ -60,10 +60,10 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     last_point = [_linear_in_one_point(f, points, step, degree) for f in rhs]
 
     def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
-        """The row that says that a coordinate of the image is `other`."""
+        """Return the row of the equation that sets a coordinate of the image equal to `other`."""
         return (*(context.constant(int(j == column)) for j in range(copies * n)), -other)
 
-    # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}), and for the inverse (x_{k-1}, ..., x_{k+d-3}) with -h.
+    # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}); the inverse gives (x_{k-1}, ..., x_{k+d-3}), with -h for h.
     zero = [context.constant(0)] * ((copies - 1) * n)
     forward = [unit(k * n + i, points[k + 1][i]) for k in range(copies - 1) for i in range(n)]
     backward = [unit((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
@@ -88,7 +88,7 @@ def _linear_in_one_point(
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
         term = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
-        # The mean over all arrangements is the symmetric form. Some of them are equal, and are counted as often.
+        # The mean over all arrangements of the points is the symmetric form; equal arrangements are counted repeatedly.
         for arrangement in permutations(factors):
             product = term
             for point, j in zip(points, arrangement[:copies], strict=True):

@@ -1,8 +1,8 @@
 """A map on projective space: the image of (X : Z), x = X/Z, is the kernel of the matrix L of its equation.
 
 The n x (n + 1) matrix L of forms of degree d in (X : Z) (equation.py) has n + 1 signed maximal minors, which are forms
-of degree n d; a common factor may be divided out. The forms of several factors are composed. Source:
-petrera-suris-2016, eq. (eq: Phi gen).
+of degree n d; a common factor is divided out if there is one. For several factors of a map, the forms are composed.
+Source: petrera-suris-2016, eq. (eq: Phi gen).
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.inverse import TooLarge
 
-_MAX_TERMS = 3_000  # of a form of several factors, before a common one is divided out
+_MAX_TERMS = 3_000  # terms of a form of a composition, before the common factor is divided out
 
 
 class HomogeneousMap(NamedTuple):
     """The `forms` without common factor that give a map on projective space.
 
     `factor` is the common factor by which the forms of `Equation.image`, composed for several factors of a map, were
-    divided. `denominator` is, up to its sign, det M(x) made homogeneous; for several factors it is the product of their
-    denominators. The map is singular everywhere if the last form is zero.
+    divided. `denominator` is, up to sign, det M(x) made homogeneous; for several factors, it is the product of their
+    denominators. If the last form is zero, the map is singular everywhere.
     """
 
     forms: list[Any]
@@ -37,9 +37,9 @@ class HomogeneousMap(NamedTuple):
 
 
 def homogeneous_map(map_over: Map) -> HomogeneousMap:
-    """The forms of a map over QQ or GF(p) with p < 2^63; exact. Their variables are named x1, ..., xn, z.
+    """Return the forms of a map over QQ or GF(p) with p < 2^63; exact. Their variables are named x1, ..., xn, z.
 
-    Raises TooLarge if the forms of several factors have too many terms when they are composed.
+    Raises TooLarge if a form of a composition of several factors has too many terms.
 
     >>> from kahanmaps.maps.kahan import KahanMap
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -70,7 +70,7 @@ def _of_equation(equation: Equation) -> HomogeneousMap:
 
 
 def _without_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:
-    """The forms divided by their common factor, and this factor, which is 1 if it is a number."""
+    """Return the forms divided by their common factor, and this factor; the factor is 1 if it is constant."""
     context = forms[0].context()
     common = context.constant(0)
     for form in forms:

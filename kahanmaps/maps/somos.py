@@ -1,8 +1,8 @@
 """Somos sequences: t(n + 2) t(n - 2) = alpha t(n + 1) t(n - 1) + beta t(n)^2.
 
-On an elliptic curve with a point T, the sigma function at Q + n T is such a sequence, and at n T the elliptic
-divisibility sequence W with the same alpha and beta (ward-1948, hone-2005). The sections of a line bundle at the points
-Q + n T are forms in their terms.
+On an elliptic curve with a point T, the values of the sigma function at Q + n T form such a sequence, and its values at
+n T form the elliptic divisibility sequence W, with the same alpha and beta (ward-1948, hone-2005). The sections of a
+line bundle at the points Q + n T are forms in the terms of both sequences.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.integers import divide_exactly, split_by_primes
 
-_DIRECT = 8  # up to this n quotients of s(n) are computed from s(n) itself, then from those at n/2
+_DIRECT = 8  # up to this n, quotients of s(n) are computed from s(n) itself, for larger n from quotients at n/2
 
 
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
@@ -33,7 +33,7 @@ def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
 
 
 def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
-    """Return the terms from -bound to bound of W or, given the first terms of W (`multiples`), of another sequence.
+    """Return the terms from -bound to bound of W, or of U if the first terms of W are given as `multiples`.
 
     Raises ZeroDivisionError if a term by which the recurrence divides is 0.
     """
@@ -43,20 +43,20 @@ def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> d
     terms_by_index = dict(enumerate(terms, start=1))
     if not multiples:
         return terms_by_index | {-n: -term for n, term in terms_by_index.items()} | {0: 0 * first[0]}
-    backward = list(first)[::-1]  # the recurrence is the same backwards
+    backward = list(first)[::-1]  # the recurrence is symmetric
     while len(backward) < bound + 5:
         backward.append(_next(backward[-4:], multiples[1]))
     return terms_by_index | {4 - k: term for k, term in enumerate(backward)}
 
 
 def _next(terms: Sequence[Any], H: Any) -> Any:
-    """Return the term after four given terms, for alpha = H^2 and beta = -H^3."""
+    """Return the term that follows four given terms, for alpha = H^2 and beta = -H^3."""
     previous, a, b, c = terms
     return (H**2 * c * a - H**3 * b * b) / previous
 
 
 class Integers:
-    """Rational terms, written as integers coprime to `power` times a rational scale."""
+    """Rational terms, each written as an integer coprime to `power` times a rational scale."""
 
     def __init__(self, power: fmpz) -> None:
         self.power = power
@@ -69,7 +69,7 @@ class Integers:
         return integer, fmpq(part, value.q)
 
     def prepared_divisor(self, value: fmpz) -> fmpz:
-        """Return the divisor for `difference`; here the integer itself."""
+        """Return the divisor in the form that `difference` needs; here the integer itself."""
         return value
 
     def difference(self, s: fmpq, first: fmpz, t: fmpq, second: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
@@ -83,11 +83,11 @@ class Integers:
 
 
 class Terms:
-    """W or another sequence U, without the primes of a finite set: t(n) = s(n) w(n) with integers w(n) and scales s(n).
+    """W or a sequence U, with the primes of a finite set split off: t(n) = s(n) w(n), w(n) integers and s(n) scales.
 
-    The integers w(n) are coprime to the primes of the set. Outside it the terms have no superfluous factors, so w(n) is
-    as short as possible. The terms near n are computed from those near n/2 of both sequences, with divisions by w(1)
-    and w(2) only:
+    The integers w(n) are coprime to the primes in the set. At all other primes the terms have no superfluous factors,
+    so w(n) is as short as possible. The terms near n are computed from the terms near n/2 of both sequences, with
+    divisions by w(1) and w(2) only:
 
         t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
 
@@ -95,8 +95,8 @@ class Terms:
     and `mixed_quotient(n)` is S(n - 1) s(n + 1)/(S(n) s(n)), where S denotes the scales of W.
 
     `numbers` (Integers, or its equivalent over a number field) splits terms into integer and scale. If `gamma` is
-    given, all terms with an index divisible by 3 are stored without a factor gamma^(1/3): in the formula above, a
-    square whose index is divisible by 3 is multiplied by gamma, if the index of the other one is not.
+    given, all terms with an index divisible by 3 are stored without a factor gamma^(1/3). In the formula above, a
+    square whose index is divisible by 3 is then multiplied by gamma if the index of the other square is not.
     """
 
     def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
@@ -105,16 +105,16 @@ class Terms:
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}
         self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
-        self._short_scales: dict[int, Any] = {}  # s(n), as long as it is short
+        self._short_scales: dict[int, Any] = {}  # s(n), while it is short
         self._pairs: dict[int, tuple[Any, Any]] = {}
-        self._order = deque[int]()  # of computation of the terms after the first ones
+        self._order = deque[int]()  # the order in which the terms after the first ones were computed
         self._own_quotients: dict[int, Any] = {}
         self._mixed_quotients: dict[int, Any] = {}
         for n, term in enumerate(first, start=1):
             if term == 0:
                 raise ArithmeticError("one of the first terms is 0")
             self._terms[n], self._short_scales[n] = numbers.split(term)
-        # The division by t(i - j): for 1 and W(2) in the scale, otherwise by w, which divides exactly.
+        # The division by t(i - j): by 1 or W(2) in the scale for W, otherwise by w, which divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
         self._divisor_and_scale = {
             low: (None, first[low - 1])
@@ -186,9 +186,9 @@ class Terms:
         return self._mixed_quotients[n]
 
     def forget(self, n: int) -> None:
-        """Discard the terms with index below n that are not needed for terms near 2 n + 8 and later, but not the first.
+        """Discard the terms with index below n that terms near 2 n + 8 and later do not need, except the first ones.
 
-        Products that are needed again are recomputed, which takes a fifth of their first computation.
+        Products that are needed again are recomputed, which takes a fifth of the time of the first computation.
         """
         while self._order and self._order[0] < n:
             self._terms.pop(self._order.popleft(), None)

@@ -12,7 +12,7 @@ from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InexactNumber, InputError, counted
 
-_MATRICES = (fmpq_mat, fmpz_mat)  # columns or rows of coordinates
+_MATRICES = (fmpq_mat, fmpz_mat)  # a matrix with one column or row contains coordinates
 
 
 def is_float_value(value: Any) -> bool:
@@ -21,14 +21,14 @@ def is_float_value(value: Any) -> bool:
 
 
 def is_float_array(value: Any) -> bool:
-    """Whether the value is an array of numpy with floats."""
+    """Whether the value is a numpy array of floats."""
     return is_float_value(value) and getattr(value, "ndim", 0) > 0
 
 
 def as_point(value: Any, variables: Sequence[str]) -> Any:
     """Return the coordinates of a point in order: from a sequence, an array, {variable: value}, or text such as "1,2".
 
-    The caller converts the coordinates. Raises InputError for other names, for several points, and for anything else.
+    The caller converts the coordinates. Raises InputError for other names, for several points, and for other values.
 
     >>> as_point("1/2, 3", ["x", "y"]), as_point({"y": 3, "x": "1/2"}, ["x", "y"])
     ((1/2, 3), ['1/2', 3])
@@ -63,14 +63,14 @@ def is_several(value: Any) -> bool:
 
 
 def as_points(value: Any, variables: Sequence[str]) -> list[Any]:
-    """Return one point or several as a list of points, each as `as_point` does."""
+    """Return one point or several points as a list; each is converted by `as_point`."""
     return [as_point(point, variables) for point in (value if is_several(value) else [value])]
 
 
 def start_rows(starts: Any, variables: Sequence[str]) -> Any:
-    """Return one initial point or several, each as `as_point` takes it, as the rows of an array of doubles.
+    """Return one initial point or several, in any form that `as_point` accepts, as the rows of an array of doubles.
 
-    Text with a colon is a grid or a line, as for `starts_on`.
+    Text with a colon is a grid or a line, as in `starts_on`.
 
     >>> start_rows(["1/2", 0], ["x", "y"]), start_rows([{"y": 2.5, "x": 1}], ["x", "y"])
     (array([[0.5, 0. ]]), array([[1. , 2.5]]))
@@ -108,7 +108,7 @@ def point_of(arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
 
 
 def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -> tuple[Any, ...]:
-    """Convert what `as_point` takes to a point over the field; raise InputError for a wrong length and floats."""
+    """Convert a value that `as_point` accepts to a point over the field. InputError for a wrong length and floats."""
     if not isinstance(values, tuple):
         values = as_point(values, variables)
     if len(values) != dim:
@@ -122,7 +122,7 @@ def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -
 
 
 def function_value(function: RationalFunction, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
-    """Return the value of a rational function at a point, as `RationalFunction.__call__` does."""
+    """Return the value of a rational function at a point, as described in `RationalFunction.__call__`."""
     if arguments and is_several(arguments[0]):
         import numpy as np
 
@@ -140,7 +140,7 @@ def function_value(function: RationalFunction, arguments: Sequence[Any], named: 
     rest = [name for name in names if name not in given]
     unused = {*function.numerator.unused_gens()}.intersection(function.denominator.unused_gens())
     if len(values) == len(rest) - 1 and rest[-1] == "eps" and "eps" in unused:
-        values.append(0)  # it does not matter
+        values.append(0)  # any value, since the function does not contain this name
     if len(values) != len(rest) or not {*given} <= {*names}:
         hint = ', for example I(x, eps="1/10")' if len(values) == len(rest) - 1 and rest[-1] == "eps" else ""
         values_given = ", ".join([f"{len(values)} values", *(f"{name}=" for name in given)])

@@ -1,6 +1,6 @@
 """Differential equations: quadratic and polynomial vector fields, cubic Hamiltonians.
 
-`km.systems()` is the catalogue, and `km.systems(name)` a system of it, as `kahanmaps systems NAME` shows it.
+`km.systems()` returns the catalogue, and `km.systems(name)` one of its systems, like `kahanmaps systems NAME`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from kahanmaps.function_calls import CallableModule
 
 
 def command(name: str | None = None, **parameters: Any) -> Any:
-    """Return the catalogue, or the system with this name and these values of its parameters."""
+    """Return the catalogue; or its system with this name, with the given values of its parameters."""
     catalog = import_module("kahanmaps.documents.catalog")
     return catalog.catalogue() if name is None else catalog.load(name, **parameters)
 

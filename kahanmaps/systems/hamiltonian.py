@@ -1,7 +1,7 @@
 """Hamiltonian systems f = J grad H with a cubic H and a constant skew matrix J.
 
-Gradients are columns. The standard structure on R^{2m} is J = [[0, I], [-I, 0]], so that {x_i, x_{m+i}} = 1; any
-constant skew J is admitted, singular ones and odd dimensions included.
+Gradients are columns. The standard structure on R^{2m} is J = [[0, I], [-I, 0]], so that {x_i, x_{m+i}} = 1. Any
+constant skew J is allowed, including singular J and odd dimensions.
 """
 
 from __future__ import annotations
@@ -98,13 +98,13 @@ class CubicHamiltonian(LatexDisplay):
     def centre(self) -> tuple[fmpq, ...] | None:
         """Return a point c for which H(c + x) - H(c) is a homogeneous cubic, or None.
 
-        Hess H(c) = 0 are linear equations. Solutions differ by directions on which the cubic part does not depend, so
-        that grad H has the same value at all of them.
+        Hess H(c) = 0 is a system of linear equations. Two solutions differ by a direction on which the cubic part does
+        not depend, so that grad H has the same value at all solutions.
         """
         n, zero = self.dim, (0,) * self.dim
         affine = [component.derivative(j) for i, component in enumerate(self.gradient) for j in range(i + 1)]
         rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in affine]
-        # c = 0 where that is a solution: all but the last of the columns without pivot are zero in this vector.
+        # c = 0 if it is a solution: all entries without pivot but the last are zero in this vector.
         last = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
         if last is None or any(evaluate(component, QQ, last[:n]) != 0 for component in self.gradient):
             return None

@@ -16,7 +16,7 @@ from kahanmaps.algebra.printing import format_polynomial
 
 @dataclass(frozen=True, eq=False)
 class PolynomialField:
-    """A system x' = f(x); `rhs` has a polynomial over Q, in the variables and `symbols`, for each variable.
+    """A system x' = f(x); `rhs` lists for each variable a polynomial over Q in the variables and `symbols`.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x^3*y", "x")))
@@ -71,7 +71,7 @@ class PolynomialField:
         return _from_text, (type(self), names, texts, self.symbols)
 
     def __hash__(self) -> int:
-        # Hashing all terms would be slow; this hash is also the same for equal fields.
+        # Hashing all terms would be slow; equal fields have equal hashes anyway.
         return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))
 
 

@@ -23,9 +23,9 @@ from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, counted
 from kahanmaps.systems.polynomial import PolynomialField
 
-# f'' has dim^3 entries: 10^6 of them at the largest dimension.
+# f'' has dim^3 entries: 10^6 for the largest dimension.
 MAX_DIMENSION = 100
-LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer set up and solved
+LONG_COEFFICIENTS = 2_000  # digits; equations with longer coefficients are not set up and solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     def from_text(
         cls, variables: Sequence[str], rhs: Sequence[str], parameters: dict[str, Any] | None = None
     ) -> QuadraticSystem:
-        """Parse right-hand sides; `parameters` are exact numbers by name."""
+        """Parse right-hand sides; `parameters` maps names to exact numbers."""
         check_names(variables)
         constants = {name: rational(value) for name, value in (parameters or {}).items()}
         return cls(tuple(parse_polynomial(text, variables, constants) for text in rhs))
@@ -86,30 +86,30 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @property
     def _numbers(self) -> SystemOver:
-        """The system over Q. Raises InputError where there are symbols."""
+        """The system over Q. Raises InputError if there are symbols."""
         if self.symbols:
             raise InputError(f"found the symbols {', '.join(self.symbols)} in the coefficients, expected numbers")
         return self.over(QQ)
 
     @cached_property
     def Q(self) -> tuple[fmpq_mat, ...]:
-        """The symmetric matrix of each quadratic form, without symbols."""
+        """The symmetric matrices of the quadratic forms; only for systems without symbols."""
         n, entries = self.dim, (self._numbers.tensor / 2).entries()
         return tuple(fmpq_mat(n, n, entries[i * n * n : (i + 1) * n * n]) for i in range(n))
 
     @cached_property
     def B(self) -> fmpq_mat:
-        """The matrix of the linear part, without symbols."""
+        """The matrix of the linear part; only for systems without symbols."""
         linear: fmpq_mat = self._numbers.B
         return linear
 
     @cached_property
     def c(self) -> tuple[fmpq, ...]:
-        """The constants, without symbols."""
+        """The constant terms; only for systems without symbols."""
         return tuple(self._numbers.c.entries())
 
     def scaled(self, factor: Any) -> QuadraticSystem:
-        """Return the system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""
+        """Return the system x' = factor f(x). Its Kahan map at eps is the Kahan map of f at factor * eps."""
         by = rational(factor)
         return QuadraticSystem(tuple(polynomial * by for polynomial in self.rhs), self.symbols)
 
@@ -128,7 +128,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
     def renamed(self, variables: Sequence[str]) -> QuadraticSystem:
-        """Return the system, without symbols, with other names of its variables."""
+        """Return the system with other names of its variables; only for systems without symbols."""
         context = ring(variables)
         return QuadraticSystem(tuple(p.compose(*context.gens(), ctx=context) for p in self.rhs))
 
@@ -152,10 +152,10 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
     def f(self, *point: Any, **named: Any) -> Any:
-        """Return the right-hand sides at a point, as `SystemFile.f` does. Raises InputError if there are symbols."""
+        """Return the right-hand sides at a point, like `SystemFile.f`. Raises InputError if there are symbols."""
         if self.symbols:
             raise InputError(f"found the symbols {', '.join(self.symbols)}, expected numbers: system.at(values).f(x)")
-        values: Any = import_module("kahanmaps.maps.values")  # from a higher layer
+        values: Any = import_module("kahanmaps.maps.values")  # a module of a higher layer
         return values.values_at(self.rhs, self.variables, values.point_of(point, named))
 
     def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
@@ -173,7 +173,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
             return SystemOver.of(field_of_numbers, self, values)
         system = self._over.get(field_of_numbers)
         if system is None:
-            if len(self._over) >= 8:  # systems modulo random primes are used only for a while
+            if len(self._over) >= 8:  # systems modulo random primes are not needed for long
                 self._over.clear()
             system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
         return system
@@ -195,8 +195,8 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 class SystemOver:
     """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's.
 
-    `tensor` is f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k. Without `B` and
-    `c` the system is homogeneous.
+    `tensor` is f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k. If `B` and `c` are
+    None, the system is homogeneous.
     """
 
     field: Field
@@ -229,11 +229,11 @@ class SystemOver:
                 for monomial, coefficient in polynomial.terms():
                     # Of the variables in the monomial, each as often as it occurs.
                     indices = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
-                    # Twice x_j^2/2 is an integer: f'' makes sense modulo 2 where Q does not.
+                    # Twice x_j^2/2 is integral: f'' is defined modulo 2, though Q is not.
                     is_square = len(indices) == 2 and indices[0] == indices[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
                     for exponent, at in zip(monomial[n:], values, strict=True):
-                        for _ in range(exponent):  # a power of a ball around 0 is nan in python-flint 0.9.0
+                        for _ in range(exponent):  # in python-flint 0.9.0 a power of a ball around 0 is nan
                             value = value * at
                     if len(indices) == 2:
                         j, k = indices
@@ -260,7 +260,7 @@ class SystemOver:
             return SystemOver(field, field.matrix(n * n, n, rows.entries()), matrix * self.B, matrix * self.c)
 
     def hessian_times(self, vector: Sequence[Any]) -> Any:
-        """Return the matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
+        """Return the matrix f''(v), which satisfies f'(x + v) = f'(x) + f''(v)."""
         with self.field.working():
             first, *others = (
                 derivative * self.field.convert(v) for derivative, v in zip(self._derivatives, vector, strict=True)
@@ -286,7 +286,7 @@ class SystemOver:
         return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
-        """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's defining equation (not modulo 2)."""
+        """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's equation; not modulo 2."""
         half = self.field.convert(fmpq(1, 2))
         column_x, column_y = self.field.column(x), self.field.column(y)
         with self.field.working():
@@ -296,7 +296,7 @@ class SystemOver:
 
 
 def as_system(value: Any) -> QuadraticSystem:
-    """Convert a value to a quadratic system; it takes the arguments of `maps.kahan.as_map`, except other maps."""
+    """Convert a value to a quadratic system: any value that `maps.kahan.as_map` accepts, except maps of other kinds."""
     if isinstance(value, QuadraticSystem):
         return value
     system: QuadraticSystem = (

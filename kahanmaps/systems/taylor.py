@@ -1,4 +1,4 @@
-"""Solutions of quadratic systems in balls: Taylor polynomials with a bound of the remainder.
+"""Solutions of quadratic systems in balls, from Taylor polynomials with a bound of the remainder.
 
 Let q = max_i (sum |Q_jk| s + sum |B_j| + |c|/s) over the equations, and v_0 = max |x_i|/s + 1 at a point, for a number
 s > 0. Then x/s is majorized by v - 1, where v' = q v^2, so the k-th Taylor coefficient of x_i is at most
@@ -16,15 +16,15 @@ from kahanmaps.algebra.fields import QQ, RR, rational
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_MAX_STEPS = 200  # more are needed close to a pole of the solution
+_MAX_STEPS = 200  # if more steps are needed, the solution is close to a pole
 _MAX_BITS = 2048
 
 
 def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int = 64) -> list[arb] | None:
     """Return balls that contain the solution x(time) with x(0) = start, of radius at most 2^-bits max |x_i(time)|.
 
-    `start` and `time` are exact numbers; the time may be negative. None if there is no such solution, or if it comes
-    too close to a pole. Raises InputError for a point of another dimension.
+    `start` and `time` are exact numbers; the time may be negative. Returns None if there is no such solution, or if it
+    comes too close to a pole. Raises InputError if the point has another dimension.
 
     >>> [ball] = solution(QuadraticSystem.from_text(["x"], ["x^2"]), [1], "1/2")  # x = 1/(1 - t)
     >>> ball.contains(2), bool(ball.rad() < 1e-18)
@@ -57,7 +57,7 @@ def _solution(system: QuadraticSystem, x: list[arb], time: fmpq, bits: int) -> l
             terms.append((arb(coefficient), [k for k, power in enumerate(monomial) for _ in range(int(power))]))
         equations.append(terms)
     pairs = sorted({tuple(at) for terms in equations for _, at in terms if len(at) == 2})
-    degree = bits // 2 + 1  # with r <= 1/4
+    degree = bits // 2 + 1  # sufficient for r <= 1/4
     for taken in range(_MAX_STEPS):
         size = max(abs(entry).upper() for entry in x)
         scales = [size, 4 * size, arb(1)] if size > 0 else [arb(1)]

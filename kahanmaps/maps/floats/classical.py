@@ -1,11 +1,11 @@
-"""One-step methods for quadratic vector fields in floating point, to be compared with Kahan's; time step h = 2 eps.
+"""One-step methods for quadratic vector fields in floating point, for comparison with Kahan's; time step h = 2 eps.
 
-The step of each method is a straight-line program (straight_line_program.py), so that it runs as the Kahan map does: as
-numpy code, or compiled. The equations of implicit methods are quadratic; they are solved by Newton's method from the
+The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
+numpy code, or compiled. The equations of implicit methods are quadratic. They are solved by Newton's method from the
 step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), so that the program
-knows when it has converged to rounding. The fast step takes a few iterations; where they do not suffice, the careful
-step takes more of them, and where it does not converge either, the orbit ends.
-Sources: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
+can test whether it has converged up to rounding. The fast step takes a few iterations. If these do not suffice, the
+careful step takes more iterations, and if it does not converge either, the orbit ends.
+Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_ROUNDING = 2.0**-52  # relative size of a residual, below which the equations are solved
-_STALLED = 1e-10  # relative size below which the last correction of a careful step is round-off
+_ROUNDING = 2.0**-52  # relative size of a residual below which the equations count as solved
+_STALLED = 1e-10  # relative size below which the last correction of a careful step counts as round-off
 _ITERATIONS, _CAREFUL_ITERATIONS = 2, 8
 
 
 class Method(NamedTuple):
     """A one-step method: its name in tables, its order, and its work per step.
 
-    `evaluations` counts evaluations of f; each part of a separable f counts by its share of the equations as 1/2.
-    `systems` counts linear systems, each of them with f' evaluated at every stage.
+    `evaluations` counts evaluations of f; for a separable f, evaluating one of its two halves counts as 1/2.
+    `systems` counts linear systems; for each of them f' is evaluated at every stage.
     """
 
     title: str
@@ -67,20 +67,20 @@ _TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Rung
     "rk4": ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
 }
 _ROOT3 = sqrt(3.0)
-# Implicit ones: the matrix A, and the weights of the increments in the step, b^T A^-1.
+# Implicit Runge-Kutta methods: the matrix A, and the weights of the increments in the step, b^T A^-1.
 _IMPLICIT: dict[str, tuple[list[list[float]], list[float]]] = {
     "midpoint": ([[0.5]], [2.0]),
     "gauss4": ([[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]], [-_ROOT3, _ROOT3]),
 }
 IMPLICIT = set(_IMPLICIT)
-# Solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
+# The coefficients of solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
 _YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
 
 
 def composition(method: str) -> list[fmpq]:
-    """Return the shares of the time step that a symmetric composition of Kahan steps takes one after the other.
+    """Return the parts of the time step that a symmetric composition of Kahan steps takes one after the other.
 
-    The shares, rational approximations beyond double precision, add up to 1 exactly.
+    The parts are rational approximations beyond double precision, and their sum is exactly 1.
 
     >>> [float(share.p) / float(share.q) for share in composition("yoshida4")]
     [1.3512071919596578, -1.7024143839193153, 1.3512071919596578]
@@ -88,14 +88,14 @@ def composition(method: str) -> list[fmpq]:
 
     if method == "yoshida6":
         side = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
-    else:  # k steps of 1/(k - k^(1/3)), one back, and k of them again; half as many on each side
+    else:  # k steps of 1/(k - k^(1/3)), one step back, and k steps again; with k halved on each side
         k = 4 if method == "suzuki4" else 2
         side = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
     return [*side, 1 - 2 * sum(side, fmpq(0)), *reversed(side)]
 
 
 def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
-    """Return the numbers of evaluations of f and of linear systems in steps, some of them with more iterations.
+    """Return the numbers of evaluations of f and of linear systems in `steps` steps, `repeated` with more iterations.
 
     >>> work("midpoint", 100), work("midpoint", 100, 1)
     ((300, 300), (309, 309))
@@ -106,11 +106,11 @@ def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
 
 
 class MethodEnsemble(FloatEnsemble):
-    """The orbits of many initial points under a method of `METHODS` other than "normal-form", with time step 2 eps.
+    """The orbits of many initial points under a method of `METHODS` except "normal-form", with time step 2 eps.
 
-    `eps` is exact, `halves` the two groups of variables of a separable system (`separated`), for the methods that need
-    them; the other arguments are those of FloatEnsemble. The steps of an orbit in which an implicit method needed more
-    iterations than usual count as near-singular.
+    `eps` is exact. `halves` are the two groups of variables of a separable system (see `separated`), for the methods
+    that need them. All further arguments are as in FloatEnsemble. The steps of an orbit in which an implicit method
+    needed more iterations than usual count as near-singular.
 
     >>> growth = QuadraticSystem.from_text(["x"], ["x"])
     >>> ensemble = MethodEnsemble(growth, "1/20", [[1]], "midpoint", kernel="numpy")
@@ -139,7 +139,7 @@ class MethodEnsemble(FloatEnsemble):
         self._machine_code: Any = None
 
     def end(self, orbit: int) -> OrbitEnd:
-        """Return how one orbit ended so far."""
+        """Return how one orbit has ended."""
         end, method = super().end(orbit), self._made_of[2]
         if self._batch.status[orbit] == SINGULAR and method in IMPLICIT:
             sentence = f"step {end.steps + 1}: Newton's method finds no solution of the equations of {method}"
@@ -166,9 +166,9 @@ def method_step(
 
 
 class FieldProgram:
-    """A quadratic vector field, its Jacobian and its quadratic part, to be written into straight-line programs.
+    """A quadratic vector field, its Jacobian and its quadratic part, to be used in straight-line programs.
 
-    `terms[i]` are pairs (coefficient, indices of at most two variables).
+    `terms[i]` lists the terms of component i as pairs (coefficient, indices of at most two variables).
     """
 
     def __init__(self, system: QuadraticSystem) -> None:
@@ -180,7 +180,7 @@ class FieldProgram:
                 self.terms[-1].append((to_float(coefficient), indices))
 
     def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> Any:
-        """Return f(x), or the sum of the terms of the given degrees."""
+        """Return f(x), or the sum of its terms of the given degrees."""
         kept = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
         return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in kept]
 
@@ -217,7 +217,7 @@ def _explicit(field: FieldProgram, h: float, rows: list[list[float]], weights: l
 
 
 def _separable(field: FieldProgram, h: float, halves: tuple[frozenset[int], frozenset[int]], method: str) -> Write:
-    """Positions and momenta change in turn: positions by h first, or momenta by h/2 before and after them."""
+    """Change positions and momenta in turn: positions by h first, or momenta by h/2 before and after them."""
     positions, momenta = halves
     moves = [(positions, h), (momenta, h)]
     if method == "stormer-verlet":
@@ -234,7 +234,7 @@ def _separable(field: FieldProgram, h: float, halves: tuple[frozenset[int], froz
 
 
 def _implicit(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sum_i w_i z_i; from the parabola through a step of Kahan's method."""
+    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sum_i w_i z_i; the first z_i is on a parabola through a Kahan step."""
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
         n, stages = len(x), range(len(A))
@@ -266,8 +266,8 @@ def _implicit(field: FieldProgram, h: float, A: list[list[float]], weights: list
 def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, checks: StepChecks) -> None:
     """Improve the increments z of the stages x + z in place, and check that they have converged.
 
-    `equations` returns the rows of the matrix and the residuals at the stages, `left` the residual that a correction
-    leaves. Pivots are not checked for their own sake: a bad elimination only slows Newton's method down.
+    `equations` returns the rows of the matrix and the residuals at the stages, `left` the residual after a correction.
+    Pivots need no check of their own: an inaccurate elimination only makes Newton's method slower.
     """
     n = len(x)
     for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
@@ -292,7 +292,7 @@ def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, checks: S
 def separated(
     system: QuadraticSystem, hamiltonian: CubicHamiltonian | None
 ) -> tuple[frozenset[int], frozenset[int]] | str:
-    """Return the positions and the momenta (indices of variables) of H = T(p) + V(q), or why there are none.
+    """Return the positions and the momenta (indices of variables) in H = T(p) + V(q); if there are none, the reason.
 
     >>> from kahanmaps.documents.catalog import load
     >>> file = load("henon_heiles")
@@ -304,7 +304,7 @@ def separated(
     if hamiltonian is None:
         return "the system has no Hamiltonian form J grad H with constant J that is known"
     n, names = system.dim, system.variables
-    # The derivative of a position depends on momenta only, and vice versa: colour the graph of these dependences.
+    # Derivatives of positions depend on momenta only, and vice versa: color the graph of these dependences.
     neighbours: list[set[int]] = [set() for _ in range(n)]
     for i, polynomial in enumerate(system.rhs):
         for j in range(n):
@@ -326,7 +326,7 @@ def separated(
 
 
 class VectorField(FieldProgram):
-    """A quadratic vector field and its Jacobian in doubles, at points (..., dim) and at one point.
+    """A quadratic vector field and its Jacobian in doubles, at an array of points (..., dim) or at one point.
 
     >>> f = VectorField(QuadraticSystem.from_text(["x", "y"], ["x*y + 1", "3*x"]))
     >>> f(np.array([2.0, 5.0])).tolist(), f.jacobian(np.array([2.0, 5.0])).tolist()

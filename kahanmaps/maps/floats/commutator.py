@@ -1,4 +1,4 @@
-"""The commutator of two maps along a float orbit: measured numbers beside the exact check."""
+"""The commutator of two maps along a float orbit, measured in addition to the exact check."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.maps.implicit import MapFamily
 
 _HALVINGS = 6
-_ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, is rounding
+_ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, counts as rounding error
 
 
 @dataclass(frozen=True)
 class Commutator:
     """Measured sizes of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)), relative to the largest coordinate (at least 1).
 
-    `by_step` are pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the largest of all steps.
-    `by_eps` are pairs (eps, size) at n = 1 for eps and its halves; `slope` is the slope of log size against log eps
-    between the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
+    `by_step` contains pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the maximum over all steps.
+    `by_eps` contains pairs (eps, size) at n = 1 for eps and its halves; `slope` is the slope of log size against log
+    eps for the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
     """
 
     by_step: tuple[tuple[int, float], ...]
@@ -38,7 +38,7 @@ class Commutator:
     message: str
 
     def lines(self) -> list[str]:
-        """Return sentences, which say that the numbers are measured."""
+        """Return the result as sentences, which say that the numbers are measured."""
         sizes = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
         if not self.by_step:
             return [f"measured\t{self.message}"]
@@ -63,14 +63,14 @@ class Commutator:
 
 
 def commutator(f: MapFamily, g: MapFamily, eps: Any, start: Sequence[Any], steps: int, ratio: Any = 1) -> Commutator:
-    """Measure the commutator of two maps along the float orbit of a point, and for smaller and smaller eps.
+    """Measure the commutator of two maps along the float orbit of a point, and at its first step for decreasing eps.
 
     Args:
         f, g: the maps, over Q.
         eps: an exact number, half the time step where there is one.
         start: the initial point, exact numbers.
         steps: the number of steps, at least 1.
-        ratio: the quotient of the eps of g and that of f.
+        ratio: the eps of g divided by the eps of f.
 
     >>> from kahanmaps.maps.kahan import as_map
     >>> from kahanmaps.systems.quadratic import QuadraticSystem

@@ -1,9 +1,9 @@
-"""Ensembles of float orbits, advanced together.
+"""Ensembles of float orbits, which are advanced together.
 
-There are two methods: "normal form" if a NormalForm of the system is given (planar_blocks.py), and "generic" for any
-map; steps.py defines a step. There are two kernels: "numpy", always available, and "numba", machine code (the extra
-`fast`; machine_code.py). The results depend on method, kernel and initial points, but not on the number of threads or
-the size of the portions.
+There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py), and "generic" for any
+map; steps.py defines a step. There are two kernels: "numpy", which is always available, and "numba", machine code (the
+extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but not on the number of
+threads or the size of the portions.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SAMPLED = 1000  # steps between samples of the integrals of the planes
-_MAX_SCALAR_ORBITS = 4  # up to this number machine code takes orbits one by one
+SAMPLED = 1000  # steps from one sample of the integrals of the planes to the next
+_MAX_SCALAR_ORBITS = 4  # up to this number, machine code advances one orbit after the other
 _CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
-_RECORDED_NUMBERS = 1_000_000  # in a portion
+_RECORDED_NUMBERS = 1_000_000  # numbers in a portion of recorded points
 
-# A function of a point; with an attribute `of_arrays` that is true, of many points (n, dim).
+# A function of a point; if it has a true attribute `of_arrays`, it is a function of many points (n, dim).
 Function = Callable[[Any], Any]
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drift of an integral: how far its value has moved, one entry for each orbit.
+    """The drift of an integral: how far its value has moved, with one entry for each orbit.
 
     `initial` is the value at the initial point (complex at a complex root of chi), `largest` the largest distance from
-    it at the sampled points, `last` the distance at the last of them (NaN if the orbit has ended). A value that is not
-    finite counts as infinitely far.
+    `initial` at the sampled points, `last` the distance at the last sampled point (NaN if the orbit has ended). The
+    distance of a value that is not finite is infinity.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Drift:
 
 
 def distribution(values: NDArray[Any]) -> dict[str, float]:
-    """Return minimum, quantiles, maximum and mean of numbers; each quantile is one of them. Empty for no numbers.
+    """Return minimum, quantiles, maximum and mean of numbers; a quantile is one of the numbers. Empty for no numbers.
 
     >>> distribution(np.array([4.0, 1.0, 2.0, np.inf]))
     {'min': 1.0, '5%': 1.0, '25%': 1.0, '50%': 2.0, '75%': 4.0, '95%': inf, 'max': inf, 'mean': inf}
@@ -94,16 +94,16 @@ class FloatEnsemble(AttributeHints):
         system: a map, or a quadratic system, which stands for its Kahan map.
         eps: an exact number, half the time step.
         starts: the initial points, one per row: an array of floats, or a sequence of points with exact entries.
-        backward: step by the inverse map.
-        form: the normal form of the system; then a step takes a few operations for each pair of coordinates instead of
+        backward: whether steps are taken by the inverse map.
+        form: the normal form of the system; a step then takes a few operations for each pair of coordinates instead of
             an elimination, and loses fewer digits.
         kernel: "numpy" or "numba" (default: numba if installed).
         threads: the number of cores that numba may use (default: all).
         integrals: functions of a point, or rational functions of the variables and eps, such as those of
             `load(name).integrals`, by name; their drift is measured at recorded points.
-        sampled: the number of steps between samples of the integrals of the planes, and of `integrals` where
-            no points are recorded.
-        radius: if given, every step is examined, and the first point with max |x_i| > radius of each orbit is kept.
+        sampled: the number of steps from one sample to the next, for the integrals of the planes, and for `integrals`
+            if no points are recorded.
+        radius: if given, every step is examined, and for each orbit the first point with max |x_i| > radius is stored.
 
     >>> import numpy as np
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -167,7 +167,7 @@ class FloatEnsemble(AttributeHints):
         compiled = compiled and self._step.careful_code is not None
         self._threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"
-        #: Kernel, method and threads, for example "numba normal form, 2 threads".
+        #: The kernel, the method and the number of threads, for example "numba normal form, 2 threads".
         self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if compiled else f"numpy {method}"
         self._compiled = compiled
         self._watched = []
@@ -190,7 +190,7 @@ class FloatEnsemble(AttributeHints):
         self._machine_code: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state for `pickle`, without the step, which is built and compiled again when loaded."""
+        """Return the state for `pickle` without the step, which is built and compiled again after loading."""
         return {name: value for name, value in vars(self).items() if name not in ("_step", "_machine_code")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -208,7 +208,7 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def x(self) -> FloatArray:
-        """The current points (n, dim); NaN for orbits that have ended."""
+        """The current points, an array (n, dim); NaN for orbits that have ended."""
         if self.step == 0:
             return self._starts.copy()
         x: FloatArray = self._points_of(self._batch.z[None].copy())[0]
@@ -217,13 +217,13 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def status(self) -> NDArray[Any]:
-        """The status of each orbit: "completed" (all its steps so far), "overflow" or "singular"."""
+        """The status of each orbit: "completed" (all steps so far were taken), "overflow" or "singular"."""
         names: NDArray[Any] = np.array(STATUS)[self._batch.status]
         return names
 
     @property
     def failed_at(self) -> NDArray[np.int64]:
-        """The index of the first iterate that does not exist, -1 for orbits that have not ended."""
+        """The index of the first iterate that does not exist, for each orbit; -1 for orbits that have not ended."""
         return self._batch.failed_at.copy()
 
     @property
@@ -233,24 +233,24 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def near_singular_at(self) -> NDArray[np.int64]:
-        """The index of the point before the first near-singular step of each orbit, -1 if there was none."""
+        """The index of the point before the first near-singular step of each orbit; -1 if there was no such step."""
         return self._batch.near_at.copy()
 
     @property
     def escaped_at(self) -> NDArray[np.int64]:
-        """The first step at which max |x_i| > radius, for each orbit; -1 for orbits that were not seen outside."""
+        """The first step at which max |x_i| > radius, for each orbit; -1 if no such point was seen."""
         return self._escaped_at.copy()
 
     @property
     def escaped_to(self) -> FloatArray:
-        """The points (n, dim) at the steps `escaped_at`; NaN for orbits that were not seen outside."""
+        """The points (n, dim) at the steps `escaped_at`; NaN for orbits without such a step."""
         return self._escaped_to.copy()
 
     def statistics(self) -> dict[str, dict[str, float]]:
         """Return distributions over the orbits: of the largest drift of each integral, and of the escape steps.
 
-        The drift is that of the orbits that completed their steps, by the name of the integral. With a radius, "escape
-        step" is the distribution of `escaped_at` over the orbits that left. See `distribution`.
+        The drift is over the orbits that completed their steps, by the name of the integral. If a radius is given,
+        "escape step" is the distribution of `escaped_at` over the orbits that escaped. See `distribution`.
         """
         completed = self._batch.status == RUNNING
         results = {drift.name: distribution(drift.largest[completed]) for drift in self.drift}
@@ -272,7 +272,7 @@ class FloatEnsemble(AttributeHints):
         return (*drifts, *(watched.drift for watched in self._watched))
 
     def end(self, orbit: int) -> OrbitEnd:
-        """Return how one orbit ended so far."""
+        """Return how one orbit has ended."""
         code, last = int(self._batch.status[orbit]), int(self._batch.failed_at[orbit]) - 1
         if code == RUNNING:
             return OrbitEnd("completed", self.step, counted(self.step, "step"))
@@ -281,7 +281,7 @@ class FloatEnsemble(AttributeHints):
         return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of floating-point numbers")
 
     def interrupt(self) -> None:
-        """Stop `advance` or `records` after the current (or the next) portion; safe to call from a signal handler."""
+        """Stop `advance` or `records` after the current or the next portion; safe to call from a signal handler."""
         self._interrupted = True
 
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
@@ -297,7 +297,7 @@ class FloatEnsemble(AttributeHints):
             pass
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
-        """Take `steps` steps lazily, and yield the points at multiples of `every` in portions (count, n, dim).
+        """Take `steps` steps lazily, and yield the points at multiples of `every` in portions, arrays (count, n, dim).
 
         The initial points are included; points after the end of an orbit are NaN.
         """
@@ -322,7 +322,7 @@ class FloatEnsemble(AttributeHints):
                     yield x
 
     def _note_escapes(self, first: int, x: FloatArray) -> None:
-        """Keep the first points outside of the radius among those at the steps first, first + 1, ..."""
+        """Store for each orbit the first point outside the radius among the steps first, first + 1, ..."""
         if self._radius is None:
             return
         inside = np.flatnonzero(self._escaped_at < 0)
@@ -333,9 +333,9 @@ class FloatEnsemble(AttributeHints):
         self._escaped_at[inside[left]], self._escaped_to[inside[left]] = first + at, x[at, inside[left]]
 
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
-        """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: none)."""
+        """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: no states)."""
         batch, stop, rows = self._batch, self.step + steps, self._step.rows
-        # Rough estimates of the time per step; for arrays only a part of it grows with the number of orbits.
+        # Rough estimates of the time per step; for arrays only a part of the time grows with the number of orbits.
         if self._compiled:
             speed = 8e9 if self.n > _MAX_SCALAR_ORBITS else 1.5e9
             seconds = self.n * self._step.operations / speed / self._threads
@@ -391,14 +391,14 @@ class FloatEnsemble(AttributeHints):
         records, _, n = record.shape
         if self._blocks is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
-        if n == 1:  # multiplying contiguous numbers is fastest
+        if n == 1:  # a product of contiguous arrays is fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
         x = _product(self._blocks.state_to_x, record)
         return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(records, n, self.system.dim)
 
 
 class WatchedFunction:
-    """A function of points, and its drift from the values at the initial points."""
+    """A function of points, and its drift from its values at the initial points."""
 
     def __init__(self, name: str, function: Function, starts: FloatArray) -> None:
         self.name = name
@@ -408,7 +408,7 @@ class WatchedFunction:
         self._last = np.zeros(len(starts))
 
     def observe(self, x: FloatArray) -> None:
-        """Update the drift by points (count, n, dim); points with NaN are skipped."""
+        """Update the drift with points (count, n, dim); points with NaN are skipped."""
         for points in x:
             is_finite = ~np.isnan(points).any(axis=1)
             self._last[~is_finite] = np.nan
@@ -454,9 +454,9 @@ def ensemble(
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.
 
-    The arguments are those of `FloatEnsemble`; `x0` stands for `starts`, `n` for `steps`, and `time_step` or `h` for
-    2 eps. `starts` may also be a grid or a line, as text: "x=-1:1:20, y=1/2" or "0,0:1,2:50". Raises InputError for a
-    negative number of steps and for invalid arguments.
+    The arguments are those of `FloatEnsemble`; `x0` is another name of `starts`, `n` of `steps`, and `time_step` or `h`
+    give 2 eps. `starts` may also be a grid or a line, as text: "x=-1:1:20, y=1/2" or "0,0:1,2:50". Raises InputError
+    for a negative number of steps and for invalid arguments.
 
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
     >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
@@ -493,11 +493,11 @@ def require_every(every: int) -> None:
 
 
 def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return matrix @ columns (..., rows, n), with sums from left to right.
+    """Return matrix @ columns, for columns of shape (..., rows, n), with sums taken from left to right.
 
-    BLAS is not used, since its order of summation depends on the shape of the arrays.
+    BLAS is not used, since its order of summation depends on the shapes of the arrays.
     """
-    with np.errstate(all="ignore"):  # an overflow is a status, not a warning
+    with np.errstate(all="ignore"):  # an overflow is reported as a status, not as a warning
         total: FloatArray = matrix[:, :1] * columns[..., :1, :]
         for j in range(1, matrix.shape[1]):
             total += matrix[:, j, None] * columns[..., j : j + 1, :]

@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 
 def to_float(value: fmpq) -> float:
-    """Return the double nearest to a rational number. Raises InputError if it is out of the range of doubles."""
+    """Return the double nearest to a rational number. Raises InputError if the number is too large for a double."""
     try:
         nearest = int(value.p) / int(value.q)
     except OverflowError as error:
@@ -31,12 +31,12 @@ def to_float(value: fmpq) -> float:
 
 
 def double(value: Any) -> float:
-    """Return an exact number rounded to the nearest double, and a float of Python or numpy as it is."""
+    """Round an exact number to the nearest double; return a float of Python or numpy unchanged."""
     return float(value) if isinstance(value, float | np.floating) else to_float(rational(value))
 
 
 def to_floats(values: Sequence[Any]) -> FloatArray:
-    """Round exact numbers to the nearest doubles; floats are left as they are.
+    """Round exact numbers to the nearest doubles; floats do not change.
 
     >>> to_floats(["1/3", "2"])
     array([0.33333333, 2.        ])
@@ -51,7 +51,7 @@ def exact(value: float) -> fmpq:
 
 
 class _Floats:
-    """Floating-point numbers with the part of the interface of a field that evaluation and printing need."""
+    """Floating-point numbers, with those methods of a field that evaluation and printing need."""
 
     zero = 0.0
     one = 1.0
@@ -62,7 +62,7 @@ class _Floats:
 
     @staticmethod
     def value(polynomial: Any, point: Sequence[float]) -> None:
-        """Return None: floating-point numbers have no method of their own, so `evaluate` sums the terms."""
+        """Return None: floats have no evaluation method of their own, so `polynomials.evaluate` sums the terms."""
 
     @staticmethod
     def is_zero(value: float) -> bool:
@@ -83,7 +83,7 @@ FLOATS: Any = _Floats()
 def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
     """Return a function that evaluates a rational function in double precision.
 
-    Its value is None where the denominator is 0 or the result is not finite.
+    Its value is None if the denominator is 0 or the result is not finite.
     """
 
     def value(point: Sequence[float]) -> float | None:

@@ -1,8 +1,8 @@
 """Orbits in floating point, one at a time.
 
-This implementation is independent of the exact one and tested against it. Exact numbers are converted only by
-`to_floats`. The modules of this folder: `steps` defines a step, `straight_line_program` its operations, `machine_code`
-compiles them, `planar_blocks` is the normal form in doubles, `ensemble` advances many orbits, `npy_file` stores them.
+This implementation is independent of the exact one and tested against it. Only `to_floats` converts exact numbers. The
+modules of this folder: `steps` defines a step, `straight_line_program` its operations, `machine_code` compiles these,
+`planar_blocks` is the normal form in doubles, `ensemble` advances many orbits, `npy_file` stores them.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class FloatOrbit:
         eps: an exact number, half the time step.
         start: the initial point, exact numbers.
         steps: the number of steps; None for no limit.
-        backward: step by the inverse map.
-        form: the normal form of the system, by which steps are much faster and lose fewer digits.
-        kernel: "numpy" or "numba"; by default numba, if installed, for more than 20,000 steps.
-        every: deliver only the points whose step is a multiple of this number.
+        backward: whether steps are taken by the inverse map.
+        form: the normal form of the system; with it, steps are much faster and lose fewer digits.
+        kernel: "numpy" or "numba"; by default numba, if it is installed and more than 20,000 steps are requested.
+        every: only the points whose step is a multiple of this number are yielded.
         integrals, sampled: see FloatEnsemble.
 
-    Points are computed in portions, ahead of the one delivered; near-singular steps and drift refer to all points
-    computed so far.
+    Points are computed in portions, ahead of the point yielded; the near-singular steps and the drift refer to all
+    points computed so far.
 
     >>> orbit = FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 4, every=2)
     >>> [(step, float(x[0])) for step, x in orbit]
@@ -110,7 +110,7 @@ class FloatOrbit:
 
     @property
     def kernel(self) -> str:
-        """A phrase for kernel and method: "numpy generic", "numba normal form, 1 thread"."""
+        """Kernel and method as a phrase: "numpy generic", "numba normal form, 1 thread"."""
         return self._ensemble.kernel
 
     @property
@@ -120,7 +120,7 @@ class FloatOrbit:
 
     @property
     def near_singular_at(self) -> int | None:
-        """The index of the point before the first near-singular step; None if there was none."""
+        """The index of the point before the first near-singular step; None if there was no such step."""
         return int(self._ensemble.near_singular_at[0]) if self.near_singular else None
 
     @property
@@ -143,10 +143,10 @@ class FloatOrbit:
                     return
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the step reached and the points (count, dim) since the previous portion."""
+        """Yield the step reached, and an array (count, dim) of the points since the previous portion."""
         if (
             self.end is not None or self._ensemble.step
-        ):  # start again: an ensemble would continue the previous iteration
+        ):  # create a new ensemble: the old one would continue the previous iteration
             self._ensemble = self._fresh()
         ensemble = self._ensemble
         for x in ensemble.records(_NO_LIMIT if self.steps is None else self.steps, self.every):
@@ -160,14 +160,14 @@ class FloatOrbit:
         self.end = ensemble.end(0)
 
 
-_MIN_COMPILED_STEPS = 20_000  # compiling pays for more steps
+_MIN_COMPILED_STEPS = 20_000  # for fewer steps, compiling takes longer than it saves
 _NO_LIMIT = 1 << 62
 
 
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
     """Write an orbit to a .npy file of shape (points, dim): the initial point and every `orbit.every`-th iterate.
 
-    `progress` is called with the current step about ten times a second; `orbit.interrupt()` stops after the current
+    `progress` is called with the current step about ten times a second. `orbit.interrupt()` stops after the current
     portion.
     """
     with NpyFile(path, (orbit.dim,)) as file:

@@ -1,11 +1,11 @@
-"""Lyapunov exponents of float orbits, many at once, by the exact tangent map.
+"""Lyapunov exponents of many float orbits, computed together from the exact tangent map.
 
 The orbits are computed in portions (ensemble.py). The tangent map dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is
-(I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion at once. Tangent maps are
-multiplied along each orbit as long as the product stays well conditioned; then the product is applied to a frame of n
-tangent vectors, which is made orthonormal again by a QR decomposition. The logarithms of the lengths add up to the
-exponents. The tangent map is the exact derivative, evaluated in double precision, without finite differences.
-Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tangent map.
+(I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion together. Tangent maps are
+multiplied along each orbit as long as the product stays well conditioned. The product is then applied to a frame of n
+tangent vectors, which a QR decomposition makes orthonormal again. The sums of the logarithms of the lengths give the
+exponents. The tangent map is the formula for the derivative, evaluated in double precision, not a finite difference.
+Sources: benettin-1980 for the method; petrera-suris-2016, eq. (Jac), for the tangent map.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.values import start_rows
 
-MAX_NUMBERS = 20_000_000  # entries of all frames together
-_PORTION = 200_000  # entries of the tangent maps of a portion
+MAX_NUMBERS = 20_000_000  # entries of the frames of all orbits together
+_PORTION = 200_000  # entries of the tangent maps in a portion
 _MAX_PORTION_STEPS = 512
-_MAX_CONDITION = 16.0  # logarithm of the condition of a product of tangent maps; beyond it digits would be lost
-_MAX_NORM = 300.0  # logarithm of the norm of a tangent map, which is squared
-_MIN_COMPILED_WORK = 10_000  # orbits times steps below which compiling does not pay
+_MAX_CONDITION = 16.0  # logarithm of the condition number of a product; larger products would lose digits
+_MAX_NORM = 300.0  # logarithm of the norm of a tangent map, whose square must not overflow
+_MIN_COMPILED_WORK = 10_000  # orbits times steps; for less work, compiling takes longer than it saves
 
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov(ResultPart):
-    """The Lyapunov exponents of an ensemble in floating point, largest first.
+    """The Lyapunov exponents of an ensemble of float orbits, largest exponent first.
 
-    `unit` is the time of a step: 2 eps, or 1 for a map without a time step, so that its exponents are per step.
-    `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them; `half`
-    are the exponents over the first half of the steps, which show how far they have converged. `log_volume` is the mean
-    of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is the
-    number of orbits that overflowed or reached a pole; they are excluded. `steps` is the number of counted steps, after
-    `transient` uncounted ones; fewer than requested if `stopped` by a time limit.
+    `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are then per step.
+    `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them. `half`
+    contains the exponents over the first half of the steps, to show how far they have converged. `log_volume` is the
+    mean of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is
+    the number of orbits that overflowed or reached a pole; they are excluded. `steps` is the number of counted steps,
+    after `transient` uncounted steps; it is smaller than requested if a time limit `stopped` the computation.
     """
 
     unit: float
@@ -100,12 +100,12 @@ class Lyapunov(ResultPart):
 
     @property
     def change(self) -> FloatArray:
-        """The distance between the mean exponents over the first half of the steps and those over all steps."""
+        """The distances of the mean exponents over the first half of the steps from those over all steps."""
         return np.abs(_over_orbits(np.mean, self.half) - self.mean)
 
     @property
     def residual(self) -> float:
-        """The largest difference of the sum of exponents and log |det dPhi|, normally round-off; NaN without orbits."""
+        """The maximum of |sum of exponents - log |det dPhi||, normally round-off; NaN if no orbit was completed."""
         return (
             float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max()) if len(self.exponents) else float("nan")
         )
@@ -132,21 +132,21 @@ def lyapunov_exponents(
     """Compute the Lyapunov exponents of float orbits of a map.
 
     The method is that of Benettin et al. with the exact tangent map. In double precision chaotic orbits are not
-    accurate, only their statistics are.
+    accurate, but their statistics are.
 
     Args:
         system: the map; a quadratic system stands for its Kahan map.
         starts, x0: the initial points, an array (orbits, dim) of floats, or a single point.
-        eps: an exact number of either sign, half the time step if there is one; `time_step` or `h` (2 eps) instead.
+        eps: an exact number of either sign, half the time step if there is one; `time_step` or `h` give 2 eps instead.
         steps, n: the number of counted steps, at least 2.
-        transient: the number of uncounted steps before them.
-        progress: called with a message for each portion.
+        transient: the number of uncounted steps before the counted ones.
+        progress: a function that is called with a message for each portion.
 
     Returns:
-        The exponents (Lyapunov); if a TimeLimit is raised, over the steps completed before.
+        The exponents (Lyapunov). If a TimeLimit is raised, they are over the steps completed before it.
 
     Raises:
-        InputError: for eps = 0, fewer than 2 steps, and initial points of a wrong shape.
+        InputError: for eps = 0, for fewer than 2 steps, and for initial points of a wrong shape.
 
     Source: benettin-1980.
 
@@ -179,7 +179,7 @@ def lyapunov_exponents(
     frames = np.broadcast_to(np.eye(n), (len(x), n, n))
     sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
     marks = [transient, transient + steps // 2, transient + steps]
-    checkpoint = 0, sums, half, volumes, alive  # after the last complete portion
+    checkpoint = 0, sums, half, volumes, alive  # the state after the last complete portion
     with suppress(TimeLimit):
         while orbits.step < marks[-1] and alive.any():
             progress(f"step {orbits.step} of {marks[-1]}")
@@ -197,8 +197,8 @@ def lyapunov_exponents(
             alive[alive] = sound
             maps, log_dets, norms, Q = maps[:, sound], log_dets[:, sound], norms[:, sound], frames[alive]
             volumes[alive] += log_dets.sum(axis=0)
-            # Logarithms of bounds: the condition number of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, and that of
-            # a product at most the product of those of the factors.
+            # Logarithms of bounds: the condition number of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, and the
+            # condition number of a product is at most the product of the condition numbers.
             log_conditions = np.maximum(
                 np.log(2.0) + n * (norms - np.log(n) / 2) - log_dets, norms * _MAX_CONDITION / _MAX_NORM
             )
@@ -221,7 +221,7 @@ def lyapunov_exponents(
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
     unit = convention.time_step(float_eps, map_) or 1.0
-    order = np.argsort(-sums[alive] / unit, axis=1)  # the unit is negative for negative eps
+    order = np.argsort(-sums[alive] / unit, axis=1)  # for negative eps the unit is negative
     first_half = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
     return Lyapunov(
         unit,

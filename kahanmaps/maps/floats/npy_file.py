@@ -1,11 +1,11 @@
-"""A .npy file to which float orbits are appended as they are computed, and which is valid at every time.
+"""A .npy file to which float orbits are appended as they are computed; the file is valid at any time.
 
-A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header for the first length
-to grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in place. A
-reader in between, or after the program was killed, finds a file that is complete up to the last portion (readers ignore
-numbers that the header does not count yet). The length shows how much was computed, and no disk space is used for steps
-that are never taken. A closed file is on the disk (fsync); if the machine crashes before, the last portions may be
-missing, or be zeros that the header already counts.
+A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header in which the first
+length can grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in
+place. A reader between these writes, or after the program was killed, finds a file that is complete up to the last
+portion (readers ignore numbers that the header does not count yet). The length shows how much was computed, and no disk
+space is used for steps that are never taken. Closing the file writes it to the disk (fsync). If the machine crashes
+before, the last portions may be missing, or may be zeros that the header already counts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kahanmaps.errors import InputError
 
 
 class NpyFile:
-    """A growing .npy file of shape (rows, *shape), of doubles or 64-bit integers; `rows` is its current length.
+    """A growing .npy file of shape (rows, *shape) with doubles or 64-bit integers; `rows` is its current length.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, NpyFile(Path(folder) / "x.npy", (2,)) as file:
@@ -33,7 +33,7 @@ class NpyFile:
     """
 
     def __init__(self, path: str | Path, shape: tuple[int, ...], kind: Literal["<f8", "<i8"] = "<f8") -> None:
-        if Path(path).is_fifo():  # opening it would wait for a reader
+        if Path(path).is_fifo():  # opening a pipe would wait for a reader
             raise InputError(f"{path} is a pipe, expected a file: the header of a .npy file is rewritten in place")
         self.path = path
         self.shape = shape
@@ -49,7 +49,7 @@ class NpyFile:
             raise
 
     def append(self, rows: NDArray[Any]) -> None:
-        """Append rows (count, *shape), then update the header."""
+        """Append an array (count, *shape), then update the header."""
         if rows.shape[1:] != self.shape:
             raise InputError(f"found rows of shape {rows.shape[1:]}, expected {self.shape}")
         header = self._header(self.rows + len(rows))
@@ -58,7 +58,7 @@ class NpyFile:
         with named(self.path):
             self._stream.seek(0, io.SEEK_END)
             remaining = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-            while remaining:  # a single write may be partial
+            while remaining:  # one call of write may write only a part
                 remaining = remaining[self._stream.write(remaining) :]
             self._stream.seek(0)
             self._stream.write(header)
@@ -74,7 +74,7 @@ class NpyFile:
             self._stream.close()
 
     def _header(self, rows: int) -> bytes:
-        """Return the header; numpy pads it so that its length does not depend on the number of rows."""
+        """Return the header; numpy pads it so that its length is the same for any number of rows."""
         stream = io.BytesIO()
         what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
         np.lib.format.write_array_header_1_0(stream, what)

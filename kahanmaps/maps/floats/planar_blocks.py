@@ -1,8 +1,8 @@
 """The normal form in floating point: one planar map for each root of chi, in a canonical form.
 
-At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). In
-coordinates (U, V) = 2 eps (u, v), with half the second derivatives A = a U + b V, B = b U + c V, C = c U + d V of
-h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3, it is Cramer's rule for two equations:
+At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). Let
+(U, V) = 2 eps (u, v), and A = a U + b V, B = b U + c V, C = c U + d V half the second derivatives of
+h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3. Then the map is Cramer's rule for two equations:
 
     U~ = ((1 + B) U + C V)/w,     V~ = ((1 - B) V - A U)/w,     w = (1 + B)(1 - B) + A C = 1 + eps^2 D.
 
@@ -12,13 +12,13 @@ A linear change of U and V (h is divided by its determinant) makes h one of
     cubes    (U^3 + V^3)/3                      (1, 0, 0, 1)    one real linear factor
     general                      arbitrary                      a repeated factor, h = 0, or U and V nearly dependent
 
-so most maps have no coefficients other than 0 and 1, and take five or six multiplications and a division. Of the linear
-factors, U and V are the two whose forms in x are closest to orthogonal. The integral h_r/(1 + eps^2 D) of the block is
+so that most maps have no coefficients except 0 and 1, and take five or six multiplications and a division. The linear
+factors U and V are those two whose forms in x are closest to orthogonal. The integral h_r/(1 + eps^2 D) of the block is
 kappa (A U^2 + 2 B U V + C V^2)/w.
 
-A real root gives one real block (two rows: U, V), a pair of complex roots one complex block (four rows: Re U, Im U,
-Re V, Im V). Roots, coefficients and the linear maps between x and the rows are computed in balls and rounded once, so
-each of these numbers is the double nearest to the exact one, or next to it.
+A real root gives a real block (two rows: U, V), a pair of complex roots a complex block (four rows: Re U, Im U, Re V,
+Im V). Roots, coefficients and the linear maps between x and the rows are computed in balls and rounded once, so each of
+these numbers is the double nearest to the exact number, or a neighbor of this double.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 LINES, CUBES, GENERAL = "lines", "cubes", "general"
 _CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
-_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # one of them gives a nonzero form a nonzero leading coefficient
-_MIN_SINE = 0.02  # of the angle between the forms U and V: for smaller angles too many digits would be lost
+_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # at least one gives a nonzero form a nonzero leading coefficient
+_MIN_SINE = 0.02  # sine of the angle between the forms U and V; smaller angles would lose too many digits
 _BITS = (192, 384, 768, 1536, 3072)
-_MIN_ACCURACY = 60  # bits of an entry before it is rounded
-_NEGLIGIBLE = 120  # an entry smaller than 2^-120 times the largest of its row is rounded to 0
+_MIN_ACCURACY = 60  # accurate bits that an entry needs before it is rounded
+_NEGLIGIBLE = 120  # an entry smaller than 2^-120 times the largest entry of its row is rounded to 0
 
 Frame = tuple[list[acb], list[acb]]
 
@@ -81,10 +81,10 @@ class PlanarBlocks:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The roots as short text; a complex root represents itself and its conjugate."""
+        """The roots as short text; a complex root stands for itself and its conjugate."""
         labels = []
         for root in self.roots:
-            real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
+            real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # the midpoint of a ball around 0
             labels.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
         return tuple(labels)
 
@@ -127,7 +127,7 @@ def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
 
 
 def require_same_system(form: NormalForm, map_: MapFamily) -> None:
-    """Raise InputError if the normal form is that of another map."""
+    """Raise InputError if the normal form belongs to another map."""
     theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
     if not isinstance(map_, KahanFamily) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
         raise InputError(
@@ -172,7 +172,7 @@ class _Blocks:
             kappas.append(complex(*_round_to_doubles([kappa.real, kappa.imag])))
             for row, column in zip(into_uv, out_uv, strict=True):
                 into.append(_round_to_doubles([entry.real for entry in row]))
-                # A complex block stands for two conjugate ones, whose sum is twice the real part.
+                # A complex block represents two conjugate blocks, whose sum is twice the real part.
                 out.append(_round_to_doubles([entry.real if real else 2 * entry.real for entry in column]))
                 if not real:
                     into.append(_round_to_doubles([entry.imag for entry in row]))
@@ -185,7 +185,7 @@ class _Blocks:
         return PlanarBlocks(reals, tables[0], tables[1], tables[2], tables[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
-        """Return (a, b, c, d); kappa; U and V as forms in x; the columns of x in terms of U and V."""
+        """Return (a, b, c, d); kappa; U and V as forms in x; and the columns that express x in U and V."""
         cubic = [_value(coefficient, root) for coefficient in self.form.coefficients]
         rows = [[_value(element[k], root) for element in self.inverse] for k in (0, 1)]
         kind, frame = self._frame(root, cubic, rows)
@@ -205,7 +205,7 @@ class _Blocks:
         kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
         step = 2 * self.eps
         into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
-        # The Lagrange polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at the others.
+        # The Lagrange polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at all other roots.
         slope, carry = _value(self.form.chi.derivative(), root), acb(0)
         lagrange: list[acb] = []
         for coefficient in reversed(self.form.chi.coeffs()[1:]):
@@ -224,7 +224,7 @@ class _Blocks:
         return numbers, kappa, into, out
 
     def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[str, Frame]:
-        """Return the kind of h and two linear forms in u and v, not yet scaled, that bring it to canonical form."""
+        """Return the kind of h, and two linear forms in u and v, up to scale, that bring h to its canonical form."""
         if self._vanishes(self.discriminant, root):
             return GENERAL, self._orthonormal_frame(rows)
         if root.imag.is_zero() and _value(self.discriminant, root).real < 0:
@@ -232,7 +232,7 @@ class _Blocks:
             kind, lines = CUBES, _factors([3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c])
         else:
             kind, lines = LINES, _factors(cubic)
-        if root.imag.is_zero():  # then the factors are real
+        if root.imag.is_zero():  # at a real root the factors are real
             lines = [[acb(entry.real) for entry in line] for line in lines]
         pairs = [(lines[i], lines[j]) for i in range(len(lines)) for j in range(i)]
         sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda candidate: candidate[0])
@@ -252,7 +252,7 @@ class _Blocks:
         value = _value(element, root)
         if not value.contains(acb(0)):
             return False
-        common = element.gcd(self.form.chi)  # vanishes at the root iff the element does: the roots of chi are simple
+        common = element.gcd(self.form.chi)  # since chi has simple roots, it is 0 at the root iff the element is
         if common.degree() < 1 or not _value(common, root).contains(acb(0)):
             raise _Unclear
         if common.degree() < self.form.chi.degree() and _value(self.form.chi / common, root).contains(acb(0)):
@@ -261,7 +261,7 @@ class _Blocks:
 
 
 def _factors(form: list[acb]) -> list[list[acb]]:
-    """Return the linear factors f u + g v, up to scale, of a binary form without repeated factors (u^k first)."""
+    """Return the linear factors f u + g v, up to scale, of a binary form (u^k first) without repeated factors."""
     for p, q in _ROTATIONS:
         # u = p u' - q v', v = q u' + p v'
         turned = _transformed(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
@@ -277,7 +277,7 @@ def _factors(form: list[acb]) -> list[list[acb]]:
 
 def _transformed(form: list[acb], matrix: Frame) -> list[acb]:
     """Return the binary form after the substitution (u, v) = matrix (u', v')."""
-    degree, (u, v) = len(form) - 1, (acb_poly(row) for row in matrix)  # with u' = 1
+    degree, (u, v) = len(form) - 1, (acb_poly(row) for row in matrix)  # u and v as polynomials in v', for u' = 1
     total = sum((u ** (degree - k) * v**k * coefficient for k, coefficient in enumerate(form)), acb_poly([]))
     return [total[k] for k in range(degree + 1)]
 
@@ -289,10 +289,10 @@ def _inverse(frame: Frame) -> Frame:
 
 
 def _sine(frame: Frame, rows: list[list[acb]]) -> float:
-    """Return the sine of the angle between two forms in u and v, regarded as forms in x."""
+    """Return the sine of the angle between two forms in u and v, both expressed as forms in x."""
     first, second = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
     size = abs(_inner(first, second))
-    # Not size**2: in python-flint 0.9.0 every power but the 0th of an arb with the midpoint 0 and a radius is nan.
+    # Not size**2: in python-flint 0.9.0 all powers except the 0th of an arb with midpoint 0 and nonzero radius are nan.
     cosine = size * size / (_inner(first, first).real * _inner(second, second).real)
     if not cosine.is_finite():
         raise _Unclear
@@ -313,7 +313,7 @@ def _value(polynomial: fmpq_poly, at: acb) -> acb:
 
 
 def _round_to_doubles(row: Sequence[arb]) -> list[float]:
-    """Round the entries to doubles; entries that are certainly negligible compared with the largest become 0."""
+    """Round the entries to doubles; entries certainly negligible compared with the largest entry become 0."""
     largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
     doubles = []
     for entry in row:

@@ -1,4 +1,4 @@
-"""Initial points of many orbits: a grid, a line, or random."""
+"""Initial points of many orbits: on a grid, on a line, or random."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from kahanmaps.algebra.parsing import parse_number, parse_point
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 
-MAX_NUMBERS = 50_000_000  # coordinates of all initial points
-_MAX_DIGITS = 9  # of a number of points
+MAX_NUMBERS = 50_000_000  # coordinates of all initial points together
+_MAX_DIGITS = 9  # digits of the number of points
 
 
 def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
-    """Return random initial points (count, dim), uniform between -size and size, determined by the seed.
+    """Return random initial points (count, dim), with coordinates uniform in [-size, size), determined by the seed.
 
     >>> starts_in_box(2, 1, 1.0, seed=0).tolist()
     [[0.2739233746429086], [-0.4604265724722594]]
@@ -29,9 +29,9 @@ def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
 def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
     """Return the initial points (n, dim) of a grid or of a line.
 
-    A grid is NAME=LOW:HIGH:N for some of the variables, which takes N equidistant values with both ends, or NAME=VALUE;
-    the others are 0. The last variable with several values changes fastest. A line is A:B:N with two points A and B.
-    Coordinates are rounded from exact numbers. Raises InputError for other texts, and for too many points.
+    A grid gives variables as NAME=LOW:HIGH:N, for N equidistant values including both ends, or as NAME=VALUE; all other
+    variables are 0. The last variable with several values changes fastest. A line is A:B:N with two points A and B.
+    Coordinates are rounded from exact numbers. Raises InputError for any other text, and for too many points.
 
     >>> starts_on("x=-1:1:3, z=1/2", ["x", "y", "z"]).tolist()
     [[-1.0, 0.0, 0.5], [0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]
@@ -70,13 +70,13 @@ def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
 
 
 def _values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArray:
-    """Return equidistant numbers with both ends, each the nearest double."""
+    """Return equidistant numbers including both ends, each rounded to the nearest double."""
     digits = count.strip()
     number = int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _MAX_DIGITS else 0
     if not 2 <= number <= MAX_NUMBERS // dim:
         raise InputError(f"found {quoted(digits)} points, expected 2 to {MAX_NUMBERS // dim} in dimension {dim}")
-    to_float(low), to_float(high)  # raise the error for numbers that are too large
+    to_float(low), to_float(high)  # raise the error for numbers that are too large for doubles
     denominator = int(low.q) * int(high.q)
     first, last = int(low.p) * int(high.q), int(high.p) * int(low.q)
-    whole = number - 1  # the division of integers rounds correctly
+    whole = number - 1  # a quotient of Python integers is rounded correctly
     return np.array([(first * (whole - k) + last * k) / (denominator * whole) for k in range(number)])

@@ -1,12 +1,12 @@
-"""Steps of maps in floating point: straight-line programs, or for large maps numpy arrays.
+"""Steps of maps in floating point: as straight-line programs, or for large maps with numpy arrays.
 
-A step maps the rows of a state to those of its image. For a map they are its coordinates, and the step solves
-M(x) x~ = r(x), where M(x) = I - eps f'(x) for Kahan maps; for a normal form they are the coordinates of its planar
-blocks (planar_blocks.py), and the same equation decomposes into blocks of two rows. A step is *near-singular* if a
-pivot is small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular*
-if a pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
+A step maps the rows of a state to the rows of its image. For a map the rows are the coordinates, and the step solves
+M(x) x~ = r(x), where M(x) = I - eps f'(x) for Kahan maps. For a normal form the rows are the coordinates of its planar
+blocks (planar_blocks.py), and the same equation splits into blocks of two rows. A step is *near-singular* if a pivot is
+small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular* if a
+pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
 
-With the same kernel results are reproducible to the last bit, for any number of orbits and threads and any portions.
+With the same kernel, results agree to the last bit for any number of orbits and threads, and for any portions.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ from kahanmaps.maps.kahan import KahanMap
 IntArray = NDArray[np.int64]
 
 RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
-STATUS = ("completed", "overflow", "singular")  # by code; the values of OrbitEnd.status
+STATUS = ("completed", "overflow", "singular")  # indexed by a code; the values of OrbitEnd.status
 
 
 Write = Callable[[Sequence[Any], StepChecks], Sequence[Any]]
 
 
 class FloatStep:
-    """A step of states with the given number of rows: `write` writes the image of a state, and the checks.
+    """A step of states with `rows` rows; `write` writes the operations for the image of a state and the checks.
 
-    `careful` maps the rows of a state (arrays) to those of its image and three more, which say in which orbits the
-    step is near-singular, singular, or an overflow. `fast` has one more row, which says in which orbits it is valid.
-    If the fast program has too many operations, there is none; if the careful one has too many (row exchanges fill in
-    zeros), `in_arrays` takes its place. Machine code requires both programs.
+    `careful` maps the rows of a state (arrays) to the rows of its image and three more rows, which say in which orbits
+    the step is near-singular, singular, or an overflow. `fast` has one more row, which says in which orbits it is good.
+    If the fast program has too many operations, it is omitted; if the careful program has too many (row exchanges fill
+    in zeros), `in_arrays` takes its place. Machine code needs both programs.
     """
 
     def __init__(self, rows: int, write: Write, in_arrays: Callable[..., tuple[Any, ...]] | None = None) -> None:
@@ -66,7 +66,7 @@ class FloatStep:
 
     @cached_property
     def careful_code(self) -> StraightLineProgram | None:
-        """The program of the careful step, written on demand, since it is rarely needed."""
+        """The program of the careful step, written when it is first needed, since this is rare."""
         return None if self.fast_code is None else self._code(careful=True)
 
     @cached_property
@@ -79,7 +79,7 @@ class FloatStep:
 
     @cached_property
     def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
-        """The step on floats with all checks, if there is a program for it."""
+        """The step on floats with all checks, if the careful program exists."""
         return self.careful if self.careful_code is None else self.careful_code.function(float)
 
     def _code(self, careful: bool) -> StraightLineProgram | None:
@@ -132,7 +132,7 @@ class FloatEquation(NamedTuple):
     """The equation M(x) x~ = r(x) in doubles, in sparse form; r is the last column of (M | r).
 
     Entry (i, j) is `constants[i][j]` plus the sum of c y[k] over the pairs (k, c) of `terms[i][j]`. The vector y
-    consists of x, followed by y[a] y[b] for every pair (a, b) of `products`.
+    is x followed by y[a] y[b] for every pair (a, b) in `products`.
     """
 
     constants: list[list[float]]
@@ -147,7 +147,7 @@ class FloatEquation(NamedTuple):
         return y
 
     def image(self, x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        """Write the image of x."""
+        """Write the operations that compute the image of x."""
         y, n = self.monomials(x), len(self.constants)
         rows = []
         for constants, entries in zip(self.constants, self.terms, strict=True):
@@ -166,10 +166,10 @@ class FloatEquation(NamedTuple):
 
 
 def float_equation(map_over: ElementaryMap) -> FloatEquation:
-    """Return the equation of a map over QQ in doubles, each number rounded once.
+    """Return the equation of a map over QQ in doubles; each number is rounded only once.
 
-    Near-singular steps are detected by the size of pivots, so each row is divided by its largest coefficient in M,
-    except for Kahan maps, whose rows have size 1 for small eps. Raises InputError if a number is out of range.
+    Near-singular steps are recognized by the size of pivots, so each row is divided by its largest coefficient in M,
+    except for Kahan maps, whose rows have size 1 for small eps. Raises InputError if a number is too large for doubles.
     """
     equation = map_over.equation
     n = equation.dim
@@ -223,7 +223,7 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
             for j, terms in enumerate(entries):
                 for k, c in terms:
                     M[i, j] += c * y[k]
-        M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # sizes of the rows
+        M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # the sizes of the rows
         pivots = eliminate(M, n, 1)
         near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
         singular |= finite & (pivots == 0.0).any(axis=0)
@@ -235,8 +235,8 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
     """Gaussian elimination with partial pivoting for a batch of matrices (n, n + count + ..., batch), in place.
 
-    The `count` columns after the first n are right-hand sides and are replaced by the solutions; further columns are
-    only permuted with the rows. Returns the absolute values (n, batch) of the pivots.
+    The `count` columns after the first n are right-hand sides, which the solutions replace; in further columns only the
+    rows are permuted. Returns the absolute values of the pivots, an array (n, batch).
     """
     columns, last_column = np.arange(M.shape[2]), n + count
     pivots = np.empty((n, len(columns)))
@@ -254,9 +254,9 @@ def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
 
 
 def images_of(map_: Map, points: FloatArray) -> FloatArray:
-    """Return the images of points (dim,) or (points, dim) under a map over Q; NaN where it is not defined.
+    """Return the images of points (dim,) or (points, dim) under a map over Q; NaN if the map is not defined there.
 
-    Raises InputError for points of another shape, and for a map over another field.
+    Raises InputError for an array of another shape, and for a map over another field.
     """
     rows = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if map_.field is not QQ or rows.ndim != 2 or rows.shape[1] != map_.dim:
@@ -264,7 +264,7 @@ def images_of(map_: Map, points: FloatArray) -> FloatArray:
             f"found floating-point numbers of shape {points.shape} for {map_!r}, expected rows of {map_.dim} numbers, "
             "and a map over QQ"
         )
-    batch = BatchState.of(np.array(rows.T, order="C"))  # a copy: steps are taken in place
+    batch = BatchState.of(np.array(rows.T, order="C"))  # a copy, since steps overwrite the states
     advance_by_numpy(_step_of(map_), batch, 0, 1, [])
     images = batch.z.T.copy()
     images[batch.status != RUNNING] = np.nan
@@ -277,11 +277,11 @@ def _step_of(map_: Map) -> FloatStep:
 
 
 class BatchState(NamedTuple):
-    """The states of a batch of n orbits, one per column, and the status of each.
+    """The states of a batch of n orbits, one per column, and the status of each orbit.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
-    near-singular steps, `near_at` the index of the point at the first of them (-1: none). Columns of ended orbits are
-    0.
+    near-singular steps, `near_at` the index of the point before the first near-singular step; -1 means none. Columns of
+    ended orbits are 0.
     """
 
     z: FloatArray
@@ -298,7 +298,7 @@ class BatchState(NamedTuple):
         return cls(np.ascontiguousarray(z), *counts)
 
     def note(self, which: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
-        """Record the result of a careful step from `index` of the orbits `which`; return which of them have ended."""
+        """Record the results of a careful step from `index`, for the orbits `which`; return which of these ended."""
         near, singular, overflow = (np.broadcast_to(x, which.shape) for x in (near, singular, overflow))
         ended = singular | overflow
         self.status[which[ended]] = np.where(singular[ended], SINGULAR, OVERFLOW)
@@ -310,18 +310,18 @@ class BatchState(NamedTuple):
 
 
 class RecordTable(NamedTuple):
-    """An array (records, rows, n) for the states at multiples of `every`."""
+    """An array (records, rows, n) in which the states at multiples of `every` are stored."""
 
     every: int
     states: FloatArray
 
 
-_MAX_SINGLE_ORBITS = 16  # up to this number of orbits Python floats are faster than arrays
-_GROUP = 4096  # orbits processed together, so that the arrays fit into the processor's cache
+_MAX_SINGLE_ORBITS = 16  # up to this number of orbits, Python floats are faster than arrays
+_GROUP = 4096  # number of orbits processed together, so that the arrays fit into the processor's cache
 
 
 def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
-    """Advance all orbits by `steps` steps from the index `first`: in arrays, or a few of them in Python floats."""
+    """Advance all orbits by `steps` steps from the index `first`: in arrays, or in Python floats for a few orbits."""
     n = batch.z.shape[1]
     single = n <= _MAX_SINGLE_ORBITS and step.fast_code is not None
     width = 1 if single else _GROUP
@@ -342,9 +342,9 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                             good = not (near or singular or overflow)
                     else:
                         *image, good = step.fast(*x)
-                except ZeroDivisionError:  # arrays would contain an infinity here
+                except ZeroDivisionError:  # in arrays the result would be infinite
                     image, good = x, False
-                # Orbits for which the fast program does not guarantee the image repeat the step with the careful one.
+                # Orbits in which the fast step is not valid repeat it as a careful step.
                 if good is not True and not np.all(good | has_ended):
                     repeat = np.flatnonzero(~(good | has_ended))
                     points_before, points_after = (

@@ -1,20 +1,20 @@
 """Straight-line programs for steps of maps in floating point.
 
-`StraightLineProgram` records the operations on its values. Coefficients are folded in: there are no multiplications by
-0 or 1, and no common subexpressions are computed twice. A program is run in two ways, with the same results to the last
-bit: as a Python function of floats or of numpy arrays (`StraightLineProgram.function`), and as machine code for vectors
-of orbits (machine_code.py).
+`StraightLineProgram` records the operations on its values. Operations on constants are carried out at once: there are
+no multiplications by 0 or 1, and no common subexpression is computed twice. A program runs in two ways, with equal
+results to the last bit: as a Python function of floats or of numpy arrays (`StraightLineProgram.function`), and as
+machine code for vectors of orbits (machine_code.py).
 
-`solve` writes a program for the solution of M y = r, where the zeros of M are known. Rows and columns with a single
-entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal form are
-such blocks, with complex entries at a complex root), larger blocks by Gaussian elimination.
+`solve` writes a program for the solution of M y = r, where the positions of zeros in M are known. Rows and columns with
+a single entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal
+form are such blocks, with complex entries at a complex root), larger blocks by Gaussian elimination.
 
 Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 of the numbers
 from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the diagonal, in
-an order with little fill-in; this is stable as long as no row is subtracted more than 8 times from another. Each step
-has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows need to be exchanged and all
-numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports the status. Where the fast
-version is valid, both give the same numbers.
+an order with little fill-in. This is stable as long as no pivot row is multiplied by more than 8 before it is
+subtracted. Each step has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows need
+to be exchanged and all numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports the
+status. If the fast version is valid, both versions give the same numbers.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 
 NEAR = 2.0**-40
-MAX_FACTOR = 8.0  # of the pivot row when it is subtracted from another row
+MAX_FACTOR = 8.0  # maximal factor by which a pivot row is multiplied when it is subtracted from another row
 LARGEST = float(np.finfo(np.float64).max)
-MAX_OPERATIONS = 4000  # of a fast step; longer ones take too long to be compiled
+MAX_OPERATIONS = 4000  # operations of a fast step; longer programs take too long to compile
 
 _SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=", "eq": "==", "and": "&", "or": "|"}
 
@@ -57,7 +57,7 @@ class StraightLineProgram:
         self.arguments = [Value(self, k) for k in range(inputs)]
 
     def emit(self, name: str, *operands: Any) -> Value:
-        """Return the value of an operation, and record the operation unless it was recorded before."""
+        """Return the value of an operation, and record the operation unless it is already recorded."""
         keys = tuple(x.number if isinstance(x, Value) else ("constant", float(x)) for x in operands)
         key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
         if key not in self._known:
@@ -68,13 +68,13 @@ class StraightLineProgram:
         return self._known[key]
 
     def function(self, kind: type) -> Callable[..., tuple[Any, ...]]:
-        """Compile the program to a Python function of floats, or of arrays (`kind` is np.ndarray)."""
+        """Compile the program to a Python function of floats, or of arrays if `kind` is np.ndarray."""
         last = {
             x.number: k for k, (_, operands) in enumerate(self.operations) for x in operands if isinstance(x, Value)
         }
         last |= {x.number: len(self.operations) for x in self.outputs if isinstance(x, Value)}
         names = {k: f"v{k}" for k in range(self.inputs)}
-        unused: list[str] = []  # names that are reused, so that fewer arrays have to fit into the processor's cache
+        unused: list[str] = []  # names to be reused, so that fewer arrays have to fit into the processor's cache
 
         def text(x: Any) -> str:
             return names[x.number] if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
@@ -99,7 +99,7 @@ class StraightLineProgram:
             if kind is not float and name in ("add", "sub", "mul", "div") and isinstance(operands[0], Value):
                 if name in ("add", "mul") and operands[0].number not in dying:
                     x.reverse()
-                if x[0] in free_names:  # in place
+                if x[0] in free_names:  # overwrite this array
                     free_names.remove(x[0])
                     names[self.inputs + k] = x[0]
                     lines.append(f"    {x[0]} {_SYMBOLS[name]}= {x[1]}")
@@ -118,7 +118,7 @@ class StraightLineProgram:
 
 
 class Value:
-    """A number or a truth value in a program; constants are Python floats and bools."""
+    """A number or a truth value in a program; constants are floats and bools of Python."""
 
     def __init__(self, code: StraightLineProgram, number: int) -> None:
         self.code, self.number = code, number
@@ -193,7 +193,7 @@ class Value:
 
 
 def _operand_of_negation(x: Any) -> Any:
-    """Return y if x was computed as -y, else None."""
+    """Return y if x was computed as -y, otherwise None."""
     if not isinstance(x, Value) or x.number < x.code.inputs:
         return None
     name, operands = x.code.operations[x.number - x.code.inputs]
@@ -201,7 +201,7 @@ def _operand_of_negation(x: Any) -> Any:
 
 
 class ComplexPair:
-    """A complex number x + i y of values or floats."""
+    """A complex number x + i y, with values or floats as x and y."""
 
     def __init__(self, x: Any, y: Any = 0.0) -> None:
         self.x, self.y = x, y
@@ -231,12 +231,12 @@ class ComplexPair:
 
 
 def is_zero(x: Any) -> bool:
-    """Return whether this is the constant 0."""
+    """Return whether x is the constant 0."""
     return isinstance(x, float | int) and x == 0.0
 
 
 def select(condition: Any, if_true: Any, if_false: Any) -> Any:
-    """Return `if_true` where the condition holds and `if_false` elsewhere."""
+    """Return `if_true` if the condition holds, otherwise `if_false` (for each orbit)."""
     if isinstance(condition, bool):
         return if_true if condition else if_false
     same = if_true is if_false or (isinstance(if_true, float) and isinstance(if_false, float) and if_true == if_false)
@@ -244,7 +244,7 @@ def select(condition: Any, if_true: Any, if_false: Any) -> Any:
 
 
 def extreme(name: str, x: Any, y: Any) -> Any:
-    """Return the larger ("max") or smaller ("min") of two numbers >= 0; either of them if one is NaN."""
+    """Return the larger ("max") or smaller ("min") of two numbers >= 0; if one is NaN, either of them."""
     values = [v for v in (x, y) if isinstance(v, Value)]
     if len(values) == 1 and (0.0 if name == "max" else np.inf) in (x, y):
         return values[0]
@@ -267,8 +267,8 @@ class StepChecks:
         self._sum: Any = 0.0
 
     def pivot(self, pivot: Any, threshold: Any) -> None:
-        """Check a divisor: it is small if its absolute value is at most `threshold`."""
-        if isinstance(pivot, float):  # a coefficient: 0 if the matrix is singular everywhere
+        """Check a divisor, which counts as small if its absolute value is at most `threshold`."""
+        if isinstance(pivot, float):  # a constant, which is 0 if the matrix is singular at all points
             self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
             return
         usual = abs(pivot) > threshold
@@ -279,7 +279,7 @@ class StepChecks:
         self.number(pivot)
 
     def number(self, x: Any) -> None:
-        """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each of them."""
+        """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each number."""
         if isinstance(x, Value):
             if self.careful:
                 self.finite = self.finite & (abs(x) <= LARGEST)
@@ -287,7 +287,7 @@ class StepChecks:
                 self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """Return the truth values of a step: `good`, or whether it was near-singular, singular, an overflow."""
+        """Return the truth values of a step: `good`; or whether it was near-singular, singular, an overflow."""
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
@@ -300,14 +300,14 @@ def _negation(x: Any) -> Any:
 
 
 def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
-    """Write the solution y of M y = r, given the rows of (M | r); the numbers are arbitrary if M is singular.
+    """Write the solution y of M y = r, given the rows of (M | r); y is meaningless if M is singular.
 
-    `bound` returns an upper bound of the entries of M, which only fast eliminations need.
+    `bound` returns an upper bound of the entries of M; only fast eliminations need it.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
     rhs, remaining, solution = [row[n] for row in rows], set(range(n)), [0.0] * n
-    # A row with one entry is solved first. A column with one entry is solved last: no other row needs its unknown.
+    # A row with one entry is solved first. A column with one entry is solved last: only one row contains its unknown.
     after: list[tuple[int, int]] = []
     while remaining:
         single = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
@@ -329,7 +329,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
             break
         after.append((columns[alone][0], alone))
         remaining.remove(columns[alone][0])
-    while remaining:  # connected blocks: rows with common unknowns
+    while remaining:  # split into connected blocks, i.e. rows that are linked by common unknowns
         block: set[int] = set()
         component = {min(remaining)}
         while component != block:
@@ -337,7 +337,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
             component = {i for i in remaining if unknowns & matrix[i].keys()} | block
         remaining -= block
         order = sorted(unknowns)
-        if len(order) != len(block):  # singular everywhere
+        if len(order) != len(block):  # the matrix is singular at all points
             checks.pivot(0.0, NEAR)
             continue
         square = [[*(matrix[i].get(j, 0.0) for j in order), rhs[i]] for i in sorted(block)]
@@ -355,7 +355,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
 
 def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
-    # The bound for the pivot grows with b c: digits are lost where a d and b c cancel, however large they are.
+    # The bound for the pivot a d - b c grows with b c: digits are lost if a d and b c cancel, however large they are.
     (a, b, r), (c, d, s) = rows
     product = b * c
     det = a * d - product
@@ -372,9 +372,9 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
 
 def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
     """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small."""
-    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the sizes of the rows
+    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
     order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
-    if len(order) < n:  # singular everywhere
+    if len(order) < n:  # the matrix is singular at all points
         checks.pivot(0.0, NEAR)
         return [0.0] * n
     for row in M if checks.careful else ():
@@ -417,7 +417,7 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
 def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
     """Return row and column of each pivot, on the diagonal if possible, with little fill-in (Markowitz).
 
-    The result has fewer pivots than rows if the pattern of zeros makes the matrix singular.
+    The result has fewer pivots than rows if the positions of the zeros make the matrix singular.
     """
     rows, order = {i: set(row) for i, row in enumerate(pattern)}, []
     while rows:

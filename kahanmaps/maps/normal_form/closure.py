@@ -1,10 +1,10 @@
-"""Whether an orbit is dense in the real components of the level set that it visits, or Zariski dense.
+"""Whether an orbit is dense in the real components of its level set that it visits, and whether it is Zariski dense.
 
-The orbit is dense if and only if no integers n_0 and n_i, not all n_i = 0, satisfy sum n_i rho_i = n_0 (Kronecker),
-where rho_i are the coordinates of the translation on the circles of which the components are products. On one circle it
-is enough that the translation has infinite order. For several circles no theorem is known that excludes all relations;
-balls exclude those with small coefficients. The orbit is Zariski dense if no two of the curves are isogenous, which one
-prime may prove. docs/mathematics.md, "Geometry of the level sets".
+Let rho_i be the coordinates of the translation on the circles whose products the components are. The orbit is dense if
+and only if sum n_i rho_i = n_0 has no integer solution except n_i = 0 for all i (Kronecker). On one circle it is enough
+that the translation has infinite order. For several circles no theorem is known that excludes all such relations; balls
+exclude those with small coefficients. The orbit is Zariski dense if no two of the curves are isogenous, which one prime
+may prove. See docs/mathematics.md, "Geometry of the level sets".
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 from kahanmaps.algebra.fields import RR
 
 _SCALE = 10**15  # the inverse of the accuracy of rotation numbers
-_SUPPORT = 10  # relations up to this size have to be excluded, or nothing is said
+_SUPPORT = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
 _MAX_PRIME = 4000
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Whether an orbit is dense in the components that it visits: True and False are proved, None is not decided.
+    """Whether an orbit is dense in the components that it visits: True and False are proved, None is undecided.
 
-    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if this is
-    all that is known. Modulo `prime` no two of the curves are isogenous, so that the orbit is Zariski dense (proved),
-    and the map has no further integral on the level set; None if no such prime was found or needed.
+    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if only
+    this is known. If `prime` is given, no two of the curves are isogenous modulo this prime, so that the orbit is
+    Zariski dense (proved), and the map has no further integral on the level set; None: no prime was found or needed.
     """
 
     is_dense: bool | None
@@ -40,12 +40,12 @@ class Closure:
 
     @property
     def status(self) -> str:
-        """Return "proved", "supported" (dense, if there are no relations with large coefficients) or "undecided"."""
+        """Return "proved", "supported" (dense unless a relation has large coefficients) or "undecided"."""
         return "proved" if self.is_dense is not None else "undecided" if self.bound is None else "supported"
 
     @property
     def text(self) -> str:
-        """A line of text."""
+        """The result as one line."""
         verb = "not dense" if self.is_dense is False else "dense"
         zariski = f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
         return f"{verb} in the real components that it visits ({self.status}: {self.reason}){zariski}"
@@ -66,8 +66,8 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
     """Return whether an orbit on a product of smooth levels is dense in the components that it visits.
 
     Args:
-        gammas, orders: gamma and the order of the translation (None: infinite) in each plane over Q in which the orbit
-            moves.
+        gammas, orders: for each plane over Q in which the orbit moves, gamma and the order of the translation (None:
+            infinite).
         numbers: the rotation numbers at real roots of chi, and both coordinates at each pair of complex roots.
     """
     if any(order is not None for order in orders):
@@ -88,8 +88,8 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
 def separating_prime(values: fmpq_poly) -> int | None:
     """Return a prime modulo which the curves of all roots gamma of a polynomial are good and no two are isogenous.
 
-    All roots have to lie in GF(p). The curves are not isogenous over an extension of GF(p) if the product of the
-    discriminants a^2 - 4p of their Frobenius maps is no square. None if there is no such prime below 4000.
+    All roots must lie in GF(p). Two curves are not isogenous over any extension of GF(p) if the product of the
+    discriminants a^2 - 4p of their Frobenius maps is not a square. Returns None if no prime below 4000 is suitable.
 
     >>> separating_prime(fmpq_poly([6, -5, 1])), separating_prime(fmpq_poly([9, -6, 1]))
     (7, None)
@@ -113,12 +113,12 @@ def separating_prime(values: fmpq_poly) -> int | None:
 
 
 def excluded_relations(numbers: Sequence[arb]) -> int:
-    """Return some N such that no integers n_i, not all 0 and at most N in size, have an integer sum n_i rho_i.
+    """Return some N such that sum n_i rho_i is not an integer for integers n_i, not all 0, of size at most N.
 
-    The numbers are balls of radius at most 1e-15.
+    The numbers rho_i are balls of radius at most 1e-15.
 
-    With C = 10^15 the vectors (n_1, ..., n_d, sum n_i [C rho_i] - C n_0) form a lattice, and a relation is a short one
-    of them. No vector is shorter than the shortest one of an orthogonalized basis; LLL only makes this bound large.
+    With C = 10^15 the vectors (n_1, ..., n_d, sum n_i [C rho_i] - C n_0) form a lattice; a relation is a short vector.
+    No lattice vector is shorter than the shortest vector of the orthogonalized basis; LLL only makes this bound large.
 
     >>> excluded_relations([arb(2).sqrt()]) > 10**6, excluded_relations([arb(1) / 3]) < 3
     (True, True)
@@ -139,6 +139,6 @@ def excluded_relations(numbers: Sequence[arb]) -> int:
             vector = [x - factor * y for x, y in zip(vector, other, strict=True)]
         orthogonal.append(vector)
         lengths.append(sum((x * x for x in vector), fmpq(0)))
-    # [C rho] has at most the error 3, so the last entry of a relation is at most 3 d N.
+    # [C rho] has an error of at most 3, so the last entry of a relation is at most 3 d N.
     least = min(lengths)
     return isqrt(int((least.p - 1) // (least.q * d * (1 + 9 * d))))

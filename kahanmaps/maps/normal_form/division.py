@@ -1,9 +1,9 @@
-"""Division polynomials of the translation T in gamma: the levels on which all orbits are periodic.
+"""Division polynomials of the translation T in gamma, whose roots are the levels on which all orbits are periodic.
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
 gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
-levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for all d < N. By Mazur's theorem the period at a rational gamma is
-neither 11 nor more than 12. Source: ward-1948 for the recurrence, mazur-1977.
+levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for 1 <= d < N. By Mazur's theorem the period at a rational gamma is
+neither 11 nor larger than 12. Sources: ward-1948 for the recurrence, mazur-1977.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _GAMMA = fmpz_poly([0, 1])
 
 @dataclass(frozen=True)
 class PeriodicLevels:
-    """The levels with period N: psi_N, its factor for the exact period N, and the rational gamma with that period.
+    """The levels with period N: psi_N, its factor for the exact period N, and the rational gamma with this period.
 
-    `psi` is psi_N without the factor gamma^(1/3) that occurs if 3 divides N.
+    `psi` is psi_N without the factor gamma^(1/3), which occurs if 3 divides N.
     """
 
     period: int
@@ -50,12 +50,12 @@ class PeriodicLevels:
 
     @cached_property
     def gammas(self) -> tuple[fmpq, ...]:
-        """The rational gamma with the exact period N, in increasing order, without 0 and 1, where E is not smooth."""
+        """The rational gamma with exact period N in increasing order, except 0 and 1, at which E is not smooth."""
         roots = (-fmpq(f[0], f[1]) for f, _ in self.primitive.factor()[1] if f.degree() == 1)
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
     def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
-        """Return for each of `gammas` the square of h/(1 + eps^2 D) on that level, in a plane with this disc(h).
+        """Return for each of `gammas` the square of the level h/(1 + eps^2 D), in a plane with this disc(h).
 
         The levels with a positive square are real. Raises InputError for disc(h) = 0 or eps = 0.
 
@@ -68,7 +68,7 @@ class PeriodicLevels:
 
 
 def division_polynomials(largest: int) -> list[fmpz_poly]:
-    """Return psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of those with an index divisible by 3.
+    """Return psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of psi_n with n divisible by 3.
 
     >>> division_polynomials(6)[5:]
     [(-27)*x + 32, (-162)*x + 168]
@@ -76,7 +76,7 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
     def product(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """The product of psi at these indices, as a term of psi_n: three surplus cube roots make a factor gamma."""
+        """The product of psi at these indices, as a term of psi_n: three superfluous cube roots give a factor gamma."""
         cube_roots = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
         value = _GAMMA ** (cube_roots // 3)
         for k in indices:
@@ -93,5 +93,5 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
 
 
 def text_in_gamma(polynomial: fmpz_poly) -> str:
-    """Format a polynomial in gamma."""
+    """Return a polynomial in gamma as text."""
     return format_univariate(fmpq_poly(polynomial)).replace("t", "gamma")

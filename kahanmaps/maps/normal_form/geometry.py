@@ -2,8 +2,8 @@
 
 In each plane of the normal form the orbit stays on a plane cubic, whose Jacobian is Y^2 = x^3 + (9 + 3 gamma) x^2 +
 48 gamma x + 64 gamma^2, and the Kahan map is the translation by T = (0, 8 gamma) (level_curves.py). So the level set
-of all integrals is a product of elliptic curves, and the map is a translation of it. docs/mathematics.md, "Geometry of
-the level sets", has the proofs.
+of all integrals is a product of elliptic curves, on which the map is a translation. Proofs: docs/mathematics.md,
+"Geometry of the level sets".
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ from kahanmaps.maps.normal_form.splitting import Plane, Splitting
 from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
 from kahanmaps.maps.values import as_point
 
-_ACCURACY = 1e-15  # of rotation numbers
-_RELATIVE_ACCURACY = 1e-12  # of phase errors
-_HEIGHT_ACCURACY = 1e-12  # of heights that are printed without an error
-_MAX_HEIGHT_DEGREE = 4  # of fields over which heights are computed
-_LONGEST_HEIGHT = 4000  # bits of gamma for which a height is computed
+_ACCURACY = 1e-15  # accuracy of rotation numbers
+_RELATIVE_ACCURACY = 1e-12  # relative accuracy of phase errors
+_HEIGHT_ACCURACY = 1e-12  # accuracy of heights that are printed without an error
+_MAX_HEIGHT_DEGREE = 4  # largest degree of fields over which heights are computed
+_LONGEST_HEIGHT = 4000  # largest number of bits of gamma for which a height is computed
 
 
 @dataclass(frozen=True)
 class Rotation:
-    """The rotation of an orbit on its level curve over one real root, or one pair of complex roots, of chi.
+    """The rotation of an orbit on its level curve at one real root, or at one pair of complex roots, of chi.
 
-    `number` is the rotation number in (0, 1/2], up to sign: a step is a rotation of the circle by this part of a turn.
-    It is that of the iterate number `steps` of the map: 2 if the level curve has two real components, which the map
-    exchanges. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
-    the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow,
-    2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step; None if the
-    level of the initial point is singular at some smaller eps. `component` is the component of the closed level
-    curve that contains the initial point, if there are two: "oval" or "unbounded".
+    `number` is the rotation number in (0, 1/2], up to sign: one application rotates the circle by this part of a turn.
+    It belongs to the iterate with `steps` steps of the map: 2 if the level curve has two real components that the map
+    exchanges, otherwise 1. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the
+    coordinates of the translation in a reduced basis of the periods. `flow` is the rotation number of the flow for the
+    time 2 eps, 2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step;
+    None if the level of the initial point is singular at some smaller eps. `component` is the component of the closed
+    level curve that contains the initial point, "oval" or "unbounded", if the curve has two.
     """
 
     root: str
@@ -72,11 +72,11 @@ class Rotation:
 class PlaneGeometry:
     """The geometry of an orbit in the planes at the roots of one irreducible factor of chi.
 
-    `delta` = disc(h) level^2 and `gamma` = 1 - delta lie in the field of the root, as the j-invariant does; they are
-    None where the level is not smooth. The Jacobian of the level curve is Y^2 = x^3 + (9 + 3 gamma) x^2 + 48 gamma x +
-    64 gamma^2, and the map is the translation by `point` on it. `order` is that of the translation, None if it is
-    infinite (proved). `height` is the canonical height of the translation point (absolute, if the root is not
-    rational), with an error of at most `height_error`. `degree` is that of the field.
+    `delta` = disc(h) level^2, `gamma` = 1 - delta and the j-invariant lie in the field of the root; they are None if
+    the level is not smooth. The Jacobian of the level curve is Y^2 = x^3 + (9 + 3 gamma) x^2 + 48 gamma x + 64 gamma^2,
+    and the map is the translation by `point` on it. `order` is the order of the translation, None if it is infinite
+    (proved). `height` is the canonical height of the translation point (absolute, if the root is not rational), with an
+    error of at most `height_error`. `degree` is the degree of the field.
     """
 
     name: str
@@ -94,12 +94,12 @@ class PlaneGeometry:
 
     @property
     def discriminant(self) -> Any:
-        """The discriminant of the Weierstrass equation, None where the level is not smooth."""
+        """The discriminant of the Weierstrass equation; None if the level is not smooth."""
         return None if self.gamma is None else -110592 * self.gamma**3 * self.delta**2
 
     @property
     def point(self) -> AffinePoint | None:
-        """The translation point on the Weierstrass equation, None where the level is not smooth."""
+        """The translation point on the Weierstrass equation; None if the level is not smooth."""
         return None if self.gamma is None else (0 * self.gamma, 8 * self.gamma)
 
     def lines(self) -> list[str]:
@@ -136,7 +136,7 @@ class PlaneGeometry:
         return lines
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; exact numbers are text."""
+        """Return plain data; exact numbers are given as text."""
         names = ("delta", "gamma", "j", "discriminant")
         exact = {name: None if (x := getattr(self, name)) is None else _text(x) for name in names}
         rotations = [
@@ -166,7 +166,7 @@ class PlaneGeometry:
 class LevelGeometry(PrintableResult):
     """The geometry of the level set of the integrals through a point, and of the map on it.
 
-    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are smooth. `closure` says
+    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all levels are smooth. `closure` says
     whether the orbit is dense in the real components that it visits; None if it is fixed or a level is singular.
     """
 
@@ -178,7 +178,7 @@ class LevelGeometry(PrintableResult):
     def components(self) -> int | None:
         """The number of real components of the level set, closed at infinity; None if a level is singular.
 
-        If there are several, the orbit visits two of them in turn, as the map exchanges components in each plane.
+        If there are several, the orbit visits two of them alternately, as the map exchanges components in each plane.
         """
         if any(plane.kind is not PeriodKind.SMOOTH for plane in self.planes):
             return None
@@ -214,7 +214,7 @@ class LevelGeometry(PrintableResult):
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; exact numbers are text."""
+        """Return plain data; exact numbers are given as text."""
         return {
             "planes": [plane.to_json() for plane in self.planes],
             "rank": self.rank,
@@ -241,12 +241,12 @@ def geometry(
         eps, time_step, h: half the time step, or the time step; exact and not 0. A map without eps needs none.
 
     Returns:
-        For a member of the commuting family, or a system that is linearly equivalent to one, a `LevelGeometry`, the
-        product of the curves in its planes; otherwise an `OrbitCurve`, the curve of genus 1 or 0 that contains the
+        For a member of the commuting family, or a system that is linearly equivalent to a member, a `LevelGeometry`:
+        the product of the curves in its planes. Otherwise an `OrbitCurve`: the curve of genus 1 or 0 that contains the
         orbit. j-invariants and orders of translations are exact, rotation numbers are balls.
 
     Raises:
-        InputError: if the start or eps is missing, or the orbit of a map that is no member is finite.
+        InputError: if the start or eps is missing, or if the system is no member and the orbit is finite.
         UnknownCurve: if no curve was found that contains the orbit.
 
     Source: docs/mathematics.md, "Geometry of the level sets" and "Orbits on elliptic curves".
@@ -270,7 +270,7 @@ def geometry(
 
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
-    """Return the geometry for a system whose normal form is known; otherwise like `geometry`."""
+    """Return the geometry for a system whose normal form is given; see `geometry`."""
     planes = []
     for plane, triple, kind, gamma, rotations in _levels(normal_form, eps, start):
         if kind is not PeriodKind.SMOOTH:
@@ -308,7 +308,7 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
 
 
 def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> dict[str, Rotation]:
-    """Return the rotations on the level set through `start` by the roots of chi, without those of singular levels.
+    """Return the rotations on the level set through `start`, by the root of chi; singular levels are omitted.
 
     Raises PrecisionLost if a level is almost singular.
     """
@@ -318,7 +318,7 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 def _levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Return for each plane the point, the kind of the level curve, gamma, and the rotations on a smooth one."""
+    """Yield for each plane the point, the kind of its level curve, gamma, and the rotations if the level is smooth."""
     form: Any = getattr(normal_form, "form", normal_form)
     exact = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(exact.planes, exact.triples([QQ.convert(x) for x in start]), strict=True):
@@ -338,12 +338,12 @@ def _text(x: Any) -> str:
 
 
 def rotations_of(gamma: Any, block: PlanarBlock, point: Triple, name: str) -> tuple[Rotation, ...]:
-    """Return the rotations at the real roots and pairs of complex roots of the field of gamma.
+    """Return the rotations at each real root and each pair of complex roots of the field of gamma.
 
     Args:
         gamma: an element of Q or of Q[t]/g, not 0 and not 1.
         block: the cubic of the plane.
-        point: a point (U : V : 1) of the level, U and V the coordinates 2 eps (u, v).
+        point: a point (U : V : 1) of the level, where (U, V) = 2 eps (u, v).
         name: the name of the plane, for a plane over Q.
 
     Raises PrecisionLost if 32768 bits do not suffice.
@@ -386,14 +386,14 @@ def _at(element: Any, root: Any) -> Any:
 def _real_rotation(gamma: arb, disc: arb, h: arb, D: arb, *, root: str) -> Rotation:
     """Return the rotation at a real root of chi."""
     curve = Jacobian(gamma)
-    # For gamma < 0 the cubic of the Jacobian has three real roots, and T lies on the oval.
+    # For gamma < 0 the cubic polynomial of the Jacobian has three real roots, and T lies on the oval.
     number, steps = rotation_number(curve, curve.T, has_oval=not gamma > 0)
     flow, error, component = _flow_rotation(disc, h), None, None
     if not (D + 1 > 0 or D + 1 < 0) or (steps == 2 and not (D + 3 > 0 or D + 3 < 0)):
         raise PrecisionLost("the position of the point on its level cannot be decided")
     if steps == 2:
         component = "oval" if D + 3 > 0 else "unbounded"
-    elif D + 1 > 0:  # then gamma > 0 for all smaller eps, and 0 < number < 1/2 is a continuous function of eps
+    elif D + 1 > 0:  # gamma > 0 for all smaller eps, and 0 < number < 1/2 is a continuous function of eps
         error = number - flow
     return Rotation(root, (number,), steps, flow, error, component)
 
@@ -401,12 +401,12 @@ def _real_rotation(gamma: arb, disc: arb, h: arb, D: arb, *, root: str) -> Rotat
 def _flow_rotation(disc: arb, h: arb) -> arb:
     """Return 1/period of the flow u' = h_v, v' = -h_u on a level of h.
 
-    p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2 on it. If h has three real roots, p has three poles in a period, one
-    at each point at infinity.
+    On this level p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2. If h has three real roots, p has three poles in a
+    period, one at each point at infinity.
     """
     g3 = 27 * disc * h * h
     unit = arb(1) / 3
-    period = unit.gamma() ** 3 / (2 * arb.pi()) / abs(g3).root(6)  # that of p'^2 = 4 p^3 - 1, for g3 > 0
+    period = unit.gamma() ** 3 / (2 * arb.pi()) / abs(g3).root(6)  # the period of p'^2 = 4 p^3 - 1, for g3 > 0
     return 1 / (3 * period) if g3 > 0 else 1 / (period * arb(3).sqrt())
 
 
@@ -415,7 +415,7 @@ def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     a, b, c = sorted((-root for root in complex_roots(Jacobian(gamma))), key=lambda e: (e.real.mid(), e.imag.mid()))
     zero = acb(0)
     first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
-    while True:  # Gauss
+    while True:  # Gauss's reduction of a binary quadratic form
         if abs(first) > abs(second):
             first, second = second, first
         quotient = (second / first).real

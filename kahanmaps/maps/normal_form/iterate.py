@@ -2,7 +2,7 @@
 
 In every plane of the normal form the map is a translation on a plane cubic, so the n-th iterate takes about log2(n)
 doublings: over Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles at
-earlier steps are detected over Q only.
+earlier steps are detected only over Q.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
     from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
-_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is iterated completely
+_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field of which all points are computed
 
 
 class NthIterate:
@@ -43,14 +43,14 @@ class NthIterate:
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
-        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last orbit, with its arguments
+        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last orbit over Q, with its arguments
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
-        """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
+        """Return Phi^n(start) for n >= 0: over Q a PlanesPoint if chi splits, otherwise the coordinates.
 
-        Raises SingularStep if the map is not defined at a step: over Q at any step, elsewhere at one of the first few
-        or the last. Raises PrecisionLost for balls that are too wide and, over Q, OverBudget if the orbit has numbers
-        of more than `max_bits` bits before step n and before a pole.
+        Raises SingularStep if the map is not defined at a step: over Q at any step, over other fields at one of the
+        first few steps or the last. Raises PrecisionLost for balls that are too wide and, over Q, OverBudget if numbers
+        of more than `max_bits` bits occur before step n and before a pole.
         """
         if n < 0:
             raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
@@ -86,7 +86,7 @@ class NthIterate:
         from kahanmaps.maps.normal_form.planar_block import same_point
         from kahanmaps.maps.normal_form.rational_iterate import point_by_steps
 
-        # Over a small finite field orbits soon close or meet a pole.
+        # Over a small finite field an orbit soon returns or reaches a pole.
         point = start
         for k in range(1, n + 1):
             if k > _CYCLE:
@@ -98,9 +98,9 @@ class NthIterate:
 
 
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
-    """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; or "".
+    """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; else "".
 
-    A plane is special if the initial point is a fixed point there, or lies on a singular level cubic (delta is 0 or 1).
+    It is special if the initial point is a fixed point in the plane, or on a singular level cubic (delta is 0 or 1).
     """
     from kahanmaps.maps.normal_form.splitting import Splitting
 

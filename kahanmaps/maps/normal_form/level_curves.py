@@ -1,7 +1,7 @@
 """The level cubics of a plane as groups: the order of the translation Psi, and whether two points lie on one orbit.
 
-The field has q elements and characteristic at least 5 (number fields are used only for single sums); the levels are
-smooth. See planar_block.py for the cubic E, its Jacobian and T.
+The field has q elements and characteristic at least 5 (over number fields only single sums are computed), and the
+levels are smooth. planar_block.py defines the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 
 _MAX_DIGIT = 2000
-_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
+_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm; this takes about 2^17 steps
 
 
 class Jacobian(EllipticCurve):
-    """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian with Y = y + 3x + 8 gamma, and T on it; None is its zero.
+    """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian with Y = y + 3x + 8 gamma, and its point T; None is the zero.
 
     a2 = 9 + 3 gamma, a4 = 48 gamma, a6 = 64 gamma^2, T = (0, 8 gamma).
 
@@ -38,13 +38,13 @@ class Jacobian(EllipticCurve):
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
     """Return the order of T over GF(q), or over the field `context` of q elements; gamma is not 0 or 1.
 
-    A number k with k T = 0 is searched among those with |k - q - 1| <= 2 sqrt(q); the number of points is one of them
-    (Hasse). In a large field the number of points is computed modulo a product of small primes first (schoof.py).
-    Finally k is divided by all prime factors that the order of T does not need.
+    A number k with k T = 0 is searched for among those with |k - q - 1| <= 2 sqrt(q); the number of points is one of
+    them (Hasse). In a large field the number of points is first computed modulo a product of small primes (schoof.py).
+    Finally k is divided by all prime factors that it contains in excess of the order of T.
     """
     curve = Jacobian(gamma)
     radius, middle, unit = isqrt(4 * q), q + 1, 1
-    if q < 1000:  # adding T until it vanishes is faster than a search, and needs no Hasse interval
+    if q < 1000:  # adding T until the sum is 0 is faster than a search, and needs no Hasse interval
         point, order = curve.add(curve.T, None), 1
         while point is not None:
             point, order = curve.add(point, curve.T), order + 1
@@ -53,7 +53,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         field = fq_default_ctx(q, 1) if context is None else context
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, curve.a6))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
-        # The representative of the trace that is closest to 0: then all candidates are near `middle`.
+        # The representative of the trace closest to 0, so that all candidates are near `middle`.
         middle -= trace if 2 * trace <= unit else trace - unit
     k = _annihilator(curve, middle, unit, radius // unit + 2)
     for factor, exponent in fmpz(k).factor():
@@ -65,7 +65,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 
 
 def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
-    """Return some k > 0 with k T = 0; one of them must be `middle` + m `unit` with |m| <= `radius`.
+    """Return some k > 0 with k T = 0; it must have the form `middle` + m `unit` with |m| <= `radius`.
 
     m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
@@ -94,7 +94,7 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 class LevelCubic:
     """A smooth level cubic denominator h - numerator W (W^2 + D), as a group with one of its points as zero.
 
-    The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
+    Sums of points are computed from chords and tangents, without a normal form. Points are triples, not normalized.
     """
 
     def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
@@ -114,9 +114,9 @@ class LevelCubic:
         )
 
     def third(self, P: Triple, Q: Triple) -> Triple:
-        """The third point of the cubic on the line through P and Q, on the tangent where they are the same."""
-        # The cubic form on a line has four coefficients. With zeros at P and Q two are left, and these are derivatives;
-        # no equation has to be solved.
+        """Return the third point of the cubic on the line through P and Q, or on the tangent if they are equal."""
+        # The cubic form on a line has four coefficients. As P and Q are zeros, two coefficients remain, and these are
+        # derivatives; no equation has to be solved.
         if not same_point(P, Q):
             s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
             return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]
@@ -137,7 +137,7 @@ class LevelCubic:
         return self.add(P, self.third(Q, self._opposite))
 
     def multiple(self, n: int, P: Triple) -> Triple:
-        """n P for n >= 0."""
+        """Return n P for n >= 0."""
         multiple: Triple = by_doublings(self.add, self.zero, n, P)
         return multiple
 
@@ -146,15 +146,15 @@ class LevelCubic:
         return same_point(P, self.zero)
 
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
-        """Return whether P is a multiple of T, which has this order; None if it is not known.
+        """Return whether P is a multiple of T, whose order is `order`; None if this is not decided.
 
-        It is not if `order` P is not zero. Otherwise, for every prime l that divides both the order of T and the index
+        If `order` P is not zero, it is not. Otherwise, for every prime l that divides both the order of T and the index
         of its multiples in the group, one discrete logarithm compares the parts of P and T of l-power order; for other
-        primes nothing is to be compared.
+        primes no comparison is needed.
         """
         if not self.is_zero(self.multiple(order, P)):
             return False
-        # The number of points of the curve, if the Hasse interval contains only one multiple of the order of T.
+        # The number of points of the curve, if only one multiple of the order of T lies in the Hasse interval.
         radius = isqrt(4 * q)
         points = -(-(q + 1 - radius) // order) * order
         if points + order <= q + 1 + radius:
@@ -167,11 +167,11 @@ class LevelCubic:
             if prime > _MAX_DIGIT:
                 is_unknown = True
                 continue
-            # The logarithm of the part of P for that of T, whose order is `power`, digit by digit (Pohlig and Hellman).
+            # The logarithm of the part of P to the base of the part of T, of order `power`, by Pohlig and Hellman.
             P_part, T_part = self.multiple(order // power, P), self.multiple(order // power, T)
             generator, unit = self.multiple(power // prime, T_part), 1
             while unit < power:
-                # `P_part` is reduced by the digits found so far; `multiple` runs through the multiples of `generator`.
+                # `P_part` is reduced by the digits known so far; `multiple` runs through the multiples of `generator`.
                 cofactor, digit, multiple = self.multiple(power // prime // unit, P_part), 0, self.zero
                 while not same_point(cofactor, multiple):
                     digit, multiple = digit + 1, self.add(multiple, generator)

@@ -1,14 +1,14 @@
 """The exact period of an orbit of a family member: over GF(p) without computing the orbit, over Q with a proof.
 
 In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py), and its period is
-the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, the same for all points of
-a level. Over a field of q elements the Hasse interval q + 1 +- 2 sqrt(q) contains a multiple of this order, which about
-q^(1/4) baby steps and as many giant steps find; in large fields Schoof's algorithm narrows the interval first. The
-period of the orbit is the least common multiple.
+the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, which is the same for all
+points of a level. Over a field of q elements the Hasse interval q + 1 +- 2 sqrt(q) contains a multiple of this order,
+which about q^(1/4) baby steps and as many giant steps find; in large fields Schoof's algorithm first narrows the
+interval. The period of the orbit is the least common multiple of the periods in the planes.
 
-The translation is defined also at the poles of the map, where W = 0. Whether an orbit meets a pole is decided too. On a
-smooth level the poles are the points (U : V : 0) with h(U, V) = 0. If h has no root in the field, there are none;
-otherwise the orbit of P meets a pole if and only if P - (U : V : 0) is a multiple of T.
+The translation is also defined at the poles of the map, where W = 0. The program also decides whether an orbit meets a
+pole. On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. If h has no root in the field, there are
+none; otherwise the orbit of P meets a pole if and only if P - (U : V : 0) is a multiple of T for one of them.
 
 On singular level cubics the period is elementary: see `PeriodKind`.
 """
@@ -38,30 +38,30 @@ from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.values import coordinates
 from kahanmaps.systems.quadratic import as_system
 
-LARGEST_FIELD = 1 << 192  # elements; a period over such a field takes a minute or two
-_MAX_WALK = 1 << 16  # steps taken where no theorem gives the answer
-_AGREEMENTS = 8  # primes modulo which T has the same order, before this order is tested over the field itself
+LARGEST_FIELD = 1 << 192  # number of elements; a period over such a field takes a minute or two
+_MAX_WALK = 1 << 16  # number of steps taken if no theorem gives the answer
+_AGREEMENTS = 8  # if T has the same order modulo this number of primes, the order is tested over the field itself
 
 
 class PeriodKind(StrEnum):
-    """The type of the level cubic of a plane, which determines how its period is computed (p is not 2 or 3)."""
+    """The type of the level cubic of a plane, which determines how the period is computed (p is not 2 or 3)."""
 
     FIXED = "a fixed point"  # period 1
-    SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite: the order of T
-    ADDITIVE = "a level with delta = 0"  # a parabolic map: period p, over Q none
+    SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite; the period is the order of T
+    ADDITIVE = "a level with delta = 0"  # a parabolic map: period p, over Q no period
     TRIANGLE = "a level with delta = 1, three lines"  # Psi^3 multiplies by -8 along a line: 3 ord(-8), over Q none
     VERTEX = "a vertex of the three lines"  # period 3
     AT_POLE = "a pole at the start"  # W (W^2 + D) = 0, a conic and a line: period 4
     UNDEFINED = "an initial point where the map is not defined"  # a base point of the levels, or disc(h) = 0: no period
-    STEPPED = "characteristic 2 or 3"  # by iteration
+    STEPPED = "characteristic 2 or 3"  # the period is found by iteration
 
 
 @dataclass(frozen=True)
 class PlanePeriod:
-    """The period in one plane, over a field of `q` elements (0: of characteristic 0).
+    """The period in one plane, over a field of `q` elements (0 means characteristic 0).
 
     `period` is None if there is none (`status` "aperiodic" or "undefined") or it was not found ("undecided").
-    `meets_pole` says whether the orbit runs into a pole of the map, or starts at one; None: not known.
+    `meets_pole` says whether the orbit reaches a pole of the map or starts at one; None if this is not known.
     """
 
     name: str
@@ -74,18 +74,18 @@ class PlanePeriod:
 
     @property
     def text(self) -> str:
-        """A line of text."""
+        """The result as one line."""
         result = f"period {self.period}" if self.period is not None else self.status
         return f"{self.name}: {result} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
 
 @dataclass(frozen=True)
 class OrbitPeriod(PrintableResult):
-    """The period of an orbit, continued through poles: the least common multiple over the planes.
+    """The period of an orbit that is continued through poles: the least common multiple over the planes.
 
-    `status` is "periodic", "aperiodic" (proved), "undefined" (the map is not defined at the initial point of a plane
-    and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the map
-    itself; if it is True, the orbit of the map ends at the pole; None: not known.
+    `status` is "periodic", "aperiodic" (proved), "undefined" (in some plane the map is not defined at the initial
+    point and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the
+    map itself. If it is True, the orbit of the map ends at the pole. None means that this is not known.
     """
 
     period: int | None
@@ -94,7 +94,7 @@ class OrbitPeriod(PrintableResult):
     planes: tuple[PlanePeriod, ...]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for each plane, for example for `pandas.DataFrame(period.rows())`."""
+        """Return one row for each plane, for example for `pandas.DataFrame(period.rows())`."""
         return [{"plane": plane.name, "status": plane.status, "period": plane.period} for plane in self.planes]
 
     def to_json(self) -> dict[str, Any]:
@@ -103,7 +103,7 @@ class OrbitPeriod(PrintableResult):
 
     @property
     def text(self) -> str:
-        """A sentence, and a line for each plane."""
+        """A sentence, followed by one line for each plane."""
         if self.period is None:
             sentence = {
                 "aperiodic": "the orbit has no period",
@@ -123,8 +123,8 @@ def orbit_period(
 ) -> OrbitPeriod:
     """Compute the exact period modulo p of the orbit of `start` under the Kahan map at `eps`, half the time step.
 
-    The period in a plane over a field of more than `largest` elements is "undecided". Raises BadPrime if the normal
-    form has no reduction modulo p, InputError for an initial point of another dimension.
+    In a plane over a field of more than `largest` elements, the period is "undecided". Raises BadPrime if the normal
+    form has no reduction modulo p, InputError if the initial point has another dimension.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -136,7 +136,7 @@ def orbit_period(
     return period_of(form, eps, start, prime, largest=largest)
 
 
-# Status, period, and whether a pole is met, for the kinds for which these do not depend on the field.
+# Status, period, and whether a pole is met, for those kinds for which they do not depend on the field.
 _KNOWN = {
     PeriodKind.FIXED: ("periodic", 1, False),
     PeriodKind.UNDEFINED: ("undefined", None, True),
@@ -162,7 +162,7 @@ def plane_period(
     'the plane: period 3347 (a smooth level cubic)'
     """
     q = prime if context is None else int(context.order())
-    if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate in homogeneous coordinates, through poles
+    if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate homogeneous coordinates, through poles
         kind, image, met_pole = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
         for step in range(1, min(q * q + q + 1, _MAX_WALK) + 1):
             image = block.image(image)
@@ -177,7 +177,7 @@ def plane_period(
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
     if kind is PeriodKind.ADDITIVE:
-        # One step takes 1 from W/s, where s^2 = -D: is W/s an element of GF(p)?
+        # A step decreases W/s by 1, where s^2 = -D: is W/s an element of GF(p)?
         a, b, c = block.D
         (U, V, W), meets_pole = point, False
         if (D := a * U * U + b * U * V + c * V * V) != 0:
@@ -186,7 +186,7 @@ def plane_period(
         return PlanePeriod(name, q, kind, "periodic", prime, meets_pole)
     at_infinity = poles(block, prime, context)
     if kind is PeriodKind.TRIANGLE:
-        order = prime - 1  # a multiple of the order of -8; then prime factors that it does not need are removed
+        order = prime - 1  # a multiple of the order of -8; superfluous prime factors are removed below
         for factor, exponent in fmpz(order).factor():
             for _ in range(exponent):
                 if pow(-8, order // int(factor), prime) != 1:
@@ -199,7 +199,7 @@ def plane_period(
         reason = f"its field has {size} elements, more than {bound}"
         return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
-    # If a pole is the zero of the group, T is the image of the pole, and the orbit meets the pole if and only if the
+    # With a pole as zero of the group, T is the image of the pole, and the orbit meets the pole if and only if the
     # point is a multiple of T.
     answers: list[bool | None] = []
     for pole in at_infinity:
@@ -227,7 +227,7 @@ def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
         image = point
         for _ in range(3):
             image = block.image(image)
-        # (0, 0, 0) is no point, but `same_point` would accept it: it is the image of a base point, never of a vertex.
+        # (0, 0, 0) is not a point, but `same_point` accepts it: it is the image of a base point, never of a vertex.
         is_vertex = any(entry != 0 for entry in image) and same_point(image, point)
         return (PeriodKind.VERTEX if is_vertex else PeriodKind.TRIANGLE), None
     return PeriodKind.SMOOTH, gamma
@@ -254,7 +254,7 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
 
 
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
-    """Return whether an orbit reaches a pole, by iteration if the period is not long."""
+    """Return whether an orbit reaches a pole, by iteration; None if the period is too long."""
     image = point
     for _ in range(min(period, _MAX_WALK)):
         image = block.image(image)
@@ -273,8 +273,8 @@ def period_of(
 ) -> OrbitPeriod:
     """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
 
-    `normal_form` is that of the system (family.system_normal_form), or of a member in the same coordinates. The other
-    arguments and the results are those of `orbit_period` and `period_over_rationals`.
+    `normal_form` is the normal form of the system (family.system_normal_form), or of a member in the same coordinates.
+    All other arguments and the results are as in `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
@@ -292,7 +292,7 @@ def period_of(
             planes.append(plane_period_over_rationals(plane.block, triple, name=plane.name))
         else:
             planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
-    # The orbit is periodic only if it is in every plane; otherwise the worst status of a plane is that of the orbit.
+    # The orbit is periodic if and only if it is in every plane; otherwise its status is the worst status of a plane.
     statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
     worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
     return OrbitPeriod(
@@ -313,16 +313,16 @@ def period(
     time_step: Any = None,
     h: Any = None,
 ) -> OrbitPeriod:
-    """Compute the period of an orbit of the Kahan map of a system with a normal form, modulo a prime or over Q.
+    """Compute the period of an orbit of the Kahan map, modulo a prime or over Q, for a system with a normal form.
 
     Args:
         system: a system that has a normal form, for example a member of the commuting family.
         start, x0: the initial point, exact numbers.
         eps, time_step, h: half the time step, or the time step 2 eps; exact.
-        prime: a prime, for the period modulo this prime; None for that over Q.
+        prime: a prime, for the period modulo this prime; None for the period over Q.
 
     Returns:
-        An `OrbitPeriod`, exact or proved. Raises InputError, with the reason, if there is no normal form.
+        An `OrbitPeriod`, exact or proved. Raises InputError if there is no normal form, with the reason.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
@@ -333,7 +333,7 @@ def period(
 
 
 def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[SystemNormalForm, Any, Sequence[Any]]:
-    """Return the normal form with eps and the initial point. Raises InputError if one of them is missing."""
+    """Return the normal form, eps and the initial point. Raises InputError if one of these is missing."""
     normal_form = import_module("kahanmaps.documents.inline").as_file(system).normal_form
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
@@ -347,8 +347,8 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     """Compute the period over Q of the orbit of `start` under the Kahan map at `eps`, or prove that it is aperiodic.
 
     `eps` is half the time step, exact. Reduction modulo an unramified odd prime of good reduction is injective on
-    torsion. So T has infinite order if it has different orders modulo two such primes; if the orders agree, n T = 0
-    is tested over the field itself.
+    torsion points. So T has infinite order if its orders modulo two such primes differ; if all orders agree on n,
+    n T = 0 is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -403,7 +403,7 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
 
 
 def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
-    """Yield unramified primes above 100 with gamma modulo each, in the smallest residue field above the prime."""
+    """Yield unramified primes above 100, with gamma modulo each in the smallest residue field above the prime."""
     modulus = None if isinstance(gamma, fmpq) else gamma.field.chi
     element = gamma if modulus is None else gamma.polynomial
     denominator = element.q if modulus is None else element.denom() * modulus.denom()

@@ -1,9 +1,9 @@
 """Planes over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t].
 
-The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes
+The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes,
 natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short at one
-root of g and long at another. So a value is multiplied by a short element of the lattice of elements that cancel its
-bad part; LLL finds such an element, with the lengths at the roots as weights. The choice is arbitrary, since the
+root of g and long at another. So a value is multiplied by a short element of the lattice of those elements that cancel
+its bad part. LLL finds such an element, with the lengths at the roots as weights. Any choice is correct, since the
 product of value and scale is exact.
 
 A point (U : V : W) has the rational coordinates U W'/N and V W'/N, where N = W W' is the norm of W.
@@ -31,12 +31,12 @@ from kahanmaps.algebra.integers import (
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
-_SHORT = 1 << 20  # a value with a smaller bad part, and lengths at the roots within this factor, counts as short
-_LEAST = arb(2) ** -50  # smallest length at a root that is used, relative to the greatest
+_SHORT = 1 << 20  # a value counts as short if its bad part, and the ratio of its lengths at two roots, is smaller
+_LEAST = arb(2) ** -50  # smallest length at a root that is used, relative to the largest
 
 
 class AlgebraBlock(LevelBlock):
-    """One plane over K with g integral: `block` is the cubic, `start` has the triple (2 eps u : 2 eps v : 1)."""
+    """One plane over K, with g integral: `block` is the cubic, `start` contains the triple (2 eps u : 2 eps v : 1)."""
 
     def __init__(self, block: PlanarBlock, start: Triple, scale: fmpq) -> None:
         self.block, self.start, self.scale = block, start, scale
@@ -44,7 +44,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer with all primes at which lifts of start and image may be imprimitive, and all small primes."""
+        """An integer divisible by all primes at which lifts of start and image may be imprimitive, and small primes."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant
@@ -63,16 +63,16 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
-        """The cubic, and lifts of the start and its image; their contents are in `bad`."""
+        """The cubic, and lifts of the start and its image; the primes of their contents divide `bad`."""
         return self.block, self.start, self.block.image(self.start)
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers whose prime factors include all primes at which a sum of coordinates may cancel."""
+        """Integers whose prime factors include all primes at which a sum of coordinates may cancel."""
         return [self.bad]
 
     def bits(self, triple: Triple) -> tuple[int, int]:
-        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of the numerators and the denominator returned by `fraction`."""
         U, V, W = (max((int(abs(c.p).bit_length()) for c in entry.polynomial.coeffs()), default=1) for entry in triple)
         if triple[2].polynomial.degree() == 0:
             denominator_bits = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
@@ -88,8 +88,8 @@ class AlgebraBlock(LevelBlock):
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
         """Return numerators of the coefficients of U/W and V/W, the denominator, and a number whose primes may cancel.
 
-        A prime of the denominator that is neither bad nor a divisor of the third number has exactly one prime ideal of
-        degree 1 above it that divides W. If W is not rational, the level of the initial point must be defined.
+        If a prime divides the denominator, but neither `bad` nor the third number, exactly one prime ideal above it
+        divides W, and has degree 1. If W is not rational, the level of the initial point must be defined.
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
@@ -101,22 +101,22 @@ class AlgebraBlock(LevelBlock):
             cofactor = power - algebra.trace(power) / k
             if k < algebra.degree - 1:
                 power = W * cofactor
-        # N is rational, so that one coefficient of the last product suffices; the full product would cost more.
+        # N is rational, so one coefficient of the last product suffices; the full product would cost more.
         norm, shifted = fmpq(0), cofactor
         for entry in W.coefficients:
             norm += entry * shifted.polynomial[0]
             shifted = shifted * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
         coprime_part, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
-        # One common factor for all coordinates: reducing each fraction on its own would cost as many gcds.
+        # One common factor is removed from all coordinates: reducing each fraction separately costs as many gcds.
         common = common_part([norm.p, *numerators], self.bad**4 * other_part)
         return [entry // common for entry in numerators], norm.p // common, coprime_part
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
-        """Return a number whose primes are those at which form and denominator may cancel; None if all primes may.
+        """Return a number divisible by all primes at which form and denominator may cancel; None if all primes may.
 
-        The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K: the elements of the dual basis of
-        1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).
+        The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K, since the elements of the basis
+        dual to 1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).
         """
         g, degree = self.algebra.chi, self.algebra.degree
         dual = [self.algebra.convert(fmpq_poly([g[j] for j in range(k + 1, degree + 1)])) for k in range(degree)]
@@ -136,10 +136,10 @@ class AlgebraBlock(LevelBlock):
         U, V, W = triple
         return triple if W == 0 else (U / W, V / W, W / W)
 
-    integral = shortest  # of a triple over K
+    integral = shortest  # over K, the integral triple is the same
 
     def residue_map(self, prime: int) -> Callable[[EtaleElement], nmod] | None:
-        """Return a homomorphism from K to GF(p) (denominators without p); None if g has no root modulo p."""
+        """Return a homomorphism from K to GF(p) on elements without p in the denominator; None if g has no root."""
         g = nmod_poly([int(c.p) for c in self.algebra.chi.coeffs()], prime)
         root = next((-factor[0] / factor[1] for factor, _ in g.factor()[1] if factor.degree() == 1), None)
         if root is None:
@@ -158,31 +158,31 @@ class AlgebraBlock(LevelBlock):
 
 
 class ShortElements:
-    """Values of tau functions over K: elements of Z[t] with short coefficients, each times a scale in K."""
+    """Values of tau functions over K, each a product of an element of Z[t] with short coefficients and a scale in K."""
 
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
         self._algebra, self._power = algebra, bad**3
         roots: Any = algebra.chi.complex_roots()
-        # Complex balls and no floating-point numbers: roots may exceed their range.
+        # Complex balls, not floating-point numbers: roots may exceed the range of the latter.
         self._powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
-        """Write a value that is not zero as the product of a short element and a scale."""
+        """Write a nonzero value as the product of a short element and a scale."""
         multiplier = self._multiplier(value)
         return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
 
     @staticmethod
     def prepared_divisor(value: EtaleElement) -> EtaleElement:
-        """Return 1/value: `difference` and `combined` divide by multiplying with it."""
+        """Return 1/value, by which `difference` and `combined` multiply instead of dividing."""
         return 1 / value
 
     def difference(
         self, s: EtaleElement, left: EtaleElement, t: EtaleElement, right: EtaleElement, inverse: Any = None
     ) -> tuple[EtaleElement, EtaleElement]:
-        """Return s left - t right, times `inverse` unless it is None, as (short element, scale)."""
+        """Return (s left - t right) times `inverse` (unless this is None) as (short element, scale)."""
         if inverse is not None:
             s, t = s * inverse, t * inverse
-        # One reduction modulo g for both products.
+        # Add before reducing modulo g, so that one reduction suffices for both products.
         value = EtaleElement(
             self._algebra,
             (s.polynomial * left.polynomial - t.polynomial * right.polynomial) % self._algebra.chi,
@@ -199,7 +199,7 @@ class ShortElements:
     def combined(
         self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
-        """Return the sum of scale times term times lift, times `inverse` and a number that makes it integral.
+        """Return the sum of scale * term * lift, times `inverse` and a number that makes the result integral.
 
         Terms and result have coefficients in Z[t]; those of the result are coprime to the remaining denominator.
         """
@@ -222,12 +222,12 @@ class ShortElements:
         return U, V, W
 
     def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
-        """Return a factor that makes a value short; None if it is short."""
+        """Return a factor that makes a value short; None if the value is already short."""
         degree, denominator = self._algebra.degree, value.polynomial.denom()
         integers = [(entry * denominator).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
         bad_part = self._power.gcd(self._algebra.norm(residue).p % self._power)
-        # Midpoints suffice: the lengths only weight the lattice, and the result is multiplied exactly.
+        # Midpoints suffice: the lengths only weight the lattice, and the multiplication is exact.
         smallest = max(abs(entry) for entry in integers) * _LEAST
         sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
         lengths = [max(smallest, abs(value).mid()) for value in sums]
@@ -261,7 +261,7 @@ class ShortElements:
 
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
-    """Return the vectors with at most four entries 1 or -1 and zeros otherwise, up to sign, fewest entries first."""
+    """Return the vectors with at most four entries 1 or -1 and other entries 0, up to sign, fewest entries first."""
     vectors = []
     for entries in range(1, min(count, 4) + 1):
         for positions in combinations(range(count), entries):

@@ -5,8 +5,8 @@ only. Write 2 eps (u, v) = (U/W, V/W). Then one step is
 
     Psi(U : V : W) = (U W + h_V : V W - h_U : W^2 + D),      D = (3ac - b^2) U^2 + (9ad - bc) UV + (3bd - c^2) V^2,
 
-and the inverse step is the same with -W. It conserves the level h : W (W^2 + D), so that a point stays on the plane
-cubic
+and the inverse step is the same with -W instead of W. The map conserves the level h : W (W^2 + D), so that a point
+stays on the plane cubic
 
     E:   h(U, V) = level * W (W^2 + D(U, V)),
 
@@ -14,8 +14,8 @@ on which Psi is a translation. Let delta = disc(h) level^2. On the Jacobian
 
     y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2,      gamma = 1 - delta,
 
-it is the translation by T = (0, 0); E is singular for delta = 0 and for gamma = 0, where it consists of three lines
-(docs/mathematics.md). Elements may be of any field, or integers, since only sums and products occur.
+Psi is the translation by T = (0, 0); E is singular for delta = 0 and for gamma = 0, where it consists of three lines
+(docs/mathematics.md). Elements may be from any field, or integers, since only sums and products occur.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Triple = tuple[Any, Any, Any]
 
 
 class PlanarBlock:
-    """Psi for the cubic with these four coefficients, elements of a field or integers.
+    """The map Psi for the cubic with these four coefficients, elements of a field or integers.
 
     >>> block = PlanarBlock(1, 0, 0, 1)
     >>> block.image((1, 2, 1)), block.preimage(block.image((1, 2, 1)))
@@ -53,7 +53,7 @@ class PlanarBlock:
         return b * b * c * c - 4 * (a * c * c * c + b * b * b * d) + 18 * (a * b * c * d) - 27 * (a * a * d * d)
 
     def image(self, point: Sequence[Any]) -> Triple:
-        """Return Psi(U : V : W), not reduced by its content; (0, 0, 0) at an indeterminacy point of Psi."""
+        """Return Psi(U : V : W), not divided by its content; (0, 0, 0) at an indeterminacy point of Psi."""
         U, V, W = point
         UU, UV, VV = U * U, U * V, V * V
         p, q, r = self.D
@@ -64,24 +64,24 @@ class PlanarBlock:
         )
 
     def preimage(self, point: Sequence[Any]) -> Triple:
-        """Return the preimage of (U : V : W) under Psi, not reduced by its content."""
+        """Return the preimage of (U : V : W) under Psi, not divided by its content."""
         U, V, W = point
         first, second, third = self.image((U, V, -W))
         return -first, -second, third
 
     def h(self, U: Any, V: Any) -> Any:
-        """The cubic form."""
+        """Return the value of the cubic form h."""
         return (self.a * U + self.b * V) * (U * U) + (self.c * U + self.d * V) * (V * V)
 
     def level(self, point: Sequence[Any]) -> tuple[Any, Any]:
-        """Return numerator and denominator of the conserved ratio h : W (W^2 + D)."""
+        """Return the conserved ratio h : W (W^2 + D) as numerator and denominator."""
         U, V, W = point
         p, q, r = self.D
         return self.h(U, V), W * (W * W + p * (U * U) + q * (U * V) + r * (V * V))
 
 
 def determinant(P: Sequence[Any], Q: Sequence[Any], R: Sequence[Any]) -> Any:
-    """Return det(P, Q, R), which is 0 for three collinear points."""
+    """Return det(P, Q, R), which is 0 if and only if the points are collinear."""
     return P[0] * (Q[1] * R[2] - Q[2] * R[1]) - P[1] * (Q[0] * R[2] - Q[2] * R[0]) + P[2] * (Q[0] * R[1] - Q[1] * R[0])
 
 

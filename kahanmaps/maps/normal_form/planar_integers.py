@@ -2,10 +2,10 @@
 
 h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
 factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
-numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level) the content of
+numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level), the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
-lifts of `tau`. Single steps remove it by gcds; they are used for short orbits, and on singular cubics, where numbers
-hardly grow.
+lifts of `tau`. Single steps remove the content by gcds; they are used for short orbits, and on singular cubics, where
+numbers hardly grow.
 """
 
 from __future__ import annotations
@@ -26,32 +26,32 @@ IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
 
 class LevelBlock(ABC):
-    """A plane with an initial point, the level of this point, and whether the level is special."""
+    """A plane with an initial point, the level of this point, and the test whether the level is special."""
 
     block: PlanarBlock
     start: Triple
-    table: Any = None  # of tau functions, for consecutive points
+    table: Any = None  # the table of tau functions, stored for consecutive points
 
     @property
     def is_constant(self) -> bool:
-        """Whether the initial point is fixed because h = 0 or it is the origin."""
+        """Whether the initial point is a fixed point because h = 0 or the point is the origin."""
         return bool(self.block.is_zero or (self.start[0] == 0 and self.start[1] == 0))
 
     @cached_property
     def level(self) -> Any:
-        """The conserved level h / (W (W^2 + D)); None if the first step is not defined."""
+        """The conserved level h / (W (W^2 + D)); None if the first step is undefined."""
         numerator, denominator = self.block.level(self.start)
         return None if denominator == 0 else (fmpq(1) * numerator) / denominator
 
     @cached_property
     def delta(self) -> Any:
-        """disc(h) level^2; the level cubic is singular where this is 0 or 1."""
+        """disc(h) level^2; the level cubic is singular if delta is 0 or 1."""
         assert self.level is not None
         return self.block.discriminant * self.level * self.level
 
     @property
     def is_degenerate(self) -> bool:
-        """Whether the level cubic is singular (delta is 0 or 1): heights grow no faster than linearly then."""
+        """Whether the level cubic is singular (delta is 0 or 1), so that heights grow at most linearly."""
         return bool(self.delta == 0 or self.delta == 1)
 
     def triples(self) -> Iterator[Triple]:
@@ -72,9 +72,9 @@ class LevelBlock(ABC):
 
 
 class IntegerBlock(LevelBlock):
-    """One plane over Q for the map with time step 2 eps: `cubic` has the coefficients of h, (u, v) is the start.
+    """One plane over Q for the map with time step 2 eps: `cubic` lists the coefficients of h, (u, v) is the start.
 
-    `start` is a primitive triple, `scale` the number with (U/W, V/W) = scale (u, v).
+    `start` is a primitive triple, and `scale` the number with (U/W, V/W) = scale (u, v).
 
     >>> block = IntegerBlock([fmpq(1), fmpq(0), fmpq(0), fmpq(1)], fmpq(1, 10), fmpq(1, 2), fmpq(1, 3))
     >>> block.start, block.scale
@@ -93,13 +93,13 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer whose prime factors are the primes to which the content rule does not apply (disc(h) != 0)."""
+        """An integer whose prime factors are the primes for which the rule for the content fails; disc(h) != 0."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad` whose primes have exponents that numbers rarely exceed."""
+        """A power of `bad`, whose exponents are rarely exceeded in the numbers that occur."""
         return self.bad**3
 
     @cached_property
@@ -109,9 +109,9 @@ class IntegerBlock(LevelBlock):
 
     @property
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
-        """The cubic, and primitive natural lifts of the start and its image; so all are primitive outside `bad`."""
+        """The cubic, and natural lifts of the start and its image; all lifts are then primitive outside `bad`."""
         one, points = fmpq(1), list(islice(self.triples(), 2))
-        if len(points) < 2:  # a pole
+        if len(points) < 2:  # the start is a pole
             points.append(primitive(self.block.image(self.start)))
         first, second = (tuple(one * entry for entry in P) for P in points)
         return self.block, first, second
@@ -120,24 +120,24 @@ class IntegerBlock(LevelBlock):
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers whose prime factors include all primes at which a sum of coordinates may cancel."""
+        """Integers whose prime factors include all primes at which a sum of coordinates may cancel."""
         assert self.level is not None
         return [self.level.q]
 
     @staticmethod
     def bits(triple: IntegerTriple) -> tuple[int, int]:
-        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of the numerators and the denominator returned by `fraction`."""
         return int(max(triple[0].bit_length(), triple[1].bit_length())), int(triple[2].bit_length())
 
     @staticmethod
     def fraction(triple: IntegerTriple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Return the numerators of U/W and V/W, the denominator, and 1."""
+        """Return the numerators of U/W and V/W, the denominator, and 1 (no further primes may cancel)."""
         return [triple[0], triple[1]], triple[2], fmpz(1)
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
-        """Return a number whose primes are those at which alpha U + beta V and W may have a common factor.
+        """Return a number divisible by all primes that alpha U + beta V and W may have in common.
 
-        None if every prime may divide both.
+        None if every prime may be common to both.
         """
         alpha, beta = form
         value = self.block.h(beta, -alpha)
@@ -150,7 +150,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def integral(triple: Triple) -> IntegerTriple:
-        """Return a rational triple as a primitive integer triple."""
+        """Return a rational triple as a primitive triple of integers."""
         return primitive(_cleared([triple])[0])
 
     @staticmethod
@@ -165,22 +165,22 @@ class IntegerBlock(LevelBlock):
 
 
 class PlaneIntegers(Integers):
-    """Terms of tau functions over Q, and the construction of points from them."""
+    """Terms of tau functions over Q, and points computed from them."""
 
     def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
-        """Return triples of rational numbers multiplied by a common denominator."""
+        """Multiply triples of rational numbers by a common denominator."""
         return _cleared(points)
 
     def combined(
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
-        """The primitive triple of a sum of products scale * term * lift; `divisor` divides the sum."""
+        """Return the primitive triple of the sum of scale * term * lift; `divisor` divides the sum."""
         factors, _ = over_common_denominator(scales)
         undivided = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        # The divisor has none of the bad primes.
+        # The divisor contains no bad prime.
         U, V, W = divide_exactly(undivided, common_part(undivided[::-1], self.power) * divisor)
         return U, V, W
 

@@ -1,12 +1,12 @@
 """The canonical height of the translation of a plane, over Q or a number field Q[t]/g.
 
-With integral coefficients of h and integral coordinates (U : V : W) let u = W (W^2 + D) and G = u^2 - disc(h) h^2, so
+With integral coefficients of h and integral coordinates (U : V : W), let u = W (W^2 + D) and G = u^2 - disc(h) h^2, so
 that gamma = G/u^2. With x = 4 u^2 X the Jacobian is the curve with b2 = 9 u^2 + 3 G, b4 = 6 G u^2, b6 = 4 G^2 u^2. It
-has an integral Weierstrass equation, since modulo 4 disc(h) is the square of s = ad + bc, and b2 = disc(h) h^2 there:
-a1 = s h, a3 = 0, a2 = (b2 - a1^2)/4, a4 = b4/2, a6 = b6/4. So at each prime the points with nonsingular reduction are
-a group. If m T is one of them at all primes, no doubling of it cancels a common factor, and only the archimedean
-parts of Tate's series remain. Whether this is so, is seen at the first doubling, one prime at a time. Factors that are
-cancelled at other primes divide a resultant R, which bounds the rest of the series.
+has an integral Weierstrass equation: modulo 4, disc(h) is the square of s = ad + bc, and b2 = disc(h) h^2, hence
+a1 = s h, a3 = 0, a2 = (b2 - a1^2)/4, a4 = b4/2, a6 = b6/4. So at each prime the points with nonsingular reduction form
+a group. If m T belongs to this group at all primes, no doubling of m T cancels a common factor, and only the
+archimedean parts of Tate's series remain. The first doubling shows at which primes this holds. Factors that are
+cancelled at the remaining primes divide a resultant R, which bounds the rest of the series.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from kahanmaps.errors import PrecisionLost
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 _MULTIPLES = 24  # the largest m for which the reduction of m T is examined
-_LARGE_MULTIPLE = 50  # if some primes are bad for all of them, a multiple from here on is taken
-_SMALL = 3  # coefficients of elements by which the model is reduced
-_TERMS = 40  # of the series, which decrease like 4^-n
+_LARGE_MULTIPLE = 50  # if no such m T is nonsingular at all primes, a multiple with m of at least this size is used
+_SMALL = 3  # largest coefficient of elements by which the model is reduced
+_TERMS = 40  # terms of the series; they decrease like 4^-n
 _ACCURACY = 1e-14
 
 
 def plane_height(block: PlanarBlock, point: Triple) -> arb:
-    """Return the canonical height of T, half of that of its x-coordinate, as a ball.
+    """Return the canonical height of T, normalized to half the height of its x-coordinate, as a ball.
 
     Args:
         block: the cubic of the plane, with coefficients in Q[t]/g, g irreducible.
         point: a point of a smooth level, on which T has infinite order.
 
-    The height is absolute: that over the field divided by the degree. The ball is wide if no small multiple of T has
-    nonsingular reduction at all primes. Raises PrecisionLost for balls of 32768 bits.
+    The height is absolute, i.e. the height over the field divided by the degree. The ball is wide if no small multiple
+    of T has nonsingular reduction at all primes. Raises PrecisionLost if balls of 32768 bits do not suffice.
     """
     K = point[0].field
     coefficients, (U, V, W) = [block.a, block.b, block.c, block.d], point
     scale, multiple = _denominator(coefficients), _denominator(point)
-    # With scale h and scale W for h and W both delta and the orbit are the same.
+    # Multiplying both h and W by `scale` changes neither delta nor the orbit.
     a, b, c, d = (scale * x for x in coefficients)
     block, U, V, W = PlanarBlock(a, b, c, d), multiple * U, multiple * V, multiple * scale * W
     p, q, r = block.D
@@ -56,7 +56,7 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     norm = abs(K.norm(resultant)).p
 
     def uncertain(Q: Any) -> fmpz:
-        """The part of the norm of R at those primes at which the doubling of Q cancels factors; 1 if there are none."""
+        """Return the part of the norm of R at the primes at which doubling Q cancels factors; 1 if there are none."""
         # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
         left = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
         cancelled = left / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
@@ -67,7 +67,7 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
         multiples.append((uncertain(Q), len(multiples) + 1, Q))
         Q = curve.add(Q, T)  # type: ignore[assignment]
     part, m, Q = min(multiples, key=lambda entry: float(arb(entry[0]).log()) / entry[1] ** 2)
-    while part > 1 and m < _LARGE_MULTIPLE:  # further multiples are uncertain at no other primes
+    while part > 1 and m < _LARGE_MULTIPLE:  # doubling adds no uncertain primes
         m, Q = 2 * m, curve.add(Q, Q)  # type: ignore[assignment]
     height = _archimedean(Q[0], (b2, b4, b6, b8), resultant)
     with RR(128).working():  # the remaining cancelled factors divide R, and lower the height
@@ -77,9 +77,9 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
 
 
 def _reduced(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
-    """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and a product w of small elements for which this is integral.
+    """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and a product w of small elements for which these are integral.
 
-    The curve still has an integral Weierstrass equation at each prime: for the primes over 2 it is searched for.
+    The curve must keep an integral Weierstrass equation at each prime; for primes over 2 this equation is searched for.
     """
     K, total = b[0].field, b[0].field.one
     vectors = list(product(range(-_SMALL, _SMALL + 1), repeat=K.degree))
@@ -109,7 +109,7 @@ def _is_integral(element: Any) -> bool:
 
 
 def _denominator(elements: Any) -> int:
-    """Return an integer that makes elements of Q[t]/g integral, if multiplied by it."""
+    """Return an integer such that the products of these elements of Q[t]/g with it are integral."""
     common = fmpz(1)
     for element in elements:
         common = common.lcm(element.polynomial.denom())
@@ -118,7 +118,7 @@ def _denominator(elements: Any) -> int:
 
 
 def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
-    """Return the height of x plus the archimedean parts of Tate's series."""
+    """Return the height of x plus the archimedean terms of Tate's series."""
     K = x.field
     for bits in (1 << 9, 1 << 11, 1 << 13, MAX_BITS):
         with RR(bits).working():

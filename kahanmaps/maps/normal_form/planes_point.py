@@ -1,10 +1,10 @@
-"""Rational points stored as primitive triples in the planes; x is computed from them only on demand.
+"""Rational points stored as primitive triples in the planes; x is computed from the triples only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
 product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
 removed: the gcds of the W_i with each other; the primes of the fixed numbers (denominators of alpha, beta and of the
-level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides h(beta,
--alpha)); and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.
+level, and h_i(beta, -alpha), since a prime that divides alpha U + beta V and W divides h(U, V), hence h(beta, -alpha));
+and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from kahanmaps.maps.normal_form.tau import triples
 
 Block = IntegerBlock | AlgebraBlock
 
-# Powers of the fixed primes up to this one are found in one residue.
+# Powers of the fixed primes up to this size are found from one residue.
 _POWER = 3
 
 
@@ -40,12 +40,12 @@ class _Row:
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
     denominator: fmpz
-    fixed_number: fmpz  # its primes may be in numerator and denominator
-    dividing: tuple[int, ...]  # the planes whose h the form divides
+    fixed_number: fmpz  # contains the fixed primes that numerator and denominator may have in common
+    dividing: tuple[int, ...]  # the planes in which the form alpha U + beta V divides h
 
 
 class Assembly:
-    """The conversion of triples to points x = sum of R (u, v), for blocks and the matrix R of each."""
+    """The conversion of triples to points x = sum of R (u, v), given the blocks and the matrix R of each block."""
 
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
@@ -75,7 +75,7 @@ class Assembly:
                     factors.append(value)
             self.rows.append(_Row(support, tuple(integers), denominator, radical(*factors), tuple(dividing)))
         self.fixed_number = radical(*(row.fixed_number for row in self.rows))
-        # The indices of the rows with the same support, and the integers of their forms.
+        # The indices of the rows with the same support, and the integer coefficients of their forms.
         self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
         for support in dict.fromkeys(row.support for row in self.rows):
             row_indices = [k for k, row in enumerate(self.rows) if row.support == support]
@@ -87,15 +87,15 @@ class Assembly:
         for row in self.rows:
             forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
-        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
-        # Bits by which numerators may be longer than the products of the triples from which they are computed.
+        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # all rows, over one denominator
+        # The number of bits by which numerators may be longer than the products of triples that give them.
         largest = max(map(abs, table_rows))
         self.extra_bits = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
         self.extra_bits += sum(block.slack for block in blocks)
 
 
 class PlanesPoint:
-    """A point of R^{2m}, given by primitive triples in the planes of an assembly."""
+    """A point of Q^{2m}, given by primitive triples in the planes of an assembly."""
 
     def __init__(self, assembly: Assembly, triples: Sequence[Triple]) -> None:
         self._assembly = assembly
@@ -104,7 +104,7 @@ class PlanesPoint:
 
     @property
     def bits(self) -> int:
-        """The approximate bit length of the largest integer over one common denominator."""
+        """The approximate bit length of the largest integer, with all coordinates over one common denominator."""
         pairs = [block.bits(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
         return sum(denominator_bits for _, denominator_bits in pairs) + max(
             0, *(numerator_bits - denominator_bits for numerator_bits, denominator_bits in pairs)
@@ -112,14 +112,14 @@ class PlanesPoint:
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
-        """Return for each plane numerators of the coordinates, their denominator, and primes that may cancel."""
+        """Return for each plane the numerators of the coordinates, their denominator, and primes that may cancel."""
         return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
     def height(self) -> int:
-        """The bit length of the largest of the integers over one common denominator in lowest terms; costs a gcd.
+        """The bit length of the largest integer over the least common denominator; computing it takes a gcd.
 
-        `bits` differs by a few bits, and is much too large if planes have common denominators.
+        `bits` differs by a few bits, but is much too large if denominators of planes have common factors.
         """
         if self._height is None:
             numerators, denominator = self.common()
@@ -128,7 +128,7 @@ class PlanesPoint:
         return self._height
 
     def exceeding(self, limit: int) -> int:
-        """Return the height if it exceeds the limit, otherwise 0; a gcd is computed only if it is needed to decide."""
+        """Return the height if it exceeds the limit, otherwise 0; a gcd is computed only if `bits` does not decide."""
         if self.bits + self._assembly.extra_bits <= limit:
             return 0
         return self.height if self.height > limit else 0
@@ -140,19 +140,19 @@ class PlanesPoint:
         return all(block.same(P, Q) for block, P, Q in pairs)
 
     def __hash__(self) -> int:
-        # Triples over an extension are not unique.
+        # Triples over an extension field are not unique.
         return hash(tuple(abs(W) for _, _, W in self.triples if isinstance(W, fmpz)))
 
     def common(self) -> tuple[list[fmpz], fmpz]:
-        """Return numerators of all coordinates and a common denominator; common factors of the W_i remain."""
+        """Return the numerators of all coordinates and a common denominator; common factors of the W_i remain."""
         column, product = _scaled([(numerators, W) for numerators, W, _ in self._fractions])
         return (self._assembly.forms * column).entries(), self._assembly.denominator * product
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
-        """Return numerator and denominator of each coordinate in lowest terms, denominators positive."""
+        """Return numerator and denominator of each coordinate in lowest terms, with positive denominators."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
-        suspects = fmpz(1)  # divisible by all primes that divide two of the W
-        *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
+        suspects = fmpz(1)  # divisible by all primes that divide two of the W_i
+        *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest W is only reduced
         while others:
             number = others.pop()
             suspects = suspects * number.gcd(product % number)
@@ -163,7 +163,7 @@ class PlanesPoint:
         modulus = (self._assembly.fixed_number * suspects) ** _POWER
         residues = [([entry % modulus for entry in numerator], W % modulus) for numerator, W in planes]
         fractions, reduced = self._fractions_of(planes), self._fractions_of(residues)
-        divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd for all rows with the same form
+        divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd suffices for all rows with the same form
         pairs = []
         for row, (numerator, denominator), residue in zip(self._assembly.rows, fractions, reduced, strict=True):
             if numerator == 0:
@@ -171,7 +171,7 @@ class PlanesPoint:
                 continue
             common = fmpz(1)
             for i, form in zip(row.support, row.forms, strict=True):
-                if i in row.dividing:  # gcd(alpha U + beta V, W) but for fixed primes, where the form divides h
+                if i in row.dividing:  # gcd(alpha U + beta V, W) up to fixed primes, if the form divides h
                     factor = content(form)
                     key = (i, *(int(entry // factor) for entry in form))
                     if key not in divisors:
@@ -187,13 +187,13 @@ class PlanesPoint:
                 numerator, denominator = numerator // common, denominator // common
                 if is_all(common, power):
                     break
-                power = power * power  # a prime may be there to a high power
+                power = power * power  # a prime may occur with a high exponent
                 common = _common_part(numerator, denominator, power)
             pairs.append((numerator, denominator) if denominator > 0 else (-numerator, -denominator))
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
-        """Return numerators and denominators of all coordinates, from those of the planes or from residues of these."""
+        """Return numerators and denominators of all coordinates, from those of the planes or from their residues."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():
@@ -205,12 +205,12 @@ class PlanesPoint:
         return [fractions[k] for k in range(len(rows))]
 
     def rationals(self) -> tuple[fmpq, ...]:
-        """Return the coordinates as fmpq (whose constructor runs another gcd)."""
+        """Return the coordinates as fmpq; the constructor of fmpq computes another gcd."""
         return tuple(fmpq(numerator, denominator) for numerator, denominator in self.lowest_terms())
 
 
 def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
-    """Return the numerators of the planes, each times the W of the others, in one column, and the product of all W."""
+    """Return the numerators of each plane times the W of all other planes, in one column, and the product of all W."""
     *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
     products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
     others = (before * after for before, after in zip(products_before, products_after, strict=True))
@@ -219,7 +219,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """Return the greatest common factor of two numbers and the modulus, except for high powers of primes."""
+    """Return the greatest common factor of two numbers and the modulus; high powers of a prime may be missed."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

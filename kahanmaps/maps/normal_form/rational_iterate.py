@@ -1,14 +1,14 @@
 """The n-th iterate over Q, unless the orbit reaches a pole or exceeds its budget before step n.
 
-An orbit is computed exactly while its numbers are short. Afterwards the step at which single steps would end (at a pole
-or over the budget) is determined as follows.
+An orbit is computed exactly while its numbers are short. Afterwards the step at which a computation by single steps
+would end (at a pole or over the budget) is determined as follows.
 
 * Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
-  (a polynomial of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
-  between, and a rise shows where the budget is exceeded at the latest; later steps are irrelevant.
-* Poles up to there are found modulo random primes of 61 bits (a pole over Q is one modulo every prime), and verified.
-* The poles of a plane that is periodic, or whose level is parabolic, are known for all steps at once, and its numbers
-  stay short. If this holds for all planes, any n can be reached.
+  (polynomials of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
+  between. A rise gives a step at which the budget is exceeded at the latest; later steps are irrelevant.
+* Poles up to this step are found modulo random primes of 61 bits (a pole over Q is one for every prime), and verified.
+* If the orbit in a plane is periodic, or its level is parabolic, its poles are known for all steps together, and its
+  numbers stay short. If this holds for all planes, any n can be reached.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from kahanmaps.maps.normal_form.periods import PeriodKind, plane_period_over_rat
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planes_point import Block, NormalSteps, PlanesPoint
 
-_RISE = 16  # steps over which a rise of the heights is more than a fluctuation
-_EXACT_STEPS = 256  # taken first,
+_RISE = 16  # number of steps over which a rise of the heights is more than a fluctuation
+_EXACT_STEPS = 256  # number of steps that are first computed exactly,
 _EXACT_BITS = 8192  # as long as the numbers have at most this bit length
-_SINGLE_STEPS = 24  # up to this step a plane is computed by single steps
+_SINGLE_STEPS = 24  # up to this step, single steps are used in a plane
 _PRIMES = 20
 # The default limits: longer numbers take minutes; this number of steps modulo a prime is faster than long numbers.
 _MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
 
 class OverBudget(Exception):
-    """The orbit has too long numbers at `step` or before; at `step` they have `bits` bits (None: not computed)."""
+    """The numbers of an orbit exceed the budget at `step` or before; at `step` they have `bits` bits, if not None."""
 
     def __init__(self, step: int, bits: int | None) -> None:
         self.step, self.bits = step, bits
@@ -49,7 +49,7 @@ class OverBudget(Exception):
 class OrbitInPlanes:
     """The orbit of an initial point over Q, with direct access to its iterates; poles at earlier steps are detected.
 
-    Every plane has triples of integers or short elements of Z[t], and points from tables of psi and chi.
+    Points in each plane are triples of integers or of short elements of Z[t], computed from tables of psi and chi.
     """
 
     def __init__(self, normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], max_bits: int | None) -> None:
@@ -62,11 +62,11 @@ class OrbitInPlanes:
         self._limit = _MAX_BITS if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
-        self._first_points: list[PlanesPoint] = []  # the first steps, exactly
+        self._first_points: list[PlanesPoint] = []  # the points of the first steps, computed exactly
         for step, value in enumerate(steps.points(x)):
             bits = value.exceeding(self._limit)
             if step == 0 or not bits:
-                self._first_points.append(value)  # not charged to the budget, since the initial point is given
+                self._first_points.append(value)  # not charged to the budget, since the user gave the initial point
             if bits:
                 self._end = OverBudget(step, bits)
                 break
@@ -79,10 +79,10 @@ class OrbitInPlanes:
             self._end = _undefined_step(len(self._first_points) - 1)
         self._reachable = (
             len(self._first_points) - 1
-        )  # the last step that is known to be within the budget and before all poles
+        )  # the last step known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
-        """Return Phi^n(start). Raises SingularStep or OverBudget, whichever occurs at an earlier step."""
+        """Return Phi^n(start). Raises SingularStep or OverBudget, whichever belongs to the earlier step."""
         if n < len(self._first_points):
             return self._first_points[n]
         if self._end is not None:
@@ -104,9 +104,9 @@ class OrbitInPlanes:
         return value
 
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
-        """Return (n, value, 0) or, for an earlier step over the budget, that step, None and its bits (None: unknown).
+        """Return (n, value, 0), or for an earlier step over the budget (step, None, its bits or None if unknown).
 
-        The value is None if it was not computed, or at a pole.
+        The value is None if it was not computed or if step n is a pole.
         """
         step = max(1, min(self._reachable, n - 1))
         target = n if self._numbers_stay_short else _halved(n, step)
@@ -121,12 +121,12 @@ class OrbitInPlanes:
                 return target, value, bits
             current = target, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
-                # Linear extrapolation: at four times the budget it is certainly exceeded.
+                # Linear extrapolation, up to four times the budget, where the budget is certainly exceeded.
                 surely_exceeded_after = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
                 if surely_exceeded_after <= min(n - target, _MAX_MODULAR_STEPS):
                     return target + surely_exceeded_after, None, None
             previous = current
-            # Heights may grow like n^2: the step is doubled only if four times the size is within the limit.
+            # Heights may grow like n^2: the step is doubled only if four times the height is within the budget.
             target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
@@ -140,15 +140,15 @@ class OrbitInPlanes:
         return PlanesPoint(self._assembly, triples)
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
-        """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
+        """Return the first undefined step up to n; `value`, the n-th point, serves as a check modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.numbers_stay_short]
-        generator = random.Random(f"first pole {n}")  # same primes on every machine: same work
+        generator = random.Random(f"first pole {n}")  # the same primes, hence the same work, on every machine
         for _ in range(_PRIMES):
             poles: list[int] = []
             for i in undecided_planes:
                 block, residue = self._blocks[i], None
-                while residue is None:  # a homomorphism to the residues modulo a random prime
+                while residue is None:  # find a homomorphism to the residues modulo a random prime
                     residue = block.residue_map(random_prime(generator))
                 pole, point = _steps_modulo(block, n, residue)
                 if pole is None:
@@ -159,7 +159,7 @@ class OrbitInPlanes:
                     is_pole = _point_in_plane(block, pole)[2] == 0
                 except SingularStep:
                     is_pole = True
-                if not is_pole:  # over Q: the prime divides W there
+                if not is_pole:  # not a pole over Q: the prime divides W at this step
                     break
                 poles.append(pole)
             else:
@@ -168,7 +168,7 @@ class OrbitInPlanes:
 
 
 def _halved(n: int, step: int) -> int:
-    """The least of n, n/2, n/4, ..., rounded down, that is above the step; tables for n contain the values at these."""
+    """Return the least of n, n/2, n/4, ..., rounded down, that is above `step`: a table for n contains its value."""
     while n >> 1 > step:
         n >>= 1
     return n
@@ -181,8 +181,8 @@ def _undefined_step(step: int) -> SingularStep:
 class _Plane:
     """The data of the orbit in one plane for all steps: whether its numbers stay short, its period and its pole.
 
-    They stay short if the orbit returns after `period` steps, or if its level is parabolic (`period` is None). In these
-    cases `pole` is the first step that is not defined, or None.
+    The numbers stay short if the orbit returns after `period` steps, or if its level is parabolic (`period` is None).
+    In both cases `pole` is the first undefined step, or None.
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
@@ -197,7 +197,7 @@ class _Plane:
             self.pole = 1
         elif period.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
-            if not (r is None or isinstance(r, fmpq)):  # an element of a number field: is it rational?
+            if not (r is None or isinstance(r, fmpq)):  # an element of a number field, perhaps rational
                 r = r.coefficients[0] if not any(entry != 0 for entry in r.coefficients[1:]) else None
             self.pole = int(r.p) if r is not None and r.q == 1 and r > 0 else None
         elif period.period is not None and period.meets_pole is not False:
@@ -207,12 +207,12 @@ class _Plane:
                 self.pole = pole.step
 
     def reduced_step(self, n: int) -> int:
-        """Return a smaller step with the same point."""
+        """Return a smaller step at which the orbit has the same point."""
         return n if self.period is None else n % self.period
 
 
 class _Pole(SingularStep):
-    """Attribute: `step`, the first one that is not defined."""
+    """A pole of the orbit. Attribute: `step`, the first undefined step."""
 
     def __init__(self, step: int) -> None:
         self.step = step
@@ -220,7 +220,7 @@ class _Pole(SingularStep):
 
 
 def point_by_steps(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """Return P_n over a field, computed step by step. Raises _Pole."""
+    """Return P_n over a field, computed step by step. Raises _Pole if a step is undefined."""
     point = start
     for k in range(n):
         U, V, W = block.image(point)
@@ -231,7 +231,7 @@ def point_by_steps(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 
 def _point_in_plane(block: Block, n: int) -> Triple:
-    """Return P_n, ignoring poles at earlier steps; where steps are needed, a pole raises SingularStep."""
+    """Return P_n, ignoring poles at earlier steps; if single steps are needed, a pole raises SingularStep."""
     if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
@@ -253,7 +253,7 @@ def _steps_modulo(block: Block, n: int, residue: Callable[[Any], nmod]) -> tuple
     """Return P_n modulo a prime, or the first step at which W vanishes modulo the prime."""
     cubic = block.block
     modulo = PlanarBlock(*map(residue, (cubic.a, cubic.b, cubic.c, cubic.d)))
-    point: Triple = tuple(map(residue, block.start))  # type: ignore[assignment]  # of three
+    point: Triple = tuple(map(residue, block.start))  # type: ignore[assignment]  # a tuple of three
     for k in range(1, n + 1):
         point = modulo.image(point)
         if point[2] == 0:

@@ -1,9 +1,9 @@
 """The number of points of an elliptic curve modulo small primes, by Schoof's algorithm, over a field of any size.
 
-For a curve y^2 = c(x) over q elements with q + 1 - t points the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
-F^2 - t F + q = 0. This holds on the points of order l, whose x are the roots of the division polynomial f of degree
-(l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c, and tries t = 0, ..., l - 1. A number that has no inverse
-modulo f gives a divisor of f, which replaces f. With FLINT's polynomials this is fast enough.
+For a curve y^2 = c(x) over q elements with q + 1 - t points, the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
+F^2 - t F + q = 0. To find t modulo l, the equation is tested for t = 0, ..., l - 1 on the points of order l, whose x
+are the roots of the division polynomial f of degree (l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c. An
+element without inverse modulo f gives a divisor of f, which replaces f. FLINT's polynomials make this fast enough.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Point = tuple[Poly, Poly] | None
 
 
 class _Divisor(Exception):
-    """Raised with a proper divisor of the modulus. Attribute: `divisor`."""
+    """A proper divisor of the modulus was found. Attribute: `divisor`."""
 
     def __init__(self, divisor: Poly) -> None:
         self.divisor = divisor
@@ -33,7 +33,7 @@ class _Torsion:
         self.f, self.c, self.A = f, c % f, A
 
     def inverse(self, value: Poly) -> Poly:
-        """Return 1/value. Raises _Divisor."""
+        """Return 1/value modulo f. Raises _Divisor."""
         common, inverse, _ = value.xgcd(self.f)
         if common.degree() > 0:
             raise _Divisor(common)
@@ -58,7 +58,7 @@ class _Torsion:
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
-    """Return (t, M): the trace t modulo M of y^2 = x^3 + a2 x^2 + a4 x + a6, where M = 2 3 5 7 ... is at least `bound`.
+    """Return (t, M): the trace t of y^2 = x^3 + a2 x^2 + a4 x + a6 modulo M, where M = 2 3 5 7 ... is at least `bound`.
 
     The field has characteristic at least 5.
 
@@ -81,7 +81,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             continue
         f, residue = division_polynomials[prime], None
         while residue is None:
-            torsion = _Torsion(f, c, A)  # find the trace that fits on the torsion points with f = 0
+            torsion = _Torsion(f, c, A)  # find the trace that satisfies the equation on the points with f = 0
             try:
                 frobenius = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 frobenius_squared = (pow(frobenius[0], q, f), frobenius[1] * pow(frobenius[1], q, f) % f)
@@ -104,7 +104,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
 
 
 class _DivisionPolynomials:
-    """Return psi_n for odd n, psi_n / (2y) for even n, as polynomials in x."""
+    """The polynomials psi_n for odd n, and psi_n / (2y) for even n, as polynomials in x."""
 
     def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
         xx = x * x
@@ -123,8 +123,8 @@ class _DivisionPolynomials:
     def __getitem__(self, n: int) -> Poly:
         if n not in self._values:
             m, odd = divmod(n, 2)
-            # Psi with an even index is stored without its factor 2 y. In the recurrence of an odd index one of the two
-            # products has four such factors, 16 y^4 = 16 c^2.
+            # psi_n with an even n is stored without its factor 2 y. In the recurrence for an odd index, one of the two
+            # products contains four such factors, 16 y^4 = 16 c^2.
             if odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]

@@ -1,8 +1,8 @@
 """The planes into which the normal form splits over a field, and the conversion of points to planes and back.
 
-Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g; over GF(p) one for each
-factor of chi modulo p, with coordinates in GF(p^deg g); over real balls one for each real root and one, with complex
-coordinates, for each pair of complex roots. In each plane the Kahan map is `PlanarBlock`.
+Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g. Over GF(p) there is one for
+each factor of chi modulo p, with coordinates in GF(p^deg g). Over real balls there is one for each real root, and one,
+with complex coordinates, for each pair of complex roots. In each plane the Kahan map is given by a `PlanarBlock`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """One plane: `name` names its root or factor of chi, `degree` is that of its field over the field of x.
+    """One plane: `name` is its root or its factor of chi, `degree` the degree of its field over the field of x.
 
-    `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
-    `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
-    is FLINT's field of the plane if that is an extension of GF(p), since elements do not determine it.
+    `residue` maps the coefficients of an element of K (elements of the field of x) to its value in the plane, and
+    `coefficients` maps a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
+    is FLINT's field of the plane if this field is an extension of GF(p), since elements do not determine it.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Plane:
 class Splitting:
     """The planes of a normal form over QQ, GF(p) or real balls, for the map with this eps (the time step is 2 eps).
 
-    `T` is the change x = T y from the coordinates y of the form, or None. Raises BadPrime if there is no reduction
+    `T` is the change x = T y from the coordinates y of the form, or None. Raises BadPrime if the form has no reduction
     modulo p, or chi has a repeated root modulo p.
     """
 
@@ -57,7 +57,7 @@ class Splitting:
             if self.eps == 0:
                 raise BadPrime(f"eps = 0 in {field}: use another prime", field.characteristic)
             self._inverse = field.convert_matrix(S.inv())
-            # The planes, and for each the coefficients in K of the elements that its own coefficients stand for.
+            # The planes, and for each plane the elements of K that correspond to the basis of its field.
             if field is QQ or isinstance(field, PrimeField):
                 planes, bases = _by_factors(form, field)
             elif isinstance(field, BallField):
@@ -67,7 +67,7 @@ class Splitting:
             self.planes: tuple[Plane, ...] = tuple(planes)
             rows = field.convert_matrix(S).tolist()
             m = form.m
-            # x = sum over planes of `matrix` times the coefficients of u, then those of v.
+            # x is the sum over the planes of `matrix` times the coefficients of u, followed by those of v.
             self._matrices = []
             for basis in bases:
                 columns = []
@@ -83,7 +83,7 @@ class Splitting:
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
-        """The rows of R, where x is the sum of R (u, v) over the planes; the coefficients are in the field of x."""
+        """Return the rows of R, where x is the sum of R (u, v) over the planes; coefficients are in the field of x."""
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:
@@ -101,7 +101,7 @@ class Splitting:
             return triples
 
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
-        """Return the point with these homogeneous coordinates. Raises SingularStep if one of them is at infinity."""
+        """Return the point with these homogeneous coordinates. Raises SingularStep if a triple is at infinity."""
         with self.field.working():
             total = [self.field.zero] * self.dim
             for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):
@@ -134,7 +134,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
         return ring([fmpz(int(c)) for c in coefficients]) if p else fmpq_poly(list(coefficients))
 
     def planes_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
-        """Return the plane of a factor, and the coefficients in K of its basis, which is 0 in the other planes."""
+        """Return the plane of a factor, and its basis as coefficients in K of elements that are 0 in other planes."""
         degree, generator = int(factor.degree()), polynomial([0, 1])
         context: Any = None
         residue: Any
@@ -162,7 +162,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
                 return coefficients_in_field + [field.zero] * (degree - len(coefficients_in_field))
 
         else:
-            # The generator is a multiple of t that is integral.
+            # An integral multiple of t is the generator.
             denominator = factor.denom()
             t_by_generator, generator = fmpq_poly([0, fmpq(1, denominator)]), fmpq_poly([0, denominator])
             algebra, name = (
@@ -188,7 +188,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
-    """Return the monic irreducible factors over Q: linear ones by increasing root, then by degree and coefficients."""
+    """Return the monic irreducible factors over Q: linear factors by root, then others by degree and coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 
@@ -197,7 +197,7 @@ def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[l
     planes, bases = [], []
     chi_derivative = form.chi.derivative()
     for complex_root in form.chi.complex_roots():
-        root: Any = complex_root[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
+        root: Any = complex_root[0]  # type: ignore[index]  # the stub omits the multiplicity
         if root.imag < 0:
             continue
         is_real = bool(root.imag == 0)
@@ -210,7 +210,7 @@ def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[l
             return total
 
         block = PlanarBlock(*(value_at(_balls(c, field)) for c in form.coefficients))
-        # chi / (t - root) by Horner's rule; divided by chi'(root) it is 1 at the root and 0 at the others.
+        # chi / (t - root) by Horner's rule; divided by chi'(root), it is 1 at the root and 0 at all other roots.
         chi, denominator = _balls(form.chi, field), value_at(_balls(chi_derivative, field))
         quotient = [chi[-1]]
         for coefficient in chi[-2:0:-1]:

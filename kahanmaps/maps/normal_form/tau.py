@@ -1,23 +1,23 @@
-"""Tau functions: the points of an orbit in a plane as products of terms, a third as long, of two Somos sequences.
+"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences, a third as long.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
     P_{n+1} W_{n-1} = Psi(P_n)                                                     (natural lifts)
 
-the determinants factor, det(P_i, P_j, P_k) = (const) psi_{j-i} psi_{k-i} psi_{k-j} chi_{i+j+k}, into values psi_n =
-sigma(n T) and chi_n = sigma(n T - kappa) of one sigma function, kappa = -3 P_0 for the zero of E with which three
-points on a line have sum 0. So
+the determinants factor: det(P_i, P_j, P_k) = (const) psi_{j-i} psi_{k-i} psi_{k-j} chi_{i+j+k}, with the values psi_n =
+sigma(n T) and chi_n = sigma(n T - kappa) of one sigma function; kappa = -3 P_0, where the zero of E is chosen such that
+three points on a line have sum 0. So
 
     P_n  ~  -2 psi_{n-1} psi_{n+1} chi_n P_0 + psi_n psi_{n+1} chi_{n-1} P_1 + psi_{n-1} psi_n chi_{n+1} P_{-1},
 
-and for a + b and a - b everything is bilinear (phi is psi or chi; there are no other terms, so no content arises):
+and both sequences satisfy bilinear identities (phi is psi or chi; there are no further terms, so no content arises):
 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
-psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
-gamma = 1 - delta. For n divisible by 3 the cube roots are factored out. These are the sequences W and U of `somos`,
-whose terms follow from those of half the index: over Q they are integers coprime to the bad primes, times scales that
-are never computed, since they contain powers of the bad primes with exponents quadratic in n.
+psi depends only on delta = disc(h) level^2: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
+gamma = 1 - delta. For n divisible by 3, the cube root is factored out. These are the sequences W and U of `somos`,
+whose terms follow from those of half the index. Over Q the terms are integers coprime to the bad primes, times scales
+that are never computed, since they contain powers of the bad primes with exponents quadratic in n.
 docs/mathematics.md has the proofs. Source: ward-1948, for such sequences.
 """
 
@@ -31,14 +31,14 @@ from kahanmaps.maps.normal_form.planar_block import Triple, determinant
 from kahanmaps.maps.somos import Terms
 
 _BASES = 3
-_FIRST = 2  # below it psi_{n-1} would be zero
-_SHARED = 8  # points taken from one table, which then holds about ten times the digits of a point
+_FIRST = 2  # the least n: for smaller n, psi_{n-1} would be 0
+_SHARED = 8  # number of points taken from one table, which then holds about ten times the digits of a point
 
 
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    The memory needed is less than that of the points between n/2 and n.
+    The points between n/2 and n would need more memory.
     """
     table = table_near(block)
     if table is None:
@@ -51,7 +51,7 @@ def triples(block: Any) -> Iterator[Triple]:
 def iterate(block: Any, n: int) -> Triple | None:
     """Return the primitive triple P_n up to sign, n >= 0; None if the sequences do not apply and steps are needed.
 
-    This happens if the cubic is singular, T has small order, or n is small. Poles at earlier steps are ignored.
+    They do not apply if the cubic is singular, T has small order, or n is small. Poles at earlier steps are ignored.
     """
     if block.is_constant:
         at_rest: Triple = block.start
@@ -66,9 +66,9 @@ def iterate(block: Any, n: int) -> Triple | None:
 
 
 def table_near(block: Any) -> TauTable | None:
-    """Return the table for a base point P_0, P_1 or P_2 around which no value is zero; None if there is none.
+    """Return a table for one of the base points P_0, P_1, P_2 around which no value is zero; None if there is none.
 
-    chi_n can vanish for one n only, unless T is a torsion point. Near a pole there are no natural lifts.
+    Unless T is a torsion point, chi_n is zero for at most one n. Near a pole there are no natural lifts.
     """
     if block.is_constant or block.level is None or block.is_degenerate:
         return None
@@ -102,9 +102,9 @@ def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]
 
 
 class TauTable:
-    """psi_n, chi_n and the points P_n, n >= 2, relative to a base point of an orbit in a plane.
+    """The values psi_n, chi_n and the points P_n, n >= 2, relative to a base point of an orbit in a plane.
 
-    `P` are natural lifts around it, `chi` the values chi_0, ..., chi_4.
+    `P` are natural lifts of the points around the base point, `chi` the values chi_0, ..., chi_4.
     """
 
     def __init__(self, block: Any, base: int, P: Mapping[int, Triple], chi: Mapping[int, Any]) -> None:
@@ -113,13 +113,13 @@ class TauTable:
         self._one = gamma * 0 + 1
         self.psi = Terms([self._one * n for n in (1, 2, 3, 4)], self._numbers, gamma=gamma)
         self.chi = Terms([chi[n] for n in (1, 2, 3, 4)], self._numbers, self.psi, gamma)
-        # The three points of which all others are combinations, times the constant factors of the formula.
+        # The three points of which all points are combinations, times the constant factors of the formula.
         self._lifts = self._numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
         self._divisor = self._numbers.prepared_divisor(self._numbers.split(chi[0])[0])
-        self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point
+        self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n, for the next point
 
     def points(self) -> Iterator[Triple]:
-        """Yield P_2, P_3, ..., primitive, as long as the map is defined."""
+        """Yield P_2, P_3, ... as primitive triples, as long as the map is defined."""
         for n in count(_FIRST):
             point = self.point(n)
             if point[2] == 0:
@@ -129,7 +129,7 @@ class TauTable:
             self.chi.forget(n // 2 - 4)
 
     def point(self, n: int) -> Triple:
-        """Return P_n for n >= 2, primitive over Q."""
+        """Return P_n for n >= 2, a primitive triple over Q."""
         psi, chi = self.psi, self.chi
         psi_before, psi_n, psi_after = (psi.integer(n + k) for k in (-1, 0, 1))
         product_before = self._product[1] if self._product[0] == n else psi_before * psi_n
@@ -140,7 +140,7 @@ class TauTable:
             product_after * chi.integer(n - 1),
             product_before * chi.integer(n + 1),
         ]
-        # Scales, over that of the first term.
+        # The scales, divided by the scale of the first term.
         ratio = chi.mixed_quotient(n)
         scales = [self._one, chi.own_quotient(n) / ratio, ratio / psi.own_quotient(n)]
         point: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)

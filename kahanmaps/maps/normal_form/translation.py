@@ -1,7 +1,7 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
-In balls the formulas are those of `tau`, with natural lifts and without scales, since they lose the fewest bits. For
-exact elements another method is faster. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is computed by doublings
+In balls the formulas of `tau` are used, with natural lifts and without scales, since they lose the fewest bits. For
+exact elements another method is faster. On the Jacobian Y^2 = x^3 + ... (`level_curves`), n T is computed by doublings
 and additions. With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y), the point is
 
     P_n ~ chi_0 x (x - x_u) P_0 + chi_{-1} (Y - Y_u - m (x - x_u)) P_1 - chi_1 (Y - Y_u - m' (x - x_u)) P_{-1},
@@ -24,13 +24,13 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.tau import first_chi
 
-# Base points that are tried until no divisor vanishes.
+# Number of base points that are tried until no divisor is zero.
 _BASES = 12
-_STEPPED = 16  # up to this n the point is computed by single steps
+_STEPPED = 16  # up to this n, the point is computed by single steps
 
 
 class NoTranslation(Exception):
-    """Raised if doublings do not apply to an orbit, which must be computed step by step."""
+    """Doublings do not apply to an orbit, which must be computed step by step."""
 
 
 def iterate(
@@ -38,8 +38,8 @@ def iterate(
 ) -> Triple:
     """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
-    `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep for a pole
-    among the first points, which are computed step by step; NoTranslation for too many special positions.
+    `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep if one of
+    the first points, which are computed step by step, is a pole; NoTranslation for too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> F = GF(10007)
@@ -58,10 +58,10 @@ def iterate(
         return _parabolic(block, start, n)
     level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
-    if is_zero(gamma):  # three lines, permuted by Psi: every third point is on the same line
+    if is_zero(gamma):  # three lines, permuted by Psi: P_n, P_{n+3}, ... are on the same line
         points = _first_points(block, points, n % 3 + 10, is_zero)
         return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
-    # The formulas divide by values that vanish at special points: then the next base point is tried.
+    # The formulas divide by values that are zero at special points: in that case the next base point is tried.
     for base in range(3, _BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
@@ -74,10 +74,10 @@ def iterate(
 
 
 def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
-    """r = W/s at a start with delta = 0 and an image, s^2 = -D; None where D = 0, so that P_n = P_0 + n (P_1 - P_0).
+    """Return r = W/s, s^2 = -D, at a start with delta = 0 and an image; None if D = 0: P_n = P_0 + n (P_1 - P_0).
 
-    A step decreases r by 1, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r, if r is
-    a positive integer, and none otherwise. r is a rational function of r^2 at the start and r^2 at its image.
+    A step decreases r by 1, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r if r is
+    a positive integer, and no pole otherwise. r is a rational function of the values of r^2 at the start and its image.
     """
 
     def square(point: Triple) -> Any:
@@ -91,10 +91,10 @@ def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
 
 
 def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """P_n for delta = 0, in characteristic 0 or at least 5; the start has an image.
+    """Return P_n for delta = 0, in characteristic 0 or at least 5; the start has an image.
 
-    (U/W, V/W) has a part with h = 0 or in the simple root of h, which is multiplied by r/(r - n), and one in the double
-    root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
+    (U/W, V/W) is the sum of a part with h = 0, or in the simple root of h, which is multiplied by r/(r - n), and a part
+    in the double root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
     """
     U, V, W = block.image(start)
     point, image = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
@@ -110,7 +110,7 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 
 def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
-    """Return P_0, P_1, ..., P_last, natural lifts from the second point on. Raises SingularStep at a pole."""
+    """Return P_0, P_1, ..., P_last, as natural lifts from the second point on. Raises SingularStep at a pole."""
     points = list(points)
     for k in range(len(points) - 1, last):
         U, V, W = block.image(points[k])
@@ -128,19 +128,19 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
-    # Coordinates (x, y) are those of x P + y Q; two entries of the triples in which P and Q are independent give them.
+    # Coordinates (x, y) stand for x P + y Q; two entries of the triples in which P, Q are independent determine them.
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
     determinant = P[i] * Q[j] - P[j] * Q[i]
     (a, b), (c, d) = (
         ((R[i] * Q[j] - R[j] * Q[i]) / determinant, (P[i] * R[j] - P[j] * R[i]) / determinant) for R in points[2:4]
     )
-    # The matrix takes (1, 0) to r (0, 1) and (0, 1) to (a, b), and (a, b) to a multiple of (c, d):
+    # The matrix maps (1, 0) to r (0, 1), (0, 1) to (a, b), and (a, b) to a multiple of (c, d):
     # r a (0, 1) + b (a, b) ~ (c, d).
     if is_zero(a):
         return Q
-    if is_zero(b):  # then the third point is P again
+    if is_zero(b):  # the third point is P again
         return points[n % 2]
-    if is_zero(c):  # the fourth point is Q: period 2 of a translation on the line is excluded, so P_3 = P_1
+    if is_zero(c):  # the fourth point is Q; since a translation on the line has no period 2, P_3 = P_1
         raise NoTranslation
     r = (b * a * d / c - b * b) / a
     # The first column of the n-th power of the matrix with these rows.
@@ -157,7 +157,7 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
 
 
 def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
-    """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor vanishes."""
+    """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor is zero."""
     P = dict(zip(range(-2, 3), points, strict=False))
     chi = first_chi(P, range(-1, 3))
     if any(is_zero(value) for value in chi.values()):
@@ -179,8 +179,8 @@ def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[A
 
 
 def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[Any, Any] | None:
-    """Return (x, Y) of n T, n > 0, None for zero, by an expansion of n with odd digits from -3 to 3 and zeros."""
-    # With x + shift for x the curve is Y^2 = x^3 + c x + ...
+    """Return n T = (x, Y), n > 0, None for zero, from an expansion of n with digits 0 and odd digits from -3 to 3."""
+    # With x + shift instead of x the curve is Y^2 = x^3 + c x + ...
     one, shift, c = gamma / gamma, 3 + gamma, -3 * (gamma - 1) * (gamma - 9)
     table = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
     table |= {-k: (x, -y) for k, (x, y) in table.items()}
@@ -204,7 +204,7 @@ def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[
 
 
 def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
-    """Return 2^count times the point (x, y), None for zero. Sums are used, since FLINT is slower with multiples."""
+    """Return 2^count times the point (x, y), None for zero. Sums replace integer multiples, which FLINT does slowly."""
     try:
         for _ in range(count):
             square = x * x
@@ -218,7 +218,7 @@ def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
 
 @lru_cache(maxsize=16)
 def _digits(n: int) -> list[tuple[int, int]]:
-    """Yield odd digits from -3 to 3 of n > 0, highest first, each with the number of binary places to the next.
+    """Return the odd digits from -3 to 3 of n > 0, highest first, each with the number of binary places to the next.
 
     >>> _digits(100)
     [(3, 3), (1, 2)]
@@ -236,8 +236,8 @@ def _digits(n: int) -> list[tuple[int, int]]:
 def _doubled(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
-    """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor vanishes."""
-    # Natural lifts around this base point: the first two determine the others.
+    """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor is zero."""
+    # Natural lifts around this base point: the first two lifts determine all others.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
         denominator = P[k - 1][2]
@@ -249,15 +249,15 @@ def _doubled(
     one = gamma / gamma
     half = one / 2
     inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
-    # psi_{-2}, ..., psi_5 and chi_0, chi_1, chi_2 are those around 1.
+    # The values psi_{-2}, ..., psi_5 and chi_0, chi_1, chi_2 around the index 1.
     window = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
     chi_values, centre = [chi[k] for k in range(3)], 1
     for digit in f"{n:b}"[1:]:
-        # The windows around 2 centre + digit from those around `centre`.
+        # The values around 2 centre + digit, computed from the values around `centre`.
         first = centre - 3
         squares = [value * value for value in window]
         neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
-        # Squares for a partner whose index is, or is not, divisible by 3.
+        # The squares for a partner whose index is divisible by 3, and for one whose index is not.
         squares_by_index = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
         shift = 2 * centre + int(digit) - 3
         window = []

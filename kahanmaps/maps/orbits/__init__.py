@@ -1,1 +1,1 @@
-"""Orbits of any map, in every arithmetic: the choice of the method, and the steps."""
+"""Orbits of any map in every arithmetic: the choice of a method, and the computation of the steps."""

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-_MAX_DIGITS = 4000  # of a prime or of a number of bits
+_MAX_DIGITS = 4000  # digits of a prime, or of the number of bits of a precision
 
 
 class Arithmetic(NamedTuple):
-    """A number system: "exact", "float", "mod" with a prime, or "ball" with a precision in bits (0: chosen as needed).
+    """A number system: "exact", "float", "mod" with a prime, or "ball" with a precision in bits (0: chosen by need).
 
     >>> Arithmetic.parse("mod:101"), str(Arithmetic.parse("ball:auto"))
     (Arithmetic(kind='mod', number=101), 'ball:auto')
@@ -21,7 +21,7 @@ class Arithmetic(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Arithmetic:
-        """Parse exact, float, mod:P, ball:BITS or ball:auto. Raises InputError for other text."""
+        """Parse exact, float, mod:P, ball:BITS or ball:auto. Raises InputError for any other text."""
         kind, colon, number = text.partition(":")
         if kind in ("exact", "float") and not colon:
             return cls(kind)
@@ -34,7 +34,7 @@ class Arithmetic(NamedTuple):
 
     @classmethod
     def of(cls, value: Any) -> Arithmetic:
-        """Return the arithmetic for a text, a field or `float`. Raises InputError for anything else.
+        """Return the arithmetic for a text, a field or the type `float`. Raises InputError for any other value.
 
         >>> str(Arithmetic.of("exact")), str(Arithmetic.of(float))
         ('exact', 'float')
@@ -59,8 +59,8 @@ class Arithmetic(NamedTuple):
 
     @property
     def field(self) -> Any:
-        """The field, GF(p) for example. Raises InputError for floats and if P is not a prime."""
-        from kahanmaps.algebra.fields import GF, QQ, RR  # imported here: parsing an option must stay fast
+        """The field, for example GF(p). Raises InputError for floats, and if P is not a prime."""
+        from kahanmaps.algebra.fields import GF, QQ, RR  # imported here, so that parsing an option stays fast
 
         if self.kind == "exact":
             return QQ

@@ -1,6 +1,6 @@
 """Fraction-free Gaussian elimination (Bareiss' two-step algorithm) for integer systems whose minors share a factor.
 
-The equations of a step of a map of the commuting family are such systems.
+The equations that define a step of a map of the commuting family are such systems.
 """
 
 from __future__ import annotations
@@ -9,29 +9,29 @@ from flint import fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
-# A common divisor shorter than this is not worth a division of every entry.
+# If a common divisor has fewer bits than this, dividing every entry by it takes longer than it saves.
 _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
 
 
 def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz) -> IntegerPoint | None:
-    """Solve matrix x = rhs over Q; return None where the matrix is singular or the elimination fails.
+    """Solve matrix x = rhs over Q; return None if the matrix is singular or the elimination fails.
 
     Bareiss' two-step algorithm eliminates two columns at a time. For maps of the commuting family the matrix has rank 2
     modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
     up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
     length of W instead of up to n times: the exact divisions by the previous pivot remove the higher powers. If the
-    minors share nothing with `candidate_divisor`, this is the usual algorithm. If they share a factor by chance (a
-    pivot W^2 where a block of the matrix is W times the identity), the previous pivot need not divide later entries,
-    and what it shares with them is found by gcds. The divisions are not checked one by one: the solution is verified in
-    the equation.
+    minors have no common factor with `candidate_divisor`, this is the usual algorithm. If they have one by chance (a
+    pivot W^2 in a matrix with a block that is W times the identity), the previous pivot need not divide later entries;
+    the part of it that divides them is then found by gcds. The divisions are not checked one by one: the solution is
+    verified in the equation.
     """
     n = matrix.nrows()
     rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous = fmpz(1)  # the previous pivot as long as it divides what Sylvester's identity says, then 1
+    previous = fmpz(1)  # the previous pivot; 1 after a pivot that need not divide the entries
     for k in range(0, n - 1, 2):
         a, b, rows_below, m = rows[k], rows[k + 1], rows[k + 2 :], n - k - 2
-        # Each entry of the other rows becomes its minor of order 3 with the two pivot rows, over the previous pivot.
+        # Replace each entry of the other rows by its minor of order 3 with the two pivot rows, divided by `previous`.
         pivot, *cofactors = (
             x[k] * y[k + 1] - x[k + 1] * y[k]
             for x, y in [(a, b), *((row, a) for row in rows_below), *((b, row) for row in rows_below)]
@@ -50,7 +50,7 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
         ]
         divisor = previous
         if previous == 1 and minors:
-            # The divisor is found from a few entries only.
+            # The divisor is determined from a few entries only.
             entries = [entry for row in minors for entry in row]
             divisor = _shared(candidate_divisor, entries[:: max(1, len(entries) // 3)])
         for row, entries in zip(rows_below, minors, strict=True):
@@ -79,7 +79,7 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
             denominator = denominator * missing_factor
             quotient = value // content
         solution.insert(0, quotient)
-    # The point is in lowest terms: each new numerator is coprime to the factor by which the others were multiplied.
+    # The point is in lowest terms: each new numerator is coprime to the factor that multiplied the other numerators.
     sign = 1 if denominator > 0 else -1
     point = IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
     return point if is_unique_solution(point, matrix, rhs) else None
@@ -88,7 +88,7 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
 def is_unique_solution(point: IntegerPoint, matrix: fmpz_mat, rhs: fmpz_mat) -> bool:
     """Return whether the point is the only solution of matrix x = rhs.
 
-    True is proved. False may be wrong: it is also returned if the determinant is 0 modulo 2^61 - 1 only.
+    True is proved. False may be wrong, as it is also returned if the determinant is 0 only modulo 2^61 - 1.
     """
     if not int(nmod_mat(matrix, _PRIME).det()):
         return False
@@ -96,13 +96,13 @@ def is_unique_solution(point: IntegerPoint, matrix: fmpz_mat, rhs: fmpz_mat) -> 
 
 
 def _shared(candidate_divisor: fmpz, values: list[fmpz]) -> fmpz:
-    """Return the part of `candidate_divisor` without small primes that divides all values, or 1 if it is short.
+    """Return the part of `candidate_divisor` without small primes that divides all values, or 1 if this part is short.
 
-    Small primes are left out: they often divide all minors of order 3 by chance, but not those of higher order to the
-    power needed.
+    Small primes are excluded: they often divide all minors of order 3 by chance, but not the minors of higher order
+    with the exponent needed.
     """
     common, small_primes = candidate_divisor, fmpz.primorial_ui(fmpz(1000))
-    while (small := common.gcd(small_primes)) != 1:  # first: what remains usually divides the values
+    while (small := common.gcd(small_primes)) != 1:  # done first: the remaining part usually divides the values
         common = common // small
     for value in values:
         if (remainder := value % common) != 0:

@@ -1,8 +1,8 @@
 """Forward substitution for maps with a triangular equation, such as explicit maps, on points given by fractions.
 
-Each row of M x~ = r contains one unknown that does not occur in the rows solved before it. The entries of a row are
+Each row of M x~ = r contains one unknown that does not occur in the rows solved before. The entries of a row are
 homogenized in each pair (p_k, q_k) separately, where x_k = p_k/q_k in lowest terms. These integers are shorter than
-those over a common denominator of all coordinates, since only the coordinates that occur in the row enter.
+integers over a common denominator of all coordinates, since only the coordinates that occur in the row enter.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class _Row:
     unknown: int
     known: tuple[int, ...]
     powers: tuple[tuple[tuple[int, int, int], ...], ...]
-    entries: fmpz_mat  # rows: the coefficient of the unknown, those of the known coordinates, the right side
-    divisors: tuple[int, ...]  # the coordinates that divide every entry of M in the row
+    entries: fmpz_mat  # rows: coefficients of the unknown and of the solved coordinates, then the right-hand side
+    divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row
 
     def solved(self, point: Sequence[Fraction], solved: Sequence[Fraction]) -> Fraction | None:
-        """Return the unknown; None if its coefficient is 0."""
+        """Return the unknown, given the point and the coordinates solved; None if the unknown has coefficient 0."""
         monomials = []
         for powers in self.powers:
             total = fmpz(1)
@@ -41,7 +41,7 @@ class _Row:
             return None
         denominator = fmpz(1)
         for k, entry in zip(self.known, others, strict=True):
-            # numerator/denominator - entry p/q; all gcds are gcds of short numbers
+            # Compute numerator/denominator - entry p/q with gcds of short numbers only.
             p, q = solved[k]
             common = entry.gcd(q)
             p, q = entry // common * p, q // common
@@ -55,7 +55,7 @@ class _Row:
 
 @dataclass(frozen=True)
 class ForwardSubstitution:
-    """The step of a map whose equation is triangular: the rows in the order in which they are solved."""
+    """The step of a map with a triangular equation: the rows, in the order in which they are solved."""
 
     rows: Sequence[_Row]
 
@@ -80,7 +80,7 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
     rows = [table[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     solved: list[_Row] = []
     remaining = list(range(n))
-    # The first row with a single new unknown is always a good choice: a row that is solvable now stays solvable.
+    # The first row with a single new unknown is always a good choice: a row that can be solved now can be solved later.
     while remaining:
         solved_unknowns = {row.unknown for row in solved}
         occurring = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}

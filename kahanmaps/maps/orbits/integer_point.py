@@ -9,14 +9,14 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.integers import common_part, content
 
-Fraction = tuple[fmpz, fmpz]  # numerator and denominator without a common factor, the latter positive
+Fraction = tuple[fmpz, fmpz]  # numerator and positive denominator without a common factor
 
 
-# Below this length common factors are always removed.
+# If numbers have fewer bits than this, common factors are always removed.
 _LONG_BITS = 3000
-# Common factors shorter than this, and than this part of the numbers, are not worth a gcd of the whole numbers ...
+# If a common factor has fewer bits than this, and than this part of the numbers, it is not divided out ...
 _SHORT_BITS, _SHORT_PART = 64, 64
-# ... unless the numbers have become this many times longer since the last one.
+# ... until the numbers have become this many times as long as at the last division.
 _LONGER = 8
 _SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8
 
@@ -24,20 +24,20 @@ _SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8
 class IntegerPoint:
     """The rational point numerators / denominator; the integers have no common factor, the denominator is positive."""
 
-    has_long_factors = False  # whether the integers of a step had a long common factor, on the orbit so far
-    keeps_factors = False  # whether the next step may be taken with common factors left in the integers
+    has_long_factors = False  # whether the integers of some step of the orbit so far had a long common factor
+    keeps_factors = False  # whether the integers for the next step may have a common factor
 
     def __init__(self, numerators: tuple[fmpz, ...], denominator: fmpz) -> None:
         self.numerators, self.denominator = numerators, denominator
 
     @property
     def integers(self) -> tuple[Sequence[fmpz], fmpz]:
-        """Numerators and denominator for the next step; they may have a short common factor."""
+        """Return numerators and denominator for the next step; they may have a short common factor."""
         return self.numerators, self.denominator
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length at the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
         return self.bits
 
     @staticmethod
@@ -52,7 +52,7 @@ class IntegerPoint:
     def lowest_terms(self) -> list[Fraction]:
         """Return the reduced numerator and denominator of each coordinate, with a single gcd of large numbers.
 
-        A common factor of a numerator and W is also one of W and the product of all numerators modulo W.
+        A common factor of some numerator and W is also a factor of W and the product of all numerators modulo W.
         """
         return _lowest_terms(self.numerators, self.denominator, _common_with_product(self.numerators, self.denominator))
 
@@ -71,7 +71,7 @@ class IntegerPoint:
 
     @property
     def approximate_bits(self) -> int:
-        """A length that takes no long computation and grows from point to point like `bits`."""
+        """A bit length that is fast to compute and grows from point to point like `bits`."""
         return self.bits
 
     def exceeding(self, limit: int) -> int:
@@ -103,12 +103,12 @@ def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common: fmpz) -> list[Fra
 
 
 class UnreducedPoint(IntegerPoint):
-    """The image of a point, as integers whose common factor is removed only when it matters.
+    """The image of a point, as integers whose common factor is removed only if this is needed.
 
-    The gcds of long numbers take most of the time of an orbit whose heights grow exponentially, and usually have a few
-    bits only. A factor that is not removed costs little: its share of the length of the integers stays the same from
-    step to step. So only small primes are divided out at once, and other common factors after the numbers have become
-    `_LONGER` times as long, or when the coordinates are read. After a long common factor all later points are reduced.
+    The gcds of long numbers take most of the time of an orbit whose heights grow exponentially, and usually have only a
+    few bits. A factor that is not removed costs little: its share of the length of the integers stays the same from
+    step to step. So only small primes are divided out at each step, and other common factors when the numbers have
+    become `_LONGER` times as long, or when coordinates are read. After a long common factor all points are reduced.
     """
 
     def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:
@@ -116,7 +116,7 @@ class UnreducedPoint(IntegerPoint):
             numerators, denominator = [-entry for entry in numerators], -denominator
         self._previous = previous.has_long_factors, previous.reduced_bits
         self._integers = numerators, denominator
-        self._common: fmpz | None = None  # a multiple of the common factor
+        self._common: fmpz | None = None  # a multiple of the common factor, if known
         bits = self._bits_with_factors
         self.keeps_factors = _LONG_BITS <= bits < _LONGER * self._previous[1] and not self._previous[0]
         if self.keeps_factors:
@@ -134,7 +134,7 @@ class UnreducedPoint(IntegerPoint):
 
     @property
     def integers(self) -> tuple[Sequence[fmpz], fmpz]:
-        """Numerators and denominator for the next step; they may have a short common factor."""
+        """Return numerators and denominator for the next step; they may have a short common factor."""
         return self._integers if self.keeps_factors else self._reduced
 
     @cached_property
@@ -159,7 +159,7 @@ class UnreducedPoint(IntegerPoint):
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length at the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
         return self._previous[1] if self.keeps_factors else self.bits
 
     def lowest_terms(self) -> list[Fraction]:
@@ -169,7 +169,7 @@ class UnreducedPoint(IntegerPoint):
         return _lowest_terms(numerators, W, self._common)
 
     def exceeding(self, limit: int) -> int:
-        """Return the bit length if it exceeds the limit, otherwise 0; a gcd is needed near the limit only."""
+        """Return the bit length if it exceeds the limit, otherwise 0; a gcd is computed only near the limit."""
         return 0 if self._bits_with_factors <= limit else super().exceeding(limit)
 
     def __eq__(self, other: object) -> bool:
@@ -210,11 +210,11 @@ class FractionsPoint(IntegerPoint):
 
     @property
     def approximate_bits(self) -> int:
-        """The largest bit length of a numerator or a denominator, without the common denominator."""
+        """The largest bit length of a numerator or denominator, without computing the common denominator."""
         return max(max(p.bit_length(), q.bit_length()) for p, q in self._fractions)
 
     def exceeding(self, limit: int) -> int:
-        """Return the bit length if it exceeds the limit, otherwise 0; usually without the common denominator."""
+        """Return the bit length if it exceeds the limit, else 0; usually without computing the common denominator."""
         lengths = [(abs(p).bit_length(), q.bit_length()) for p, q in self._fractions]
         upper_bound = sum(q for _, q in lengths) + max((max(p - q + 1, 0) for p, q in lengths), default=0)
         return 0 if upper_bound <= limit else super().exceeding(limit)

@@ -1,8 +1,8 @@
 """Steps of a map over Q on integer points: numerators over one common denominator.
 
-A point is x = X / W with integers X and W > 0 without a common factor. The equation M(x) x~ = r(x), times a power of W
-and a common denominator of its coefficients, is an integer linear system whose entries are forms in (X, W). No rational
-number is formed in between: constructing one runs a gcd that takes longer than the rest of the step.
+A point is x = X / W with integers X and W > 0 without a common factor. Multiplied by a power of W and a common
+denominator of its coefficients, the equation M(x) x~ = r(x) is an integer linear system whose entries are forms in
+(X, W). No rational number is formed: constructing one runs a gcd that takes longer than the rest of the step.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
 
-# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
+# Below this number of bits, FLINT's own solver is faster, since it runs no Python code (benchmarks/bench_exact.py).
 _ELIMINATION_BITS = 1000
-_ELIMINATION_DIMENSION = 16  # and above this dimension as well
-_SMALL_DIMENSION = 3  # eliminating constant rows pays only above this dimension
-_CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is written by determinants
+_ELIMINATION_DIMENSION = 16  # above this dimension FLINT's solver is faster as well
+_SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes longer than it saves
+_CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
 _CRAMER_BITS = 500
-_TRIALS = 2  # failures of the elimination after which it is not tried again
+_TRIALS = 2  # after this number of failures, the elimination is no longer tried
 
 
 class IntegerSteps:
     """Steps on integer points of the map with the equation (M | -r).
 
-    `exponents` are the exponents of the monomials in (X, W), all of the same degree; `terms[i][j]` are the pairs
+    `exponents` lists the exponents of the monomials in (X, W), all of the same degree; `terms[i][j]` lists the pairs
     (index of a monomial, rational coefficient) of entry (i, j).
     """
 
@@ -52,12 +52,12 @@ class IntegerSteps:
                         sign * coefficient.p * (denominator // coefficient.q)
                     )
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
-        self._modular: nmod_mat | None = None  # the forms modulo the last prime
+        self._modular: nmod_mat | None = None  # the forms modulo the last prime used
         self._remaining_trials = _TRIALS
         self._substitution = forward_substitution(exponents, self._forms, n)
         self._constant: ConstantRows | None = None
         if not self._substitution and n > _SMALL_DIMENSION:
-            # Rows of M without x are eliminated once and for all, unless they are linearly dependent.
+            # Rows of M that do not contain x are eliminated in advance, unless they are linearly dependent.
             forms = self._forms.tolist()
             constant_monomials = [k for k, exponent in enumerate(exponents) if not any(exponent[:-1])]
             other_monomials = [k for k in range(len(exponents)) if k not in constant_monomials]
@@ -93,7 +93,7 @@ class IntegerSteps:
         return lowest(*self._constant.extend(whole_rhs, scale, solution.numerators, solution.denominator))
 
     def _solved(self, matrix: fmpz_mat, rhs: fmpz_mat, W: fmpz) -> IntegerPoint | None:
-        """Return the solution of matrix x = rhs in lowest terms; None where the matrix is singular."""
+        """Return the solution of matrix x = rhs in lowest terms; None if the matrix is singular."""
         is_long = matrix[0, 0].bit_length() >= _ELIMINATION_BITS
         if self._remaining_trials and is_long and matrix.nrows() <= _ELIMINATION_DIMENSION:
             point = solve_fraction_free(matrix, rhs, W)
@@ -101,7 +101,7 @@ class IntegerSteps:
                 return point
             self._remaining_trials -= 1
         try:
-            solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub promises less
+            solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub has a less precise type
         except ZeroDivisionError:
             return None
         column, denominator = solution.numer_denom()
@@ -119,11 +119,11 @@ class IntegerSteps:
         return fmpq(matrix.det(), self._scale * W ** (self._degree * self.dim))
 
     def is_image(self, point: IntegerPoint, image: IntegerPoint) -> bool:
-        """Return whether `image` is proved to be the image of the point (False may be wrong)."""
+        """Return whether `image` is proved to be the image of the point (the answer False may be wrong)."""
         return is_unique_solution(image, *self._equation(point))
 
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
-        """Return `length` points of the orbit modulo a prime below 2^63, each followed by 1, or None."""
+        """Return `length` points of the orbit modulo a prime below 2^63, each followed by 1; None if not defined."""
         points, last = list[list[int]](), point.residues(prime)
         while last is not None:
             points.append(last)
@@ -195,12 +195,12 @@ def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None
 
 
 class ConstantRows:
-    """The rows A x~ = r of an integer system in which A does not depend on x, eliminated by a Schur complement.
+    """The rows A x~ = r of an integer system in which A does not depend on x; a Schur complement eliminates them.
 
     On integer points such a row of M is a power of the denominator times constants, and would introduce this power into
-    the determinant. In mechanical systems q' = p, p' = F(q) half of the rows are like that. `rows` are their indices; A
-    has rational entries and independent rows. With A = (A_1 | A_2) up to the order of the columns and A_1 invertible,
-    x~_1 = A_1^{-1} r - A_1^{-1} A_2 x~_2 is substituted into the other rows.
+    the determinant. In mechanical systems q' = p, p' = F(q), half of the rows are of this kind. `rows` are the indices
+    of these rows; A has rational entries and independent rows. With A = (A_1 | A_2) up to the order of the columns and
+    A_1 invertible, x~_1 = A_1^{-1} r - A_1^{-1} A_2 x~_2 is substituted into all other rows.
     """
 
     def __init__(self, rows: Sequence[int], A: fmpq_mat) -> None:
@@ -217,9 +217,9 @@ class ConstantRows:
         self._free_part = _submatrix(integers, row_indices, range(len(row_indices), n))
 
     def reduce(self, matrix: fmpz_mat, rhs: fmpz_mat, scale: fmpz) -> tuple[fmpz_mat, fmpz_mat]:
-        """Return the Schur complement and its right-hand side: a system for `scale` times the other coordinates.
+        """Return the Schur complement and its right-hand side: a system for `scale` times the remaining coordinates.
 
-        `scale` is the factor in front of A in the matrix. The system may be empty.
+        In the matrix, A is multiplied by the factor `scale`. The system may be empty.
         """
         constant_part = self._inverse * _submatrix(rhs, self._rows, [0])
         of_eliminated, of_free = (

@@ -1,8 +1,8 @@
 """Lazy iteration of orbits x, Phi(x), Phi^2(x), ... over any exact field or over balls.
 
-An orbit is a `for` loop; afterwards `orbit.end` states how it ended. Reaching a singular point or the digit budget
-raises no exception: the points computed so far are delivered. Heights of non-integrable orbits grow by a factor with
-every step, so there is a default budget.
+An orbit is iterated in a `for` loop; afterwards `orbit.end` says how it ended. If the orbit reaches a singular point or
+the digit budget, no exception is raised: the points computed so far are yielded. Heights of nonintegrable orbits grow
+by a factor in every step, so there is a default budget.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from kahanmaps.maps.implicit import Map, det_of
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.rational_orbit import RationalOrbit
 
-# Normal forms are imported where they are used: most orbits do not need them, and start in half the time.
+# Normal forms are imported when they are used: most orbits do not need them, and start in half the time without them.
 if TYPE_CHECKING:
     from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
-LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits allows more
-FIRST_POINTS = 3  # kept by an orbit
+LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits is larger
+FIRST_POINTS = 3  # number of points at the beginning that an orbit stores
 _DIGITS_PER_BIT = 0.30103
 
 
@@ -40,10 +40,10 @@ _DIGITS_PER_BIT = 0.30103
 class OrbitEnd(ResultPart):
     """How an orbit ended.
 
-    `status` is "completed", "periodic" (completed, and the initial point was reached again), "singular", "budget",
-    "precision" (balls too wide), "overflow" (floating-point numbers) or "interrupted"; `steps` is the number of the
-    last step that was taken. Modulo p a birational map need not be injective: an orbit may enter a cycle that does not
-    contain its initial point, and is then "completed".
+    `status` is "completed", "periodic" (completed, and the orbit returned to its initial point), "singular", "budget",
+    "precision" (balls are too wide), "overflow" (floating-point numbers) or "interrupted". `steps` is the number of
+    steps taken. Modulo p a birational map need not be injective: an orbit may enter a cycle that does not contain its
+    initial point; it is then "completed".
     """
 
     status: str
@@ -58,18 +58,18 @@ class OrbitEnd(ResultPart):
 
     @property
     def text(self) -> str:
-        """The status with the message, unless the message repeats it."""
+        """The status with the message; the message alone if it contains the status."""
         return self.message if self.message.startswith(self.status) else f"{self.status}: {self.message}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields as plain data; the period only if there is one."""
+        """Return the fields as plain data; the period is omitted if there is none."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 class OrbitPoint:
     """The point after `step` steps, a sequence of its coordinates `x`.
 
-    Over Q they are reduced to lowest terms only when they are read.
+    Over Q the coordinates are reduced to lowest terms only when they are read.
     """
 
     def __init__(self, step: int, field: Field, value: IntegerPoint | PlanesPoint | tuple[Any, ...]) -> None:
@@ -90,7 +90,7 @@ class OrbitPoint:
 
     @property
     def text(self) -> list[str]:
-        """The coordinates as text that can be parsed back (over Q faster than `x`)."""
+        """The coordinates as text that can be parsed again; over Q this is faster than `x`."""
         if isinstance(self.value, tuple):
             return [self.field.format(entry) for entry in self.x]
         return [
@@ -100,7 +100,7 @@ class OrbitPoint:
 
     @property
     def digits(self) -> int:
-        """Approximate number of decimal digits of the largest integer over the common denominator (0 unless over Q)."""
+        """Approximate number of decimal digits of the largest integer over the common denominator; 0 except over Q."""
         return 0 if isinstance(self.value, tuple) else _digits(self.value.bits)
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ class OrbitPoint:
 
 
 class _IterateInterrupted(Exception):
-    """Raised by `Orbit.interrupt` in the thread that computes an iterate directly."""
+    """`Orbit.interrupt` was called while an iterate was computed directly; raised in the computing thread."""
 
 
 class Orbit(HtmlDisplay):
@@ -125,15 +125,15 @@ class Orbit(HtmlDisplay):
         kahan_map: a map (not only a Kahan map), over any exact field or over balls.
         start: the initial point, a sequence of exact numbers.
         steps: the number of steps; None for no limit.
-        at: the requested iterates, each computed directly by means of the normal form. Except over Q, poles at steps
+        at: the requested iterates, each computed directly from the normal form. Except over Q, poles at steps
             in between are not noticed.
-        backward: step by the inverse map.
+        backward: whether steps are taken by the inverse map.
         max_digits: the largest number of decimal digits of the integers over one common denominator (over Q).
-        normal_form: if given (family.system_normal_form), steps are taken in normal form: over Q plane by plane; over
-            balls each point directly from the initial point, so that balls do not widen from step to step.
-        is_requested: returns whether a step is requested; other steps may be skipped where this saves time.
+        normal_form: if given (family.system_normal_form), steps are taken in the normal form: over Q plane by plane;
+            over balls each point directly from the initial point, so that balls do not widen from step to step.
+        is_requested: returns whether a step is requested; other steps may be skipped to save time.
 
-    `first` is the list of the first points, `last` the last point delivered so far.
+    `first` is the list of the first points, `last` the last point yielded so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -183,7 +183,7 @@ class Orbit(HtmlDisplay):
         elif at is not None:
             raise InputError("at= requires a normal form, by which iterates are computed directly")
         self.end: OrbitEnd | None = None
-        self.first: list[OrbitPoint] = []  # at most FIRST_POINTS
+        self.first: list[OrbitPoint] = []  # at most FIRST_POINTS points
         self.last: OrbitPoint | None = None
         self._interrupted = False
         self._busy_thread: int | None = None  # the thread that computes an iterate directly
@@ -195,14 +195,14 @@ class Orbit(HtmlDisplay):
 
     @property
     def relations(self) -> str | None:
-        """The relations between points that are in use, and the step from which on; None if there are none."""
+        """The relations between points that are in use, and the first step that uses them; None if there are none."""
         walk = self._rational_orbit
         return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
         """Stop a running orbit after the current step (safe to call from a signal handler).
 
-        A direct computation of an iterate, which may take long, is abandoned.
+        If an iterate is being computed directly, which may take long, the computation is abandoned.
         """
         self._interrupted = True
         if self._busy_thread == get_ident():
@@ -229,7 +229,7 @@ class Orbit(HtmlDisplay):
         images = self._images()
         value = start = next(images)
         step, period = 0, None
-        yield OrbitPoint(0, field, value)  # delivered even if it exceeds the budget
+        yield OrbitPoint(0, field, value)  # yielded even if it exceeds the budget
         if bits := self._bits_over_budget(value):
             self.end = OrbitEnd("budget", 0, _budget_text(0, bits, self.max_digits))
             return
@@ -246,7 +246,7 @@ class Orbit(HtmlDisplay):
             except PrecisionLost as error:
                 self.end = OrbitEnd("precision", step, f"step {step + 1} cannot be decided: {error}")
                 return
-            if value is None:  # skipped, since it is not requested
+            if value is None:  # skipped, since the step is not requested
                 step += 1
                 continue
             if bits := self._bits_over_budget(value):
@@ -262,7 +262,7 @@ class Orbit(HtmlDisplay):
             self.end = OrbitEnd("completed", step, counted(step, "step"))
 
     def _images(self) -> Iterator[Any]:
-        """Yield the initial point and its images; end, or raise SingularStep, where the map is not defined."""
+        """Yield the initial point and its images; end, or raise SingularStep, if the map is not defined at a point."""
         field = self.map.field
         if self.normal_form is not None and field is QQ:
             from kahanmaps.maps.normal_form.planes_point import NormalSteps
@@ -274,7 +274,7 @@ class Orbit(HtmlDisplay):
             for step in count(1):
                 try:
                     value = self._nth_iterate.value(self.start, step)
-                except PrecisionLost:  # for very small eps a step from the last point may need fewer bits
+                except PrecisionLost:  # for very small eps, a step from the last point may need fewer bits
                     value = self.map.step(value)
                 yield value
         elif field is QQ:
@@ -301,7 +301,7 @@ class Orbit(HtmlDisplay):
         return bits if bits > limit else 0
 
     def _iterates(self, at: Sequence[int]) -> Iterator[OrbitPoint]:
-        """Yield each of these iterates, computed directly."""
+        """Yield the requested iterates, each computed directly."""
         from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
         assert self._nth_iterate is not None
@@ -330,9 +330,9 @@ class Orbit(HtmlDisplay):
 
 
 def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | None) -> None:
-    """Raise InputError if eps or the initial point has more digits than the budget and LONGEST_INPUT.
+    """Raise InputError if eps or the initial point has more digits than both the budget and LONGEST_INPUT.
 
-    The first step alone would take minutes, in calls that cannot be interrupted.
+    For such input the first step alone would take minutes, in calls that cannot be interrupted.
     """
     max_length = max(LONGEST_INPUT, max_digits or 0)
     for name, numbers in (("eps", () if eps is None else (eps,)), ("start", start)):
@@ -350,7 +350,7 @@ def _bits(max_digits: int | None) -> int | None:
 
 
 def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
-    """Describe how a step exceeds the budget, perhaps one before the requested step."""
+    """Return a sentence saying that a step, perhaps one before the requested step, exceeds the budget."""
     limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
     size_text = (
         "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"

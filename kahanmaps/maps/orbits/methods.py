@@ -1,8 +1,8 @@
 """The choice of the method for an orbit, with the reason.
 
 * generic: one linear system per step, and over Q relations between the points of the orbit; for every map.
-* normal-form: plane by plane, for members of the family with distinct roots of chi.
-* doubling: each requested iterate directly, by doublings on the planes; for the same members.
+* normal-form: steps plane by plane, for members of the family for which chi has distinct roots.
+* doubling: each requested iterate directly, by doublings in the planes; for the same members.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 
 METHODS = ("generic", "normal-form", "doubling")
-# From this step on doublings are faster than single steps. (Modulo p, single steps also report every pole on the way.)
+# From this step on, doublings are faster than single steps. (Modulo p, single steps also report every pole passed.)
 DOUBLING_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
@@ -27,7 +27,7 @@ class Method:
 
     @property
     def text(self) -> str:
-        """A line with the method and the reason for it."""
+        """The method and the reason for its choice, as one line."""
         return f"method {self.name}: {self.reason}"
 
 

@@ -44,11 +44,11 @@ from kahanmaps.version import __version__
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
-_MAX_SINGLE_STEPS = 10**13  # more would take years
-_MIN_STEPS = 3  # up to this number of steps a search for a normal form does not pay
-_LONG_INPUT = 4000  # bits of the initial point and eps above which a normal form pays only for more steps
-_MAX_SEARCH_DIMENSION = 16  # for the search for a normal form
-_FALLBACK_BITS = 4096  # precision of balls if none is sufficient
+_MAX_SINGLE_STEPS = 10**13  # more single steps would take years
+_MIN_STEPS = 3  # up to this number of steps, a search for a normal form takes longer than it saves
+_LONG_INPUT = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
+_MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
+_FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
 _BITS_PER_DIGIT = 3.3219281
 
 
@@ -80,30 +80,30 @@ def orbit(
 
     Args:
         system: the map; a quadratic system stands for its Kahan map. A map at a fixed eps, such as phi @ psi, is
-            iterated in its own field.
+            iterated over its own field.
         start, x0: the initial point: exact numbers, a dict by variable, or text "1/2,-1/3"; or floats for float orbits.
-        eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it. For float
-            orbits a float stands for the decimal that Python prints.
+        eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on eps. For float
+            orbits, a float stands for the decimal number that Python prints.
         time_step, h: the time step 2 eps, instead of eps.
-        steps, n: the number of steps; instead of it:
+        steps, n: the number of steps; instead of it, `at` may be given.
         at: the requested iterates.
         arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or QQ, GF(p), RR(bits), CC(bits), a number
             field.
         exact: True for "exact", False for "float", instead of `arithmetic`.
         method: "generic", "normal-form" or "doubling"; by default chosen automatically.
-        backward: step by the inverse map.
-        every: deliver only the points whose step is a multiple of this number.
+        backward: whether steps are taken by the inverse map.
+        every: only the points whose step is a multiple of this number are yielded.
         max_digits: the budget of decimal digits in exact arithmetic (default 200,000).
-        hamiltonian, member: the Hamiltonian of a quadratic system or its structure as a member of the family, if known,
-            so that the normal form need not be searched for.
-        normal_form: the normal form itself, or the reason why there is none; by default computed where it pays.
-        kernel: "numpy" or "numba", for floats.
+        hamiltonian, member: the Hamiltonian of a quadratic system, or its structure as a member of the family, if
+            known, so that the normal form need not be searched for.
+        normal_form: the normal form, or the reason why there is none; by default it is computed if this saves time.
+        kernel: "numpy" or "numba", for float orbits.
         accuracy: the number of correct decimal digits, for "ball:auto".
-        progress: called with a message for each precision that "ball:auto" tries.
+        progress: a function that is called with a message for each precision that "ball:auto" tries.
 
     Returns:
         The trajectory: points are computed as they are read, and are exact, enclosed or rounded according to the
-        arithmetic. Read `end` afterwards; `method` and `why` name the method and the reason for it.
+        arithmetic. Read `end` afterwards; `method` is the method, and `why` the reason for its choice.
 
     Raises:
         InputError: for invalid values, and for combinations of map, method and arithmetic that are not available.
@@ -138,7 +138,7 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    if is_float:  # floats are accepted, and converted exactly
+    if is_float:  # an initial point or eps in floats is accepted, and converted exactly
         start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
             if isinstance(x, float) and not math.isfinite(x):
@@ -167,7 +167,7 @@ def orbit(
     map_ = system
     if eps is None and map_.has_eps:
         raise InputError('found no eps, expected an exact number, eps="1/10" or h="1/5": the map depends on eps')
-    if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
+    if isinstance(field, Field) and field != arithmetic.field:  # the field is a number field or complex balls
         if at is not None or method not in (None, "generic"):
             raise InputError(f"orbits over {field} are computed step by step: give steps=, without at= and method=")
         phi = map_.at(1 if eps is None else eps, field)
@@ -215,7 +215,7 @@ class OrbitRequest(NamedTuple):
         return step in self.at if self.at is not None else step % self.every == 0
 
     def points_by(self, method: str, normal_form: SystemNormalForm | None, arithmetic: Arithmetic) -> Any:
-        """Return the iterator over the points by a method, in an arithmetic."""
+        """Return an iterator over the points, computed by a method in an arithmetic."""
         if arithmetic.kind == "float":
             from kahanmaps.maps.floats.float_orbit import FloatOrbit
 
@@ -235,10 +235,10 @@ class OrbitRequest(NamedTuple):
 
 
 class Trajectory(HtmlDisplay):
-    """The result of `orbit`: points in the given `arithmetic`, computed by `method`, for the reason `why`.
+    """The result of `orbit`: points in the given `arithmetic`, computed by `method`; `why` is the reason for `method`.
 
-    Iterating over it keeps no points in memory; for its length, indexing, tables and arrays all points are computed and
-    kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
+    Iteration stores no points; for length, indexing, tables and arrays all points are computed and stored. `integrals`
+    are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> result = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
@@ -261,7 +261,7 @@ class Trajectory(HtmlDisplay):
 
     @property
     def why(self) -> str:
-        """The reason for the method; for long orbits over Q also the relations between points that are used."""
+        """The reason for the choice of the method; for long orbits over Q also the relations between points in use."""
         relations = getattr(self.orbit, "relations", None)
         return self._why if relations is None else f"{self._why}; {relations}"
 
@@ -271,7 +271,7 @@ class Trajectory(HtmlDisplay):
 
     @property
     def end(self) -> OrbitEnd:
-        """How the orbit ended; the remaining points are computed and kept."""
+        """How the orbit ended; reading it computes and stores the remaining points."""
         if self.orbit.end is None:
             _ = self.points
         end: OrbitEnd = self.orbit.end
@@ -283,7 +283,7 @@ class Trajectory(HtmlDisplay):
         return [point for point in self._computed() if self._request.is_requested(point.step)]
 
     def preview(self, count: int) -> list[OrbitPoint]:
-        """Return the first points, if they are known or cost no more than `count` steps; otherwise none."""
+        """Return the first points if they are stored or need at most `count` steps, otherwise an empty list."""
         if "points" in self.__dict__ or (self._request.at is None and self._request.every == 1):
             return list(islice(self, count))
         return []
@@ -314,7 +314,7 @@ class Trajectory(HtmlDisplay):
 
     @property
     def t(self) -> Any:
-        """The times of the points as an array, exact for exact orbits; the steps where there is no time step."""
+        """The times of the points as an array, exact for exact orbits; the steps if the map has no time step."""
         import numpy as np
 
         steps = [-point.step if self._request.backward else point.step for point in self.points]
@@ -328,15 +328,15 @@ class Trajectory(HtmlDisplay):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The numbers of points and of coordinates."""
+        """The number of points and the number of coordinates."""
         return len(self), len(self.variables)
 
     def to_numpy(self, dtype: Any = None) -> Any:
-        """Return the coordinates as an array of shape (points, dim), as `numpy.asarray(orbit, dtype)` does."""
+        """Return the coordinates as an array of shape (points, dim), like `numpy.asarray(orbit, dtype)`."""
         return self.__array__(dtype)
 
     def to_xarray(self) -> Any:
-        """Return the coordinates, rounded to floats, as an xarray.Dataset along `step`; InputError without xarray."""
+        """Return the coordinates, rounded to floats, as an xarray.Dataset along `step`. InputError without xarray."""
         try:
             xarray: Any = import_module("xarray")
         except ImportError as error:
@@ -351,9 +351,9 @@ class Trajectory(HtmlDisplay):
         return import_module("kahanmaps.plots.plot").plot.orbit(self, *arguments, **options)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for each point: its step, the coordinates and the values of the integrals (None at poles).
+        """Return one row for each point: its step, its coordinates and the values of the integrals (None at poles).
 
-        Floats and residues are numbers, all other values exact text.
+        Floats and residues are numbers, all other values are exact text.
         """
         kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
         names = (*self.variables, *self.integrals)
@@ -367,9 +367,9 @@ class Trajectory(HtmlDisplay):
         """Return the values of the integrals at a point, as text; None for an integral that is not defined there."""
         values: list[str | None] = []
         for function in self.integrals.values():
-            try:  # at eps also if the orbit is backward: the integrals are those of the map, not of its inverse
+            try:  # at eps also for a backward orbit: the integrals belong to the map, not to its inverse
                 value = function.value(point.field, self._request.eps, point.x)
-            except (KahanmapsError, ArithmeticError):  # not defined at the point, or out of the range of floats
+            except (KahanmapsError, ArithmeticError):  # undefined at the point, or too large for floats
                 value = None
             is_defined = value is not None and not (isinstance(value, float) and not math.isfinite(value))
             values.append(point.field.format(value) if is_defined else None)
@@ -380,7 +380,7 @@ class Trajectory(HtmlDisplay):
         return data_frame(self.rows())
 
     def save(self, path: str | Path) -> OrbitEnd:
-        """Write the orbit to a file in the format of its suffix, as `write` does."""
+        """Write the orbit to a file in the format given by its suffix, like `write`."""
         return self.write(path)
 
     def to_csv(self, path: str | Path) -> None:
@@ -400,9 +400,9 @@ class Trajectory(HtmlDisplay):
         Args:
             to: a path, a stream of text, or a writer. For csv, a file with the metadata is written next to the path.
             form: "text", "json", "jsonl", "csv", "npz", "parquet", or (float orbits without integrals) "npy"; by
-                default the format of the suffix of the path, and text for a stream.
+                default the format given by the suffix of the path, and text for a stream.
             name: the name of the system.
-            on_step: called with the number of every step that was computed.
+            on_step: a function that is called with the number of every step computed.
 
         Returns:
             How the orbit ended, as written to the file; "budget" if an npz file cannot hold more points.
@@ -438,7 +438,7 @@ class Trajectory(HtmlDisplay):
         return end
 
     def _written_to(self, writer: Writer) -> Iterator[int]:
-        """Write the points (of a float orbit in portions); yield the number of each step that was computed."""
+        """Write the points (of a float orbit in portions); yield the number of each step computed."""
         if self.arithmetic.kind == "float" and self._request.at is None and not self.integrals:
             count, every = 0, self._request.every
             for step, points in self.orbit.portions():
@@ -470,7 +470,7 @@ class Trajectory(HtmlDisplay):
         return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
 
     def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
-        """Return how the orbit ended, and the drift and near-singular steps of a float orbit."""
+        """Return how the orbit ended, and for a float orbit the drift and the near-singular steps."""
         if self.arithmetic.kind != "float":
             return end, {}
         message, float_data = end.message, {"near_singular": self.orbit.near_singular}
@@ -487,12 +487,12 @@ class Trajectory(HtmlDisplay):
         """Return the coordinates as an array of shape (points, dim), for `numpy.asarray`.
 
         Args:
-            dtype: by default float64, to which exact numbers are rounded; for residues int64, or object if they do not
-                fit. `object` keeps the coordinates unchanged: fmpq, elements of a number field, balls, float, and
-                residues as int. An integer dtype holds them exactly.
+            dtype: by default float64, to which exact numbers are rounded; for residues int64, or object if int64 is too
+                small. `object` leaves the coordinates unchanged: fmpq, elements of a number field, balls, float, and
+                residues as int. An integer dtype contains them exactly.
 
         Raises:
-            InputError: if the dtype cannot hold the coordinates: for an integer dtype, numbers that are not integers or
+            InputError: if the dtype cannot represent the coordinates: for integers, numbers that are not integers or
                 too large; for floats, balls, algebraic numbers, and residues that would be rounded.
         """
         import numpy as np
@@ -535,11 +535,11 @@ class Trajectory(HtmlDisplay):
         return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
-        # a generator, since `list` calls __len__, which computes the points, before it reads the first one
+        # This is a generator, since `list` calls __len__, which computes the points, before it reads the first point.
         yield from (point for point in self._all_points() if self._request.is_requested(point.step))
 
     def _all_points(self) -> Iterator[OrbitPoint]:
-        """Yield the stored points or, without any, all points as they are computed, including those not requested."""
+        """Yield the stored points; if none are stored, all points as they are computed, even if not requested."""
         yield from self.points if "points" in self.__dict__ else self._computed()
 
     def _computed(self) -> Iterator[OrbitPoint]:
@@ -579,11 +579,11 @@ class NotAccurate(Exception):
 
 
 def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Callable[[str], None] | None = None) -> int:
-    """Return a precision in bits at which every point has `digits` correct digits of its largest coordinate.
+    """Return a precision in bits for which every point has `digits` correct digits of its largest coordinate.
 
     The precision is doubled until it suffices. `orbit_with` returns the orbit over RR(bits); an orbit that ends for
     another reason than precision is accepted. `on_progress` is called for every trial. Raises NotAccurate if the
-    largest precision is not sufficient.
+    largest precision does not suffice.
 
     >>> from kahanmaps.algebra.fields import RR
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -599,7 +599,7 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Calla
         orbit = orbit_with(bits)
         if on_progress is not None:
             on_progress(f"balls of {bits} bits")
-        # Relative to the largest coordinate, since others may be 0; the first inaccurate point ends the trial.
+        # Accuracy is relative to the largest coordinate, since others may be 0; one inaccurate point ends the trial.
         is_accurate = all(
             entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(other.mid()) for other in point.x)
             for point in orbit
@@ -612,7 +612,7 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Calla
 
 
 def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
-    """Return the orbit of a map at a fixed eps over its own field; `numbers` may be that field or "exact"."""
+    """Return the orbit of a map at a fixed eps over its own field; `numbers` is that field or "exact"."""
     phi, exact = request.map, Arithmetic("exact")
     if request.eps is not None or request.at is not None or numbers not in ("exact", exact, phi.field):
         raise InputError(f"{phi!r} has a fixed eps and field: give only an initial point and steps=")
@@ -636,7 +636,7 @@ def _normal_form(
         return NoNormalForm("not computed")
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
-    if method is None:  # no search for a normal form where it would take longer than the orbit
+    if method is None:  # do not search for a normal form if the search takes longer than the orbit
         max_steps = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _MIN_STEPS
         numbers = [eps, *(rational(entry) for entry in request.start)]
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:

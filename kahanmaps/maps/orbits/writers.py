@@ -1,8 +1,8 @@
 """Writers of orbit files, one class for each format: text, json, jsonl, csv, npz and parquet.
 
 Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
-and parquet files are written at the end, but float orbits pass through them in portions: the rows of an npz file are
-kept in a temporary file, and each portion is a row group of a parquet file.
+and parquet files are written at the end. Float orbits are passed to them in portions: the rows of an npz file go to a
+temporary file, and in a parquet file each portion is a row group.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.processes import processors
 from kahanmaps.version import __version__
 
-# An npz file of exact numbers pads each of them to the longest one; larger orbits need jsonl.
+# An npz file pads exact numbers to the length of the longest; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
-_CHUNK = 1 << 18  # numbers that are copied at once
-_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # of a csv file, for which loading pyarrow pays, and at once
+_CHUNK = 1 << 18  # numbers copied in one operation
+_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file: from here on pyarrow is loaded; rows in one call
 _FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
 _TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
 
 
 class OutputFull(Exception):
-    """The format cannot hold the next point. Attribute: `steps`, the last step that was written."""
+    """The format cannot store the next point. Attribute: `steps`, the last step that was written."""
 
     def __init__(self, message: str, steps: int) -> None:
         self.steps = steps
@@ -47,7 +47,7 @@ class OutputFull(Exception):
 
 
 class Writer(ABC):
-    """Base class: writes a header, points and an end. The columns are the variables, then the integrals."""
+    """Base class of writers of a header, points and an end. The columns are the variables, then the integrals."""
 
     def __init__(self, stream: IO[Any], variables: Sequence[str], integrals: Sequence[str]) -> None:
         self.stream = stream
@@ -70,11 +70,11 @@ class Writer(ABC):
 
     @abstractmethod
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
-        """Write how the orbit ended, and further data of a float orbit."""
+        """Write how the orbit ended, and for a float orbit the data `extra`."""
 
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
-        # Flushed regularly, so that a killed process loses little, and always before steps that may take long.
+        # Flushed regularly, so that a killed process loses little, and always before steps that may take long:
         self._unflushed += len(text)
         if self._unflushed > _FLUSH_AFTER:
             self.stream.flush()
@@ -97,7 +97,7 @@ class Text(Writer):
 
 
 class JsonLines(Writer):
-    """One JSON object per line, whose "record" is "header", "point" or "end"."""
+    """One JSON object per line; its "record" is "header", "point" or "end"."""
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(json.dumps({"record": "header", **header}))
@@ -131,9 +131,9 @@ class Json(JsonLines):
 
 
 class Csv(Writer):
-    """Comma-separated values with a row of column names; header and end go to a separate JSON file.
+    """Comma-separated values with a row of column names; header and end are written to a separate JSON file.
 
-    `metadata_path` is the path of that file, None if the table goes to standard output.
+    `metadata_path` is the path of the JSON file; None if the table is written to standard output.
     """
 
     metadata_path: str | None = None
@@ -152,7 +152,7 @@ class Csv(Writer):
             for k in range(0, len(x), _ARROW_ROWS):
                 self.stream.write(_arrow_lines(steps[k : k + _ARROW_ROWS], x[k : k + _ARROW_ROWS]))
             return
-        # json writes the same digits as repr, several times as fast.
+        # json writes the same digits as repr, and is several times as fast.
         table = json.dumps(list(zip(steps, *x.T.tolist(), strict=True)), separators=(",", ":"))
         if len(x):
             self._line(table[2:-2].replace("],[", "\n"))
@@ -168,7 +168,7 @@ class Csv(Writer):
 
 
 def _arrow_lines(steps: Sequence[int], x: Any) -> str:
-    """Return the lines of a table with the same characters as `repr`, formatted by pyarrow, two columns at a time."""
+    """Return the lines of a table, with the same characters as `repr`; pyarrow formats two columns at a time."""
     import numpy as np
     import pyarrow as arrow
     from pyarrow import compute
@@ -176,7 +176,7 @@ def _arrow_lines(steps: Sequence[int], x: Any) -> str:
     def texts(column: Any) -> Any:
         result = arrow.array(column).cast(arrow.string())
         size = np.abs(column)
-        # Where pyarrow writes 2, 0.00001, 1e-9 and 1e+10 for 2.0, 1e-05, 1e-09 and 10000000000.0.
+        # Numbers for which pyarrow writes 2, 0.00001, 1e-9, 1e+10 instead of 2.0, 1e-05, 1e-09, 10000000000.0.
         odd = (column == np.rint(column)) | ((size > 9e-11) & (size < 1e-4)) | ((size >= 1e10) & (size < 1e16))
         if odd.any():
             result = compute.replace_with_mask(result, odd, arrow.array(list(map(repr, column[odd].tolist()))))
@@ -191,10 +191,10 @@ def _arrow_lines(steps: Sequence[int], x: Any) -> str:
 
 
 class Npz(Writer):
-    """Arrays `step`, `x` and `integrals` (if any), and header and end as JSON text; written at the end.
+    """Arrays `step`, `x` and `integrals` (if any), and header and end as JSON text; written at the end of the orbit.
 
-    Floats and residues below 2^63 are stored as float64 and int64; exact numbers and balls are stored as text. The rows
-    of a float orbit without integrals are kept in a temporary file, and are not compressed.
+    Floats and residues below 2^63 are stored as float64 and int64, exact numbers and balls as text. The rows of a float
+    orbit without integrals are first stored in a temporary file, and are not compressed.
     """
 
     def header(self, header: dict[str, Any]) -> None:
@@ -226,7 +226,7 @@ class Npz(Writer):
 
     def portion(self, first: int, every: int, x: Any) -> None:
         if self._rows is None:
-            name = getattr(self.stream, "name", "")  # beside the file, where there is room for it
+            name = getattr(self.stream, "name", "")  # the temporary file is next to this file, on the same disk
             folder = os.path.dirname(name) if isinstance(name, str) and name.startswith(os.sep) else None
             self._rows = TemporaryFile(dir=folder)  # noqa: SIM115 (closed by `end`)
         self._rows.write(x.astype("<f8").tobytes())
@@ -263,7 +263,7 @@ class Npz(Writer):
         n = len(self._x)
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
-            if any(None in row for row in self._values):  # poles are empty text, since there is no NaN for these types
+            if any(None in row for row in self._values):  # poles become empty text, since these types have no NaN
                 filled = [["" if x is None else x for x in row] for row in self._values]
                 self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled]
             arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
@@ -274,9 +274,9 @@ class Npz(Writer):
 
 
 class Parquet(Npz):
-    """A table with the columns of csv, and header and end as JSON text in the metadata; written at the end.
+    """A table with the columns of csv, and header and end as JSON text in its metadata; written at the end.
 
-    Floats and residues below 2^63 are numbers, exact numbers and balls text. Needs pyarrow.
+    Floats and residues below 2^63 are stored as numbers, exact numbers and balls as text. Needs pyarrow.
     """
 
     def header(self, header: dict[str, Any]) -> None:
@@ -294,7 +294,7 @@ class Parquet(Npz):
         steps = arrow.array(range(first, first + len(x) * every, every), arrow.int64())
         table = arrow.table([steps, *map(arrow.array, x.T.copy())], names=["step", *self.variables])
         if self._file is None:
-            # pyarrow would not show metadata that are added at the end beside a schema of its own.
+            # pyarrow does not show metadata that are added at the end if the schema has metadata of its own.
             self._file = parquet.ParquetWriter(self.stream, table.schema, store_schema=False)
         self._file.write_table(table)
 
@@ -330,7 +330,7 @@ BINARY = ("npz", "parquet")
 def writer_to(
     to: str | Path | IO[str], form: str, variables: Sequence[str], integrals: Sequence[str]
 ) -> Iterator[Writer]:
-    """Open a writer in one of the formats `WRITERS` to a path or a stream of text.
+    """Open a writer, in one of the formats in `WRITERS`, for a path or a stream of text.
 
     Raises InputError if the format is binary and the stream has no buffer of bytes.
     """
@@ -340,7 +340,7 @@ def writer_to(
             raise InputError(f"{form} is a binary format: give a path, or a stream with a buffer of bytes")
         yield WRITERS[form](stream, variables, integrals)
         return
-    if form == "csv" and os.path.isdir(meta_of(to)):  # raised before an existing table is overwritten
+    if form == "csv" and os.path.isdir(meta_of(to)):  # tested before an existing table is overwritten
         raise InputError(
             f"found a folder {meta_of(to)}, expected no folder of this name: the metadata is written there"
         )
@@ -357,7 +357,7 @@ def meta_of(path: str | Path) -> str:
 
 
 def form_of(path: str | Path) -> str:
-    """Return the format for the suffix of a file name. Raises InputError for unknown suffixes."""
+    """Return the format given by the suffix of a file name. Raises InputError for unknown suffixes."""
     suffix = Path(path).suffix.lower()
     if suffix in _TEXT_SUFFIXES:
         return "text"

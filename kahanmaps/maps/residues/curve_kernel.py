@@ -1,9 +1,9 @@
 """Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in integers of 64 bits.
 
-An element a + b w of GF(p^2), with w^2 = nu no square modulo p, is a pair of doubles that hold integers in [0, p); a
-polynomial is an array (2, length). Sums of products stay below 2^53 by the choice of p and of the largest length, so
-that they are exact, and are reduced by a product with 1/p: floor((x + 1/2)/p) is right where x/p < 2^36, since
-(x + 1/2)/p is at least 1/(2 p) away from an integer.
+An element a + b w of GF(p^2), with w^2 = nu not a square modulo p, is a pair of doubles that are integers in [0, p); a
+polynomial is an array (2, length). By the choice of p and of the largest length, sums of products stay below 2^53, so
+that they are exact. They are reduced by a product with 1/p: floor((x + 1/2)/p) is right if x/p < 2^36, since
+(x + 1/2)/p differs from every integer by at least 1/(2 p).
 
 The functions are ordinary Python until `kernel` replaces them by functions compiled by numba.
 """
@@ -33,7 +33,7 @@ def _compiled() -> Any:
 
 
 def kernel() -> Any:
-    """The compiled `walk`. Raises ImportError without numba."""
+    """Return the compiled `walk`. Raises ImportError without numba."""
     with _LOCK:
         return _compiled()
 
@@ -48,7 +48,7 @@ def _reduce(x: Any, length: int, p: float) -> None:
 
 
 def _add_product(total: Any, a: Any, length_a: int, b: Any, length_b: int, sign: float, nu: float) -> None:
-    """total += sign a b, not reduced."""
+    """Add sign a b to `total`, without reduction modulo p."""
     x, y, b0, b1 = total[0], total[1], b[0], b[1]
     for i in range(length_a):
         c0, c1 = sign * a[0, i], sign * a[1, i]
@@ -72,21 +72,21 @@ def _copy(a: Any, b: Any, length: int) -> None:
 
 
 def _stripped(a: Any, length: int) -> int:
-    """The length without zeros at the end."""
+    """Return the length of a polynomial without zeros at the end."""
     while length > 0 and a[0, length - 1] == 0 and a[1, length - 1] == 0:
         length -= 1
     return length
 
 
 def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: float, nu: float) -> Any:
-    """Subtract the multiple of b that removes the leading term of a; return its factor. `inverse` is 1/b[-1]."""
+    """Subtract the multiple of b that removes the leading term of a; return this factor. `inverse` is 1/b[-1]."""
     u, v = a[0, length_a - 1], a[1, length_a - 1]
     c0 = (u * inverse[0] + nu * v * inverse[1]) % p
     c1 = (u * inverse[1] + v * inverse[0]) % p
     shift, d, r = length_a - length_b, nu * c1, 1.0 / p
     b0, b1, x, y = b[0], b[1], a[0], a[1]
-    # s mod p without a division: s is an integer, so that (s + 1/2)/p is at least 1/(2p) away from all integers, more
-    # than the rounding error. Without the 1/2 a multiple of p could be rounded below its quotient.
+    # s mod p without a division: s is an integer, so (s + 1/2)/p differs from every integer by at least 1/(2p), more
+    # than the rounding error. Without the 1/2, the quotient of a multiple of p could be rounded to a smaller integer.
     for j in range(length_b - 1):
         s = x[shift + j] - c0 * b0[j] - d * b1[j]
         t = y[shift + j] - c0 * b1[j] - c1 * b0[j]
@@ -97,7 +97,7 @@ def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: flo
 
 
 def _inverse_of_last(b: Any, length: int, p: float, nu: float, inverses: Any) -> Any:
-    """1/c for the last coefficient c."""
+    """Return 1/c for the last coefficient c."""
     u, v = b[0, length - 1], b[1, length - 1]
     norm = inverses[int((u * u - nu * v * v) % p)]
     return (u * norm) % p, ((p - v) * norm) % p
@@ -157,7 +157,7 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
 
 
 def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
-    """Compute the minors of the first rows for all sets of columns; return the length of those of all rows."""
+    """Compute the minors of the first rows for all sets of columns; return the length of the minors of all rows."""
     n = M.shape[0]
     for j in range(n + 1):
         _copy(M[0, j], minors[1 << j], length)
@@ -195,7 +195,7 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
     _reduce(b, length, p)
     divisor, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
     _copy(divisor, common, size)
-    if size != 1:  # two mixtures may have a factor that not all have
+    if size != 1:  # two mixtures may have a common factor that not all polynomials have
         for j in range(count):
             _copy(X[j], c, length)
             quotient = _stripped(c, length)
@@ -219,8 +219,8 @@ def walk(
 ) -> None:  # fmt: skip
     """Write to degrees[m, s] the degree of the image of the line start[m] under s + 1 steps of map m.
 
-    start[m, j] are the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials exceed `max_length`; degrees are -1
+    start[m, j] contains the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
+    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials exceed `max_length`. A degree is -1
     if the iterate is defined nowhere.
     """
     n = start.shape[1] - 1

@@ -1,8 +1,8 @@
 """Degrees of the iterates of many members of a family of maps: all modulo one small prime p, on lines over GF(p^2).
 
-The parameters of the members are residues modulo p, so that all of them can be tried. A line over GF(p) would meet
-indeterminacy points all the time; over GF(p^2) it does so with a probability of about 1/p^2 for each of them. A line
-can only give degrees that are too small: take the largest over several lines.
+The parameters of the members are residues modulo p, so that all of them can be tried. A line over GF(p) would often
+meet indeterminacy points; a line over GF(p^2) meets each of them with a probability of about 1/p^2. A line can give
+degrees that are too small, but not too large: take the maximum over several lines.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from kahanmaps.maps.kernels import choose_kernel
 
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
 MAX_DIMENSION = 6
-NOWHERE, TOO_LARGE = -1, -2  # in the place of degrees
+NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
 _CHUNK = 128
-LONG = 200  # members from which on compiling pays
+LONG = 200  # number of members from which on compiling saves time
 
 Members = NDArray[np.int64]
 
@@ -47,7 +47,7 @@ class Family:
         self.prime, self.dim, self.symbols = prime, map_.dim, map_.symbols
         field, n = GF(prime), map_.dim
         self.terms: list[tuple[int, int, int, int]] = []
-        self._values: list[list[tuple[tuple[int, ...], int]]] = []  # polynomials in the symbols, then eps
+        self._values: list[list[tuple[tuple[int, ...], int]]] = []  # polynomials in the symbols and eps
         positions: dict[tuple[int, ...], int] = {}
         for i, row in enumerate(map_.rows):
             for j, entry in enumerate(row):
@@ -77,12 +77,12 @@ class Family:
         kernel: str | None = None,
         jobs: int = 1,
     ) -> NDArray[np.int64]:
-        """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
+        """Return the degrees d_1, ..., d_terms of each member as a row, for one random line each.
 
-        `members` are residues of the symbols, one member a row; an additional column contains eps. Without it `eps` is
-        an exact number, or None for a random element of GF(p^2) for each member. `max_length` is the largest number of
-        coefficients that a polynomial may have before common factors are removed; beyond it degrees are -2 (TOO_LARGE),
-        and -1 (NOWHERE) if the iterate is defined nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
+        `members` are residues of the symbols, one row for each member; an additional column contains eps. Without it,
+        `eps` is an exact number, or None for a random element of GF(p^2) for each member. `max_length` is the largest
+        number of coefficients of a polynomial before common factors are removed; beyond it degrees are -2 (TOO_LARGE).
+        They are -1 (NOWHERE) if the iterate is defined nowhere. `kernel`: "numpy" or "numba"; `jobs`: threads.
         """
         generator = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
@@ -105,14 +105,14 @@ class Family:
             walk(start[chunk], exponents, layout, values[chunk], weights, self._inverses, float(p), float(self._nu),
                  max_length, degrees[chunk])  # fmt: skip
 
-        measure_chunk(count)  # no members: compiles in this thread, which Ctrl-C can end; the pool waits for its own
+        measure_chunk(count)  # without members: compile in this thread, which Ctrl-C can end, not in the pool
         with ThreadPoolExecutor(jobs) as pool:
             for _ in pool.map(measure_chunk, range(0, count, _CHUNK)):
                 pass
         return degrees
 
     def units(self, degrees: Sequence[int]) -> float:
-        """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py).
+        """Return the work, in units (algebra/work.py), for one member whose iterates have these degrees, from the 0th.
 
         The units were fitted to the compiled kernel in dimensions 2 to 5; the slower kernel counts the same units.
         """
@@ -120,13 +120,13 @@ class Family:
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
     def coefficients(self, members: Members, eps: fmpq | None, generator: np.random.Generator) -> NDArray[np.float64]:
-        """The coefficients of the equation, an array (members, 2, places)."""
+        """Return the coefficients of the equation, an array (members, 2, places)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):
             eps_values = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
         elif eps is None:
             eps_values = generator.integers(0, p, (2, count))
-            eps_values[0, ~eps_values.any(axis=0)] = 1  # eps = 0 would be the identity
+            eps_values[0, ~eps_values.any(axis=0)] = 1  # replace eps = 0, for which the map would be the identity
         else:
             eps_values = np.zeros((2, count), dtype=np.int64)
             eps_values[0] = int(GF(p).convert(eps))
@@ -151,7 +151,7 @@ def _walk_in_flint(
     start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
     max_length: int, degrees: Any,
 ) -> None:  # fmt: skip
-    """Measure degrees as `walk` of curve_kernel.py does, without numba."""
+    """Measure degrees like `walk` of curve_kernel.py, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
     field: Any = fq_default_ctx(modulus=modulus, var="w")
     context: Any = fq_default_poly_ctx(field)

@@ -1,1 +1,1 @@
-"""Relations between the points of an orbit over Q, and steps by means of them."""
+"""Relations between the points of an orbit over Q, and steps computed from these relations."""

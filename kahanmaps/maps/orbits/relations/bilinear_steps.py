@@ -1,17 +1,17 @@
 """Steps by bilinear relations along an orbit (of Hirota type): few products, and no gcds of long integers.
 
 Cramer's rule gives the integers of the next point as determinants, several times as long as in lowest terms. If the
-orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation there, then the homogeneous
-coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), products of a coordinate at
-step n + 1 and one at step n - lag are sections of the same bundle as products of one at step n and one at step
-n + 1 - lag. If the latter products span these sections, then
+orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation on it, then the homogeneous
+coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), all products
+X_i(n + 1) X_j(n - lag) and X_k(n) X_l(n + 1 - lag) are sections of one bundle. If the
+products X_k(n) X_l(n + 1 - lag) span its sections, then
 
     f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
 
 with bilinear forms B_ij that have integer coefficients and do not depend on n. The factors f_n are short integers. A
 step consists of products and of exact divisions by the last coordinate at step n - lag.
-
-The forms are computed modulo primes and need no proof: each point that they give is verified in the equation of the
+The forms are computed modulo primes and need no proof: each point that they give is verified exactly in the equation of
+the step.
 step, exactly.
 """
 
@@ -30,31 +30,31 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
 Pairs = Sequence[tuple[int, int]]  # indices i, j of products X_i Y_j of coordinates
 
-_MAX_PRIMES = 50  # for the coefficients
-_MAX_DIMENSION = 12  # here the search for forms with 169 products takes some seconds
-_EXTRA_POINTS = 8  # beyond the number of unknowns: each lets wrong forms pass with a probability of 2^-60
+_MAX_PRIMES = 50  # number of primes from which the coefficients are computed
+_MAX_DIMENSION = 12  # in this dimension the search for forms, with 169 products, takes some seconds
+_EXTRA_POINTS = 8  # points beyond the number of unknowns; wrong forms pass at each with probability 2^-60
 
 
 class BilinearForms:
-    """The forms B_ij for the last j: a row of coefficients for each i, a column for each product."""
+    """The forms B_ij for the last j: one row of coefficients for each i, one column for each product."""
 
     name = "bilinear forms along the orbit"
 
     def __init__(self, steps: IntegerSteps, lag: int, products: Pairs, coefficients: fmpz_mat) -> None:
         self.lag, self.products, self.coefficients = lag, products, coefficients
         self._steps = steps
-        # Only the last B_ij are known, so f_n may have a denominator; those seen so far divide this number.
+        # Only B_ij for the last j are known, so f_n may have a denominator; this number is a multiple of those so far.
         self._multiple = fmpz(1)
 
     def skip(self, number: int) -> bool:
-        """Return False: every point is needed for the next ones."""
+        """Return False: every point is needed for the points after it."""
         return False
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return None: a point is computed only from the points before it."""
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point after the last ones; None if the forms do not give it."""
+        """Return the point after the points in `last`; None if the forms do not give it."""
         current, earlier, divided_by = (
             [*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag)
         )
@@ -72,7 +72,7 @@ class BilinearForms:
 
 
 def bilinear_forms(map_over: Map, point: IntegerPoint) -> BilinearForms | None:
-    """Search for bilinear forms along the orbit of a point, first with lag 1, then 2; return None if there are none."""
+    """Search for bilinear forms along the orbit of a point, with lag 1, then 2; return None if none are found."""
     if len(map_over.factors) > 1 or map_over.dim > _MAX_DIMENSION:
         return None
     steps = map_over.factors[0].integer_steps
@@ -94,7 +94,7 @@ class _Search:
         self._used: list[int] | None = None  # the unknowns that are not 0 modulo the first prime
 
     def modulo(self, prime: int) -> list[list[int]] | None:
-        """Return the coefficients of the forms modulo a prime; None if there are none, or they are not unique."""
+        """Return the coefficients of the forms modulo a prime; None if no forms exist or they are not unique."""
         lag, unknowns = self._lag, len(self.products)
         length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _EXTRA_POINTS
         points = self._steps.residues(self._point, prime, length + 1 + lag)
@@ -123,7 +123,7 @@ class _Search:
         weights = dict(zip(columns, relations[0], strict=True))
         self._used = [k for k, weight in weights.items() if weight]
         factors = [sum(weights.get(2 * unknowns + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
-        # The combinations of the columns that are f_n times the coordinates of the next point.
+        # The combinations of the columns that are f_n times the coordinates of the next point:
         sides = [[f * x % prime for x in coordinates] for f, coordinates in zip(factors, images, strict=True)]
         try:
             solution = matrix(values[:unknowns], prime).solve(matrix(sides[:unknowns], prime))

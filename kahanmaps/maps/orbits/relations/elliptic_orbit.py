@@ -1,11 +1,11 @@
 """Orbits on elliptic curves: their coordinates are forms in the terms of two Somos sequences, with a proof.
 
 If a map translates the points of an elliptic curve by T, the coordinates at step n are sections of a line bundle of
-degree d at P + n T. They are forms with rational coefficients, the same for all n, in terms near n of the sequences W
-and U (see `elliptic_search`). Such terms have 1/d of the length of a coordinate, so a step consists of short products,
-without gcds of long integers. The points of a composition of several maps may lie on several curves in turn: after
-`stride` steps of factors the orbit returns to the same curve, and T is the translation by these steps. If the equation
-is triangular, each new coordinate has a sequence U of its own, of lower degree than for all coordinates together.
+degree d at P + n T. They are forms in terms, with indices near n, of the sequences W and U (see `elliptic_search`); the
+forms have rational coefficients that do not depend on n. Such terms have 1/d of the length of a coordinate, so a step
+takes short products, and no gcds of long integers. The points of a composition of several maps may lie alternately on
+several curves: after `stride` steps of factors the orbit returns to the same curve, and T is the translation by these
+steps. If the equation is triangular, each new coordinate has its own sequence U, of lower degree than a common one.
 
 The forms are proved. Substituted into the equation of a step they give a section of known degree D. They agree with
 the points of the orbit, exactly, at more than D steps; a nonzero section of degree D has at most D zeros, hence they
@@ -32,12 +32,12 @@ from kahanmaps.maps.orbits.relations.sections import common_primes
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
 _MAX_PRIMES = 100
-_BITS_PER_PRIME = 100  # of the points for one prime: the coefficients must be shorter than the points
+_BITS_PER_PRIME = 100  # bits of the points for each prime: the coefficients must be shorter than the points
 _MAX_FACTORS = 8
-_SKIPPED_STEPS = 3  # if the initial point is special: terms of U near the beginning may be 0, like W(0)
+_SKIPPED_STEPS = 3  # for a special initial point: terms of U near the beginning may be 0, like W(0)
 _FIRST = 2  # the least n for which the forms are used
 
-Groups = Sequence[tuple[int, ...]]  # of coordinates with a common denominator
+Groups = Sequence[tuple[int, ...]]  # groups of coordinates with a common denominator
 
 
 class TooLongRelation(Exception):
@@ -49,12 +49,12 @@ def elliptic_steps(
 ) -> EllipticSteps | None:
     """Search for elliptic curves that contain the orbit of `start`, and return its steps; None if none is found.
 
-    `bits` is the length of the points; only coefficients that are much shorter are of use. Raises TooLongRelation if
-    the coefficients of a curve are longer than that, but may be of use once the points have grown; it is not raised if
+    `bits` is the length of the points; only much shorter coefficients are useful. Raises TooLongRelation if the
+    coefficients of a curve are longer than that, but may be useful once the points have grown; it is not raised if
     `most_primes` primes do not suffice to decide this.
     """
     factors = map_over.factors
-    period = next(  # the shortest initial sequence of factors of which all factors are a repetition
+    period = next(  # the shortest initial sequence of factors whose repetition gives all factors
         factors[:k]
         for k in range(1, len(factors) + 1)
         if len(factors) % k == 0 and all(factor is factors[i % k] for i, factor in enumerate(factors))
@@ -77,7 +77,7 @@ def elliptic_steps(
                 continue
             if exact_curves is not None and _is_proved(start_point, search, exact_curves.steps(map_over)):
                 return exact_curves.steps(map_over, skipped)
-            if search.sections:  # there are curves, but their coefficients are too long
+            if search.sections:  # curves exist, but their coefficients are too long
                 if max_primes < most_primes:
                     raise TooLongRelation
                 return None
@@ -98,8 +98,8 @@ class Numbers(NamedTuple):
 class _Search:
     """The search modulo primes for the sections of each curve, for each group of coordinates that is new on it.
 
-    `earlier` has a row for each of the curves, which alternate. An entry is None for a new group of coordinates, and
-    for a copy of a group at the previous step the index of that group.
+    `earlier` has one row for each of the alternating curves. An entry is None for a new group of coordinates; if the
+    group is a copy of a group at the previous step, the entry is the index of that group.
     """
 
     def __init__(self, factors: Sequence[ElementaryMap], start: IntegerPoint, stride: int) -> None:
@@ -108,7 +108,7 @@ class _Search:
         self.groups: Groups = [tuple(range(n))]
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(factor.integer_steps.is_triangular for factor in factors):
-            # Each coordinate must be a copy of a new one some steps before, not one that is only permuted for ever.
+            # Each coordinate must be a copy of a new coordinate some steps before; coordinates must not only permute.
             earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
             ungrouped = [(k, i) for k in range(stride) for i in range(n)]
             for _ in range(stride * n):
@@ -119,7 +119,7 @@ class _Search:
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
-        """Return the numbers of all new groups; None if there are none, or they are too long."""
+        """Return the numbers of all new groups; None if no curves exist or the numbers are too long."""
         residues = from_residues(self._modulo, max_primes)
         if residues is None:
             return None
@@ -131,11 +131,11 @@ class _Search:
 
     @property
     def first(self) -> int:
-        """The number of steps of factors from which on the forms are used, since W(0) = 0."""
+        """The number of steps of factors after which the forms are used, since W(0) = 0."""
         return (_FIRST + self.factors[0].dim) * self.stride
 
     def degree(self, k: int, group: int) -> int:
-        """Return the degree of a group on a curve."""
+        """Return the degree of a group of coordinates on a curve."""
         copied = self.earlier[k][group]
         return self.sections[k, group].degree if copied is None else self.degree((k - 1) % self.stride, copied)
 
@@ -144,7 +144,7 @@ class _Search:
         for point_count in (
             [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
         ):
-            points: Rows = []  # from the initial point on, one for each step of a factor
+            points: Rows = []  # the initial point, then one point for each step of a factor
             point = self._start.residues(prime)
             for factor in islice(cycle(self.factors), self.stride * point_count):
                 if point is None:
@@ -169,7 +169,7 @@ class _Search:
 
 
 def _copies(equation: Equation) -> list[int | None]:
-    """Return for each coordinate of the image the coordinate of the point that it equals; None for a new one."""
+    """Return for each coordinate of the image the equal coordinate of the point; None for a new coordinate."""
     n = equation.dim
     copies: list[int | None] = [None] * n
     for row in equation.terms:
@@ -183,7 +183,7 @@ def _copies(equation: Equation) -> list[int | None]:
 
 
 def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
-    """Return whether the forms agree with the orbit at more steps than the degree, hence at all steps."""
+    """Return whether the forms agree with the orbit at more steps than their degree, and hence at all steps."""
     factors, stride = search.factors, search.stride
     max_degree = 0
     for k in range(stride):
@@ -204,7 +204,7 @@ def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bo
         if image is None:
             return False
         point = image
-    # The steps must be at different multiples of T.
+    # The steps must belong to different multiples of T.
     return all(steps.multiples.integer(n) != 0 for n in range(1, search.first // stride + max_degree + 2))
 
 
@@ -238,7 +238,7 @@ class _Exact:
             self._all_primes[key] = self._primes.lcm(bound.p).lcm(bound.q)
 
     def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
-        """Return the steps; the first `skipped` points of the orbit are not counted in the numbers of steps."""
+        """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
         new = {

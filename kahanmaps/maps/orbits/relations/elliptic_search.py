@@ -1,9 +1,9 @@
 """Search modulo a prime for an elliptic curve on which an orbit is P + n T, with its Somos sequences.
 
 Let the points of an orbit be P + n T on an elliptic curve, and their coordinates sections of a line bundle of degree d.
-There are d independent sections; those that are not coordinates are found among the products of coordinates of several
-points, divided by coordinates of all but one. Two independent sections vanish at d - 2 points of the orbit, and their
-quotient z takes each value twice. With sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of
+There are d independent sections. Sections that are not coordinates are products of coordinates of several points,
+divided by coordinates of all points but one. Two independent sections vanish at d - 2 points of the orbit, and their
+quotient z takes each value twice. With the sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of
 the zeros of a section,
 
     z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m)),
@@ -12,7 +12,7 @@ so the cross ratios of z give quotients of W and U. Those of four consecutive po
 
     y(u) = H U(u)^2/(U(u + 1) U(u - 1)),      y(u + 1) y(u) (1 - y(u)) y(u - 1) = H,
 
-where W(2) = H and W(3) = H^3. Another choice of four points gives y(u) at the u in between, up to an unknown factor.
+where W(2) = H and W(3) = H^3. Another choice of four points gives y(u) at the remaining u, up to an unknown factor.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ Rows = list[list[int]]
 
 _MAX_PRODUCTS = 64
 _MAX_DEGREE = 8
-_EXTRA_POINTS = 8  # rows beyond the unknowns: each lets a wrong relation pass with a probability of 2^-60
-_VALUES = 14  # of z, from which the sequences are computed; nine suffice
-_POINTS, _LAGS = (2, 3), (1, 2)  # numbers of points in a product, and their distances
+_EXTRA_POINTS = 8  # rows beyond the number of unknowns; a wrong relation passes at each with probability 2^-60
+_VALUES = 14  # values of z from which the sequences are computed; nine suffice
+_POINTS, _LAGS = (2, 3), (1, 2)  # possible numbers of points in a product, and possible distances between them
 
 
 @dataclass(frozen=True)
 class Sections:
-    """The construction of all sections: products of independent `coordinates` at `points` points, `lag` steps apart.
+    """The construction of all sections, as products of independent `coordinates` of `points` points, `lag` steps apart.
 
-    `products` is empty if the coordinates span all sections.
+    `products` is empty if the coordinates themselves span all sections.
     """
 
     degree: int
@@ -65,22 +65,22 @@ class Sections:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve modulo a prime: `sections`, and as `numbers` H, y(2), y(3) and the coefficients of the coordinates."""
+    """A curve modulo a prime: `sections`; `numbers` are H, y(2), y(3) and the coefficients of the coordinates."""
 
     sections: Sections
     numbers: list[list[int]]
 
 
 def points_needed(size: int) -> list[int]:
-    """Return the numbers of points to give to `curve` for this number of coordinates, to be tried in turn."""
+    """Return the numbers of points to pass to `curve`, one after the other, for this number of coordinates."""
     products: list[int] = [(size + 1) ** count for count in _POINTS]
     return [number + 2 * _EXTRA_POINTS + 2 * max(_LAGS) for number in products if number <= _MAX_PRODUCTS]
 
 
 def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> Curve | None:
-    """Search for the elliptic curve of an orbit whose points have last coordinate 1; return None if there is none.
+    """Search for the elliptic curve of an orbit whose points have last coordinate 1; return None if none is found.
 
-    Raises ArithmeticError if only the dimensions are those of a curve: the prime or the initial point is special.
+    Raises ArithmeticError if the dimensions are those of a curve, but the prime or the initial point is special.
     """
     constructions = [known_sections] if known_sections else list(_constructions(points, prime))
     for sections in constructions:
@@ -95,7 +95,7 @@ def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> C
 
 
 def _constructions(points: Rows, prime: int) -> Iterator[Sections]:
-    """Yield possible constructions of the sections; none if the products span too large a space for a curve."""
+    """Yield possible constructions of the sections; none if the products span a space that is too large for a curve."""
     coordinates = tuple(pivots(echelon(points[: len(points[0]) + _EXTRA_POINTS], prime)))
     for count, lag in product(_POINTS, _LAGS):
         size = len(coordinates) ** count
@@ -111,12 +111,12 @@ def _constructions(points: Rows, prime: int) -> Iterator[Sections]:
 
 
 def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
-    """Return a basis of the sections at all points with enough points before them; None if there is none."""
+    """Return a basis of the sections at all points that have enough points before them; None if there is no basis."""
     count, lag, coordinates = sections.points, sections.lag, sections.coordinates
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
-    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points: of
-    # the last coordinate, 1, and of a linear form without common zeros with it. `checks` annihilate this span.
+    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
+    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g. `checks` annihilate this span.
     values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
     sums = matrix(values[: sections.rows], prime)
     checks = kernel(*sums.transpose().rref())
@@ -144,20 +144,20 @@ def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime
 
 
 def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]:
-    """Return each point with the `count` - 1 points before it, `lag` steps apart, nearest first."""
+    """Return tuples of a point and the `count` - 1 points before it, `lag` steps apart, nearest first."""
     first = (count - 1) * lag
     return [tuple(points[n - k * lag] for k in range(count)) for n in range(first, len(points))]
 
 
 def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
-    """Return the numbers of a `Curve`; None if there is no pencil or sequence, or the coordinates are not sections."""
+    """Return the numbers of a `Curve`; None without a pencil or a sequence, or if coordinates are not sections."""
     degree, first = sections.degree, (sections.points - 1) * sections.lag
     pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
         return None
     quotients = matrix(values[degree - 2 : degree - 2 + _VALUES], prime) * matrix(pencil, prime).transpose()
     z = [nmod(int(quotients[n, 0]), prime) / int(quotients[n, 1]) for n in range(quotients.nrows())]
-    shift = 2 * (first + degree - 2) + (degree - 2) * first + (degree - 2) * (degree - 3) // 2  # of u, for z[0]
+    shift = 2 * (first + degree - 2) + (degree - 2) * first + (degree - 2) * (degree - 3) // 2  # u for z[0]
     sequence = _sequence(z, prime)
     if sequence is None:
         return None
@@ -182,12 +182,12 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
 
 
 def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | None:
-    """Return H, and y at consecutive u, the first of which belongs to the four points around z[2] and z[3].
+    """Return H, and y at consecutive u; the first u belongs to the four points around z[2] and z[3].
 
-    None if z does not come from such a sequence.
+    Returns None if z does not come from such a sequence.
     """
-    odd = {}  # 1 - cross ratio is y(u)
-    even = {}  # 1 - K times this is y(u)
+    odd = {}  # y(u) is 1 minus this cross ratio
+    even = {}  # y(u) is 1 minus K times this value
     for n in range(2, len(z) - 1):
         z1, z0, z_1, z_2 = z[n + 1], z[n], z[n - 1], z[n - 2]
         odd[2 * n - 1] = 1 - (z1 - z0) * (z_1 - z_2) / ((z1 - z_1) * (z0 - z_2))

@@ -1,4 +1,4 @@
-"""Steps along an orbit on an elliptic curve, whose coordinates are forms in the terms of two Somos sequences.
+"""Steps along an orbit on an elliptic curve; the coordinates are forms in the terms of two Somos sequences.
 
 If the forms have degree d, the terms have 1/d of the length of the coordinates: a step consists of a few short
 products, without a gcd of long integers.
@@ -24,9 +24,9 @@ _PRIME = 2**61 - 1
 class EllipticSteps:
     """The steps of an orbit by Somos sequences.
 
-    `groups` has a row for each of the curves, which alternate: the Coordinates of each group, or for a copy of a group
-    at the previous step its index there. The forms are used from `first` steps of factors on. The sequences begin after
-    the first `skipped` points of the orbit.
+    `groups` has one row for each of the alternating curves: the Coordinates of each group, or for a copy of a group at
+    the previous step the index of that group. The forms are used after `first` steps of factors. The sequences begin
+    after the first `skipped` points of the orbit.
     """
 
     name = "Somos sequences along the orbit"
@@ -52,15 +52,15 @@ class EllipticSteps:
 
     @property
     def degree(self) -> int:
-        """The largest degree, on their curve, of coordinates computed together."""
+        """The largest degree of coordinates that are computed together on one curve."""
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point with this number, after the previous one was computed or skipped; None if not determined."""
+        """Return the point with this number, after the previous one was computed or skipped; None if undetermined."""
         return self.point(number) if self.skip(number) else None
 
     def skip(self, number: int) -> bool:
-        """Return whether the orbit modulo a prime shows that the previous point has an image."""
+        """Return whether the orbit modulo a prime proves that the previous point has an image."""
         if self._residue is None:
             previous = self.point(number - 1)
             self._residue = None if previous is None else previous.residues(_PRIME)
@@ -69,7 +69,7 @@ class EllipticSteps:
         return self._residue is not None
 
     def point(self, number: int) -> IntegerPoint | None:
-        """Return the point with this number, None if the forms do not give it; discard terms no longer needed."""
+        """Return the point with this number; None if the forms do not give it. Terms no longer needed are discarded."""
         factor_steps = (number - self._skipped) * len(self._map.factors)
         n = factor_steps // len(self._groups)
         for key in [
@@ -95,7 +95,7 @@ class EllipticSteps:
         return FractionsPoint([(p, q) for p, q in values])
 
     def _value(self, number: int, group: int) -> list[fmpz]:
-        """Return numerators and denominator of a group. Raises ArithmeticError if the denominator is 0."""
+        """Return the numerators and the denominator of a group. Raises ArithmeticError if the denominator is 0."""
         key = number, group
         if key not in self._values:
             n, k = divmod(number, len(self._groups))
@@ -105,17 +105,17 @@ class EllipticSteps:
 
 
 class Coordinates:
-    """A group of coordinates on one curve: `forms` has a row for each, and a last row for their denominator."""
+    """A group of coordinates on one curve; `forms` has one row for each coordinate, the last row is the denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
         self.W, self.degree, self._U, self._primes = W, degree, U, primes
         self._exponents = exponents(degree)
-        # The content of each column is multiplied into the monomial, not into each row: fewer products of long numbers.
+        # The content of a column is multiplied into the monomial, not into each row: fewer products of long numbers.
         self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
         self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
 
     def at(self, n: int) -> list[fmpz]:
-        """Return numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError if the latter is 0."""
+        """Return numerators and denominator in lowest terms, n >= 2. Raises ArithmeticError if the denominator is 0."""
         W, U = self.W, self._U
         mixed, own = U.mixed_quotient(n), W.own_quotient(n)
         weights = primitive_integers(

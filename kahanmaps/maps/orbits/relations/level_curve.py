@@ -1,8 +1,8 @@
 """The elliptic curve of an orbit in the plane, as the level curve F(x, y) = 0 of an integral.
 
 It is used for orbits that do not determine their curve, such as periodic ones. Lines through a point whose multiplicity
-on it is less by 2 than its degree meet it in two more points: it becomes v^2 = g(t), g of degree 3 or 4, and then a
-Weierstrass curve.
+on the curve is the degree minus 2 meet the curve in two more points: so the curve becomes v^2 = g(t), g of degree 3 or
+4, and then a Weierstrass curve.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ def level_curve(
 
     Args:
         integral: a function of two variables and eps that the map conserves.
-        eps: its value.
-        points: successive ones of the orbit, at least three.
+        eps: the value of eps.
+        points: at least three successive points of the orbit.
 
-    Returns None if the level curve has several components through the orbit, if it is singular there, or if no such
-    projection is found.
+    Returns None if the orbit meets several components of the level curve or a singular point, or if no projection of
+    this kind is found.
     """
     level = integral.value(QQ, (*points[0], eps))
     if level is None:
@@ -82,7 +82,7 @@ def level_curve(
 
 
 def _centers(F: fmpq_mpoly, start: Triple) -> Iterator[Triple]:
-    """Yield points that may have the required multiplicity: the start of a cubic, and rational points at infinity."""
+    """Yield points that may have the required multiplicity: for a cubic the start, and rational points at infinity."""
     one, zero = fmpq(1), fmpq(0)
     d = F.total_degree()
     if d == 3:
@@ -96,7 +96,7 @@ def _centers(F: fmpq_mpoly, start: Triple) -> Iterator[Triple]:
 
 
 def _lines_through(F: fmpq_mpoly, center: Triple) -> tuple[fmpq_mat, tuple[fmpq_poly, ...]] | None:
-    """Return a basis O, A, B, and F(s O + A + t B) = p0 + p1 s + p2 s^2 with polynomials in t; None for another degree.
+    """Return a basis O, A, B, and F(s O + A + t B) = p0 + p1 s + p2 s^2 with polynomials in t; None for other degrees.
 
     O is the center; the columns of the matrix are the basis.
     """
@@ -118,12 +118,12 @@ def _lines_through(F: fmpq_mpoly, center: Triple) -> tuple[fmpq_mat, tuple[fmpq_
 
 
 def _weierstrass(g: fmpq_poly, zero: tuple[fmpq, fmpq], point: tuple[fmpq, fmpq]) -> tuple[EllipticCurve, AffinePoint]:
-    """Return the Weierstrass form of v^2 = g(t) with one point (t, v), v != 0, as zero, and the image of another."""
+    """Return the Weierstrass form of v^2 = g(t), with `zero` = (t, v), v != 0, as zero, and the image of `point`."""
     shifted = g(fmpq_poly([zero[0], 1]))
     a, b, c, d, e = (shifted[k] for k in range(5))
     q, s = zero[1], 1 / (point[0] - zero[0])
     curve = EllipticCurve(c, b * d - 4 * a * e, a * d * d + b * b * e - 4 * a * c * e)
-    # With t = t_0 + 1/s and w = v s^2 the curve is w^2 = a s^4 + b s^3 + c s^2 + d s + e, a = q^2.
+    # With t = t_0 + 1/s and w = v s^2, the curve is w^2 = a s^4 + b s^3 + c s^2 + d s + e with a = q^2.
     x = 2 * q * point[1] * s * s + 2 * a * s * s + b * s
     y = ((4 * a * x + 4 * a * c - b * b) * s + b * x + 2 * a * d) / (2 * q)
     assert y * y == ((x + curve.a2) * x + curve.a4) * x + curve.a6

@@ -1,13 +1,13 @@
-"""The geometry of an orbit on a curve of genus 1 or 0: Weierstrass model, translation, height, rotation number.
+"""The geometry of an orbit on a curve of genus 1 or 0: Weierstrass model, translation, height and rotation number.
 
 The search for elliptic curves along an orbit (elliptic_orbit.py) ends with a proof that the points are P + n T on an
-elliptic curve, and with the first terms W(1) = 1, ..., W(4) of the sequence of the multiples of T. They determine the
+elliptic curve, and with the first terms W(1) = 1, ..., W(4) of the sequence of the multiples of T. These determine the
 curve and T: on y^2 + a1 x y + a3 y = x^3 + a2 x^2 with T = (0, 0) the division polynomials at T are
 
     psi_2 = a3,      psi_3 = a2 a3^2,      psi_4 = a3^4 (a1 a2 - a3)                            (ward-1948).
 
-If this cubic is singular, or the orbit lies on another rational curve, the map acts on a projective line. There it
-multiplies a coordinate by the multiplier kappa, or adds a constant. Source: docs/mathematics.md, "Orbits on elliptic
+If this cubic is singular, or the orbit lies on another rational curve, the map acts on a projective line: it multiplies
+a coordinate by the multiplier kappa, or adds a constant to it. Source: docs/mathematics.md, "Orbits on elliptic
 curves".
 """
 
@@ -41,22 +41,22 @@ from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elli
 from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 
-_BITS = 100_000  # of coefficients that are searched for, and of points on rational curves
-_LATER, _APART = 16, 8  # steps after which the search starts again, up to the first number, as long as
+_BITS = 100_000  # bits of coefficients that are searched for, and of points on rational curves
+_LATER, _APART = 16, 8  # the search is repeated from later points, up to 16 steps in distances of 8, as long as
 _SHORT = 2000  # ... points have at most this number of bits
-_LEVEL_POINTS = 8  # of an orbit, from which the translation of a level curve is computed
-_PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
-_MAX_RATIONAL_DEGREE = 6  # of rational curves that are not rational normal curves
-_ACCURACY = 1e-15  # of rotation numbers
+_LEVEL_POINTS = 8  # number of points from which the translation on a level curve is computed
+_PERIODS = 24  # largest period that is recognized: twice the largest order of a torsion point
+_MAX_RATIONAL_DEGREE = 6  # largest degree of rational curves that are not rational normal curves
+_ACCURACY = 1e-15  # accuracy of rotation numbers
 
 
 @dataclass(frozen=True)
 class OrbitCurve(PrintableResult):
-    """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
+    """The curve of an orbit, and the map on this curve; everything except the balls is exact and proved.
 
-    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers refer to
+    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers belong to
     this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B; `degree` is that of the
-    coordinates on it. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and trace = 2 for a parabolic map.
+    coordinates. For genus 0, `trace` = kappa + 1/kappa, kappa the multiplier; trace = 2 for a parabolic map.
     """
 
     genus: int
@@ -68,7 +68,7 @@ class OrbitCurve(PrintableResult):
 
     @cached_property
     def order(self) -> int | None:
-        """The order of the translation or of kappa, None if it is infinite."""
+        """The order of the translation or of kappa; None if it is infinite."""
         return None if self.curve is None or self.point is None else self.curve.order(self.point)
 
     @cached_property
@@ -82,7 +82,7 @@ class OrbitCurve(PrintableResult):
     def height_constant(self) -> float | None:
         """The C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits.
 
-        Over one common denominator the integers may be longer.
+        With all coordinates over one common denominator, the integers may be longer.
         """
         if self.height is None or self.order is not None:
             return None
@@ -104,12 +104,12 @@ class OrbitCurve(PrintableResult):
 
     @property
     def steps(self) -> int:
-        """1, or 2 if the iterate exchanges two real components; then `rotation` is that of its square."""
+        """1; or 2 if the iterate exchanges two real components, and `rotation` belongs to its square."""
         return self._rotation[1]
 
     @cached_property
     def bad_primes(self) -> BadPrimes | None:
-        """The bad primes of the curve over Q."""
+        """The primes of bad reduction of the curve over Q."""
         return None if self.curve is None else bad_primes(self.curve)
 
     @property
@@ -119,9 +119,9 @@ class OrbitCurve(PrintableResult):
 
     @property
     def is_dense(self) -> bool:
-        """Whether the orbit is dense in the real components of its curves that it visits (proved).
+        """Whether the orbit is dense in those real components of its curves that it visits (proved).
 
-        It is if its translation of a circle, or rotation, has infinite order.
+        It is dense if the translation of a circle, or the rotation, has infinite order.
         """
         return self.rotation is not None and self.order is None
 
@@ -167,7 +167,7 @@ class OrbitCurve(PrintableResult):
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; exact numbers and balls are text."""
+        """Return plain data; exact numbers and balls are given as text."""
 
         def text(x: fmpq | None) -> str | None:
             return None if x is None else format_number(x)
@@ -200,10 +200,10 @@ def orbit_curve(
     Args:
         map_over: the map.
         start: the initial point, exact.
-        family, integrals: the map for every eps, and its claimed integrals. In the plane their level curves are used
-            for orbits that are periodic or special, after a proof that they are integrals.
+        family, integrals: the map for every eps, and its claimed integrals. In the plane, the level curves of proved
+            integrals are used for orbits that are periodic or special.
 
-    Raises UnknownCurve if no curve was found, InputError if the orbit is finite or the map is not one over Q.
+    Raises UnknownCurve if no curve is found, InputError if the orbit is finite or the map is not over Q.
 
     >>> from kahanmaps.documents.inline import as_file
     >>> curve = orbit_curve(as_file("mcmillan").map.at(fmpq(1), QQ), [fmpq(1, 3), fmpq(2, 5)])
@@ -212,7 +212,7 @@ def orbit_curve(
     """
     require_rational(map_over)
     point = IntegerPoint.from_rationals(map_over.point(start))
-    # An initial point in special position leads to zeros among the first terms of the sequences.
+    # An initial point in special position may give zeros among the first terms of the sequences.
     curve, later = None, point
     for skipped in range(_LATER + 1):
         if skipped % _APART == 0:
@@ -251,7 +251,7 @@ def orbit_curve(
 
 
 def require_rational(map_over: Map) -> None:
-    """Raise InputError for a map with algebraic parameters."""
+    """Raise InputError for a map whose coefficients contain an algebraic number."""
     if map_over.field is not QQ:
         raise InputError(
             f"found a map over {map_over.field}, expected rational parameters: curves are found over Q only"
@@ -269,13 +269,13 @@ def _found_steps(map_over: Map, start: IntegerPoint) -> EllipticSteps | None:
 
 
 def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
-    """Return the geometry from the terms of W, and from the degrees of the coordinates."""
+    """Return the geometry, computed from the terms of W and the degrees of the coordinates."""
     W = found.multiples
     H, third, fourth = (W.value(n) for n in (2, 3, 4))
     a2, a3 = third / H**2, H
     a1 = (fourth / a3**4 + a3) / a2
     curve, T = EllipticCurve(a2 + a1 * a1 / 4, a1 * a3 / 2, a3 * a3 / 4), (fmpq(0), a3 / 2)
-    # T belongs to `stride` steps of factors.
+    # T is the translation by `stride` steps of factors.
     factors = len(map_over.factors)
     together = math.lcm(factors, found.stride)
     iterate, times = together // factors, together // found.stride
@@ -305,7 +305,7 @@ def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
 def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -> OrbitCurve:
     """Return the multiplier of the translation on Y^2 = (x - r)^2 (x - s).
 
-    It multiplies (Y + m (x - r))/(Y - m (x - r)), m^2 = r - s, by its value at the point.
+    The translation multiplies (Y + m (x - r))/(Y - m (x - r)), m^2 = r - s, by the value of this function at the point.
     """
     a, b, c = curve.a2, curve.a4, curve.a6
     square = a * a - 3 * b  # (r - s)^2
@@ -318,7 +318,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return enough points to recognize a period, which ends them, or a rational curve; None after a too long one."""
+    """Return enough points to recognize a period, which ends them, or a rational curve; None follows if too long."""
     dim = map_over.dim
     top = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
@@ -336,7 +336,7 @@ def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | Non
 def _on_level_curve(
     map_over: Map, points: Sequence[tuple[fmpq, ...]], family: MapFamily, integrals: Sequence[RationalFunction]
 ) -> OrbitCurve | None:
-    """Return the geometry of an orbit in the plane on the level curve of an integral; None if it is of another genus.
+    """Return the geometry of an orbit in the plane on the level curve of an integral; None unless the genus is 1.
 
     An automorphism over Q of a curve of genus 1 is a translation unless its square is the identity.
     """
@@ -346,7 +346,7 @@ def _on_level_curve(
         found = level_curve(integral, map_over.eps, points[:_LEVEL_POINTS])
         if found is not None and is_conserved(family, map_over.eps, integral):
             (curve, point), F = found[0].short_model(found[1]), found[2]
-            # The degree of the coordinates one by one, or with a common denominator, as in the search.
+            # The degree of single coordinates, or of coordinates with a common denominator, as in the search.
             is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
             degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
             return OrbitCurve(1, 1, curve, point, degree)
@@ -356,15 +356,15 @@ def _on_level_curve(
 def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
     """Return the multiplier of an orbit on a rational curve, on which the map acts as z -> (p z + q)/(r z + s).
 
-    The coordinates are forms of degree d in (z : 1); substituted into the equation of the map they give a form of known
-    degree, which vanishes if it does at more points.
+    The coordinates are forms of degree d in (z : 1). Substituted into the equation of the map, they give a form of
+    known degree, which is 0 if it vanishes at more points than its degree.
     """
-    if len(map_over.factors) > 1 or None in points:  # the points between the factors lie on other curves
+    if len(map_over.factors) > 1 or None in points:  # points between the factors lie on other curves
         return None
     dim, top = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
     rows = [[fmpq(p.denominator), *(fmpq(x) for x in p.numerators)] for p in points if p is not None]
     size = dim + 3
-    chosen: list[int] = []  # coordinates that are independent on the orbit, first the denominator, which is not 0
+    chosen: list[int] = []  # coordinates that are independent on the orbit, beginning with the nonzero denominator
     for k in range(dim + 1):
         columns = [*chosen, k]
         if rank(QQ, fmpq_mat(size, len(columns), [row[i] for row in rows[:size] for i in columns])) == len(columns):
@@ -372,7 +372,7 @@ def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> Orbi
     independent, normal = [[row[k] for k in chosen] for row in rows], len(chosen) - 1
     if normal < 1:
         return None
-    # On a rational normal curve hyperplanes through d - 1 points of the orbit give z. Otherwise coordinates are tried.
+    # On a rational normal curve, hyperplanes through d - 1 points of the orbit give z. Otherwise try the coordinates.
     parameters = [([row[k] / row[0] for row in rows], range(normal, _MAX_RATIONAL_DEGREE + 1)) for k in chosen[1:]]
     through = fmpq_mat(normal - 1, normal + 1, [x for row in independent[: normal - 1] for x in row])
     if len(pencil := nullspace(QQ, through)) == 2:
@@ -395,9 +395,9 @@ def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> Orbi
 
 
 def _are_forms(z: Sequence[fmpq], rows: Sequence[Sequence[fmpq]], degree: int) -> bool:
-    """Return whether the rows are, up to factors, the values of forms of this degree in (z : 1), and of no others.
+    """Return whether the rows are, up to factors, the values of unique forms of this degree in (z : 1).
 
-    These have no common factor, as there would be others with another factor instead.
+    Unique forms have no common factor: otherwise another factor could replace it.
     """
     width = degree + 1
     unknowns, equations = len(rows[0]) * width, []

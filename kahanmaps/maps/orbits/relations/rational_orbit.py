@@ -13,37 +13,37 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
-# The search for relations starts when the steps so far took about as long as it will (which depends on the bit length
-# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise there are none. The
-# coefficients of relations are about as long as the initial point, so points must be longer than that. If the
-# coefficients turn out to be longer, the search is repeated when points are _RETRY_FACTOR times as long.
-_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second times the square of (dimension + 1)
+# The search for relations starts when the steps so far took about as long as the search will take (which depends on the
+# bit length of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: for faster growth
+# there are no relations. Their coefficients are about as long as the initial point, so points must be longer than that.
+# If the coefficients are longer than expected, the search is repeated when points are _RETRY_FACTOR times as long.
+_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second is multiplied by the square of (dimension + 1)
 _RETRY_FACTOR = 4
 _LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
 
 
 class Relations(Protocol):
-    """Relations between the points of one orbit, by which its next points are computed."""
+    """Relations between the points of one orbit, from which its next points are computed."""
 
     @property
     def name(self) -> str: ...
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point with this number from the last ones; None if the relations do not determine it."""
+        """Return the point with this number, given the last points; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
-        """Return whether the point with this number certainly exists, and can be skipped: later ones do not need it."""
+        """Return whether the point with this number certainly exists and can be skipped, as no later point needs it."""
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return the point with this number if it can be computed directly, otherwise None."""
 
 
 class RationalOrbit:
-    """The points of an orbit over Q: iterate once.
+    """The points of an orbit over Q; they can be iterated over once.
 
-    The orbit ends where the map is not defined, or after a point with more than `max_bits` bits. Points that are not
-    requested may be None. `relations` are used from step `since` on; both are None before they are found.
+    The orbit ends if the map is not defined at a point, or after a point with more than `max_bits` bits. Points that
+    are not requested may be None. `relations` are used from step `since` on; both are None before relations are found.
     """
 
     def __init__(
@@ -61,17 +61,17 @@ class RationalOrbit:
         last, reached = deque([self.start], maxlen=3), 0
         by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
         search_bits: float = max(_MIN_BITS, by_coordinates, _LONGER_THAN_START * self.start.bits)
-        latest_bits = inf if self.max_bits is None else self.max_bits / 2  # later, few steps remain: bits grow like n^2
+        latest_bits = inf if self.max_bits is None else self.max_bits / 2  # above, few steps remain: bits grow like n^2
         yield self.start
         for number in count(1):
             if self.relations is not None and self._is_requested is not None and not self._is_requested(number):
-                # A point that is not requested is skipped, unless it may exceed the budget.
+                # A point that is not requested is skipped, unless it might exceed the budget.
                 is_short = self.max_bits is None or 2 * last[-1].bits * number**2 < self.max_bits * reached**2
                 if is_short and self.relations.skip(number):
                     yield None
                     continue
             image = None if self.relations is None else self.relations.step(last, number)
-            # Near the budget, an intermediate point of a composition may exceed it: only single steps notice that.
+            # Near the budget, an intermediate point of a composition may exceed it, which only single steps notice.
             if image is None or (
                 self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
             ):
@@ -93,7 +93,7 @@ class RationalOrbit:
             before = last[-1]
             last.append(image)
             reached = number
-            # A point that keeps its factors belongs to an orbit that grows fast; its exact length costs a gcd.
+            # If a point keeps its common factors, the orbit grows fast; computing the exact length would take a gcd.
             if (
                 search_bits < latest_bits
                 and number > 1

@@ -1,7 +1,7 @@
 """Sections of a line bundle on an elliptic curve at n T, as forms in the terms of the sequences W and U.
 
-Sections of degree d are products of d - 1 terms of W near n and one of U. A basis consists of the monomials in the even
-functions A = W(n)^2 and B = W(n + 1) W(n - 1), each multiplied by one of two products that are not even.
+Sections of degree d are products of one term of U near n and d - 1 terms of W near n. A basis consists of the monomials
+in the even functions A = W(n)^2 and B = W(n + 1) W(n - 1), each times one of two products that are not even.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PRIME = 2**61 - 1
 
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
-    """Return the values at n of the basis of the sections that `exponents` describes."""
+    """Return the values at n of the basis of sections that `exponents` describes."""
     square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
     first, second = U[n], U[n + 1] * W[n - 1]
     first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
@@ -27,23 +27,23 @@ def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> li
 
 
 def exponents(degree: int) -> list[tuple[int, int, int]]:
-    """Return the triples (k, i, j) of a basis of the sections of a degree.
+    """Return the triples (k, i, j) that describe a basis of the sections of a degree.
 
     k is 0 for U(n) and 1 for U(n + 1) W(n - 1); i and j are the exponents of W(n)^2 and W(n + 1) W(n - 1). The products
-    with k = 0 (for odd degree, k = 1) have another factor W(n).
+    with k = 0 (for odd degree, those with k = 1) have a further factor W(n).
     """
     tops = ((degree - 1) // 2, (degree - 2) // 2)
     return [(k, top - j, j) for k, top in enumerate(tops) for j in range(top + 1)]
 
 
 def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[fmpq]) -> fmpq:
-    """Return a number divisible by all primes that all coordinates may have in common at some n.
+    """Return a number divisible by every prime that divides all coordinates at some n.
 
     A common prime of all coordinates divides all products of a coordinate and a section psi(n) that depends only on
-    n T. If these products span the forms of their degree, such primes divide the index of their lattice: the only
-    common primes of the forms are those of the first terms. Raises ArithmeticError if the products do not span.
+    n T. If these products span the forms of their degree, such primes divide the index of their lattice, since the
+    only common primes of the forms are those of the first terms. Raises ArithmeticError if they do not span.
     """
-    for extra_degree in (0, *range(2, degree + 1)):  # no section of degree 1 depends on n T alone
+    for extra_degree in (0, *range(2, degree + 1)):  # no section of degree 1 depends only on n T
         length = degree + extra_degree
         if table.nrows() * max(extra_degree, 1) < length:
             continue
@@ -75,7 +75,7 @@ def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
 
 
 def _of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:
-    """Return a basis at n of the sections of a degree other than 1 that depend only on n T (W alone)."""
+    """Return a basis, at n, of the sections of a degree other than 1 that depend only on n T (that is, on W)."""
     square, outer, third = W[n] * W[n], W[n + 1] * W[n - 1], W[n - 1] ** 2 * W[n + 2]
 
     def even(top: int) -> list[fmpq]:
