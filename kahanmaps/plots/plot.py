@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Plot(AttributeHints):
-    """The pictures, as axes; `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other results.
+    """Pictures of results, as axes: `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other types.
 
     `km.plot(value)` draws a result, an orbit, or the portrait of a system.
     """

@@ -128,7 +128,7 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return fractions p/q between two numbers with the smallest q, up to twice the first or until there are three."""
+    """Return fractions p/q between two numbers, spaced, by increasing q: three, or all up to twice the least q."""
     marked: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(marked) >= _LEAST and q > 2 * marked[0].denominator:
