@@ -379,7 +379,7 @@ def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
-    """A = diag(roots, roots), and the third derivatives of the sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
+    """Return diag(roots, roots) and the third derivatives of a sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
     m = len(roots)
     n = 2 * m
     A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])

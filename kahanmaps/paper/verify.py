@@ -208,7 +208,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return one finding for each claim; with controls one for each claim and control, and a final one for all."""
+        """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
         sections = self.options.sections
         made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected = [c for c in made if sections is None or c.section in sections]
