@@ -192,6 +192,7 @@ effort_options: Callable[[F], F] = stack(
 
 
 def error_bits_option(help_text: str) -> Callable[[F], F]:
+    """Return the option --error-bits BITS."""
     return click.option("--error-bits", type=int, metavar="BITS", default=100, show_default=True, help=help_text)
 
 
@@ -397,7 +398,6 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
 
 
 def _list(texts: Sequence[str]) -> list[str]:
-    """Split the values of a repeatable option at semicolons into one list."""
     return [part.strip() for text in texts for part in text.split(";")]
 
 

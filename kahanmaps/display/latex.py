@@ -185,7 +185,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
         name = latex_name(left) if left == "'" or not left.endswith("'") else f"{latex_name(left[:-1])}'"
         text = f"{name} = {text}"
     if r"\frac" in text and not is_long:
-        text = rf"\displaystyle {text}"  # otherwise a fraction in a line of text is set in small type
+        text = rf"\displaystyle {text}"  # without it, a fraction in a line of text is set in small type
     return typeset(text, is_long)
 
 

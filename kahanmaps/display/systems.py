@@ -206,7 +206,6 @@ def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
 
 
 def _plain(text: object) -> str:
-    """Return a number or field as the argument of \\text{...}."""
     return str(text).replace("_", r"\_")
 
 

@@ -335,7 +335,7 @@ class DocumentReader(PartReader):
         return self._checked_map(explicit_map, "map", self.variables, image, inverse)
 
     def _checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
-        """Return the map if it is defined and dominant and a given inverse is correct; otherwise note a mistake."""
+        """Return the map if it is defined and dominant and a given inverse is correct; if not, note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None

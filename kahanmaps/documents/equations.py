@@ -154,7 +154,7 @@ def read_equations(
         parameters: the names of parameters, which velocities must not have.
 
     Returns:
-        The right-hand sides by variable, in the order of the equations, then those of the velocities; the names of the
+        The right-hand sides by variable, in the order of the equations, the velocities last; the names of the
         velocities; and sentences on new names.
 
     Raises:
@@ -309,6 +309,7 @@ def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
 
 
 def is_name(token: str) -> bool:
+    """Return whether a token is a name."""
     return (token[:1].isalpha() and token.isascii()) or token[:1] == "_"
 
 

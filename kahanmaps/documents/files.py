@@ -125,7 +125,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return self.at(resolve_eps(eps, time_step, h))
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """Draw a portrait and return its axes; the arguments are those of `km.portrait` after the system."""
+        """Draw a portrait and return its axes; the arguments are the arguments of `km.portrait` after the system."""
         return import_module("kahanmaps.plots.plot").plot.portrait(self, *arguments, **options)
 
     @property

@@ -155,7 +155,6 @@ def _are_tables(value: Any) -> bool:
 
 
 def _is_minimal(text: Any) -> bool:
-    """Return whether a text is an irreducible monic polynomial in x."""
     try:
         polynomial = parse_polynomial(text, ["x"])
     except InputError:

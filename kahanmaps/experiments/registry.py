@@ -145,7 +145,7 @@ def analysis(
 
 
 def task_kinds() -> Mapping[str, TaskKind]:
-    """Return all kinds of tasks by name, including those of KAHANMAPS_TASKS."""
+    """Return a dict from the names to all kinds of tasks, including tasks of users (KAHANMAPS_TASKS)."""
     for library_module in LIBRARY:
         import_module(library_module)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):

@@ -26,7 +26,7 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
-# Limit for the closed form of the map (all components together) before common factors are removed.
+# Limits for the closed form of the map (all components together) before common factors are removed.
 MAX_TERMS = 4_000
 MAX_DIMENSION_OF_FORMULAS = 8
 

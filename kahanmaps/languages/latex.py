@@ -97,7 +97,6 @@ def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Ro
 
 
 def _equations(formulas: Formulas) -> Rows:
-    """Return the components of a map other than Kahan's, or the rows of M x~ = r."""
     rows: Rows = []
     for row in formulas.equation:
         entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]

@@ -60,6 +60,7 @@ def combine(terms: list[tuple[Term, Scalar]]) -> Expression:
 
 
 def letter(name: str) -> Expression:
+    """Return the expression that is a single letter."""
     return Expression({(name,): fmpq_poly([1])})
 
 

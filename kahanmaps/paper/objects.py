@@ -137,9 +137,11 @@ class PaperObjects:
 
     @remembered
     def unit(self, k: int) -> Any:
+        """Return the k-th unit vector."""
         return self.K.column([self.K.one if i == k else self.K.zero for i in range(self.n)])
 
     def zeros(self, rows: int, columns: int) -> Any:
+        """Return the zero matrix."""
         return self.K.matrix(rows, columns, [self.K.zero] * (rows * columns))
 
     solve, det, trace = staticmethod(solve), staticmethod(det), staticmethod(trace)
@@ -149,6 +151,7 @@ class PaperObjects:
         return solve(matrix, self.I)
 
     def dot(self, left: Any, right: Any) -> Any:
+        """Return left^T right, a number."""
         return (left.transpose() * right)[0, 0]
 
     def sum(self, terms: Sequence[Any]) -> Any:
@@ -253,6 +256,7 @@ class PaperObjects:
 
     @cached_property
     def AT(self) -> Any:
+        """The transpose of A."""
         return self.A.transpose()
 
     @cached_property

@@ -113,7 +113,7 @@ def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
-    """Return a sample of sign vectors (those with one sign -1, and random ones), or None, which means all of them."""
+    """Return a sample of sign vectors (all vectors with one sign -1, and random ones); None stands for all vectors."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
     flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
@@ -125,6 +125,7 @@ def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | Non
 
 
 def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
+    """Return random vectors of K^n."""
     return lambda name: K.column([K.random(rng) for _ in range(n)])
 
 
@@ -360,7 +361,6 @@ def _not_zero(K: Field, rng: random.Random) -> Any:
 
 
 def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
-    """Return names of indeterminates for the entries of vectors."""
     return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 

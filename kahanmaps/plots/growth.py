@@ -98,7 +98,7 @@ def plot_degrees(
                 and ";" not in recurrence.closed_form
                 and recurrence.preperiod == 0
             ):
-                # d_n is one polynomial: draw it as a smooth curve, and otherwise straight lines from point to point.
+                # d_n is one polynomial in n: draw a smooth curve instead of straight lines from point to point.
                 few = range(recurrence.power + 1)
                 law = np.polynomial.Polynomial.fit(list(few), [recurrence.predict(n) for n in few], recurrence.power)
                 n = np.linspace(steps[0], steps[-1], 200)
@@ -376,7 +376,7 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """Return the fitted law as a function of the step, NaN where it is not positive; None if no law was fitted.
+    """Return the fitted law as a function of the step; its non-positive values become NaN. None if no law was fitted.
 
     For c n^2 and c n, c is `curve.constant`, and the terms of lower degree are a least-squares fit to the heights. The
     exponential goes through the last height.

@@ -128,7 +128,7 @@ class Plot(AttributeHints):
             system: a map with at least 3 variables, or a system, which stands for its Kahan map.
             plane: the hyperplane, a linear equation in the variables such as "x1 = 1/2".
             x0: one initial point or many.
-            eps: an exact number, half the time step where there is one.
+            eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
             axes: two variables or expressions; by default those along which the crossings spread most.
             direction: "up" for crossings to larger values, "down" or "both".
@@ -161,7 +161,7 @@ class Plot(AttributeHints):
 
         Args:
             system: a map, or a system, which stands for its Kahan map.
-            eps: an exact number, half the time step where there is one.
+            eps: half the time step (exact); None for a map without eps.
             window: the intervals of the first two coordinates of the initial points; all other coordinates are 0.
             n: the number of steps.
             show: "time" for the steps, or "basin" for the directions.
@@ -233,7 +233,7 @@ def plot_orbits(
     Args:
         system: a map, or a system, which stands for its Kahan map.
         starts, x0: one initial point or many; by default sixteen around a fixed point, as for `plot portrait`.
-        eps: an exact number, half the time step where there is one.
+        eps: half the time step (exact); None for a map without eps.
         steps, n: the number of steps of each orbit, by default 1000.
         axes: the indices of the two coordinates, counted from 0.
     """

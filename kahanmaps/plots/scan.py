@@ -208,7 +208,6 @@ def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
 
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
-    """Return `count` points along a curve, at equal distances."""
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)

@@ -153,7 +153,7 @@ def report(
 
 
 def write_report(path: str | Path, results: Any, **options: Any) -> None:
-    """Write the page of `report_html` atomically to a file; the options are those of `report_html`."""
+    """Write the page of `report_html` atomically to a file; `options` are options of `report_html`."""
     write_atomically(Path(path), report_html(results, **options).encode())
 
 
@@ -187,7 +187,6 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
 
 
 def _catalogue(file: SystemFile) -> Section:
-    """Return the section with facts and claims of the catalogue or the file; empty if there are none."""
     claims = [
         formula(function, name or "I", CHARACTERS)
         for name, function in {**file.integrals, **file.integrals_in_iterates}.items()
@@ -299,7 +298,7 @@ def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
     return typeset(f"{text} = 0")
 
 
-# -- the page of claims: those of the paper by section, or those of the checks of one system
+# -- the page of claims: the paper's claims by section, or the claims of checks of one system
 
 
 def _claims_sections(

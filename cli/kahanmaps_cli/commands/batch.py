@@ -350,7 +350,6 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
 
 def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
-    """Return the progress of the experiments as plain data for JSON."""
     experiments = store.status()
     _require_experiments(only, [experiment.name for experiment in experiments])
     return {

@@ -95,7 +95,6 @@ def command(name: str) -> click.Command:
 def _measured_commutator(
     file: lib.SystemFile, second: lib.SystemFile | None, start: Any, eps2: Any, options: dict[str, Any]
 ) -> lib.Commutator:
-    """Measure the commutator of two maps along a float orbit."""
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     if second is None or start is None or eps is None:
         raise click.UsageError("--arithmetic float needs OTHER, --start X and --eps E (or --time-step H)")

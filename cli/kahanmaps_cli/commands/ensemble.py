@@ -172,7 +172,6 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
-    """Raise UsageError for options that contradict each other or are out of range."""
     steps, every, output = options["steps"], options["every"], options["output"]
     if require_one_kind_of_starts({**options, "system": system}) is None:
         raise click.UsageError("missing initial points: give --start X, --starts FILE, --grid, --line or --random N")

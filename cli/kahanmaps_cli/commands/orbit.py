@@ -166,7 +166,6 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
 
 def _require_consistent(options: dict[str, Any]) -> None:
-    """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):
         raise click.UsageError("give either --steps N or --at N1,N2,...")

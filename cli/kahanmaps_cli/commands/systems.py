@@ -88,7 +88,6 @@ def _structured_facts(file: Any) -> dict[str, Any]:
 
 
 def _latex(file: Any) -> str:
-    """Return the system or map as displayed LaTeX formulas."""
     names = [lib.latex_name(name) for name in file.variables]
     if isinstance(file.map, lib.KahanFamily):  # an adjusted discretization has eps in its coefficients
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]

@@ -131,6 +131,7 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
 
 
 def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
+    """Return the option --window."""
     return click.option("--window", type=PointText(), metavar=numbers, help="Show this part of the plane only.")
 
 

@@ -161,7 +161,6 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
 
 
 def _require_consistent(options: dict[str, Any]) -> None:
-    """Refuse contradicting options."""
     require_one_kind_of_starts(options)
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:

@@ -84,5 +84,4 @@ def discard_unwritable_output() -> None:
 
 
 def _raw_output() -> Any:
-    """Return the raw stream under the buffers of standard output."""
     return getattr(getattr(sys.stdout, "buffer", None), "raw", None)

@@ -145,7 +145,7 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
 def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
     """Write a table with a header row. `rows` is called twice: first for the names of the columns, then for the values.
 
-    Open files with newline="", since otherwise "\\n" is translated on some systems.
+    Open files with newline="": without it some systems translate "\\n".
     """
     layout = _Layout(rows(), stable)
     stream.write(csv_line(map(cell, layout.names)))

@@ -75,6 +75,7 @@ class Task:
 
     @classmethod
     def from_text(cls, text: str) -> Task:
+        """Return the task with this canonical text."""
         data = json.loads(text)
         return cls(data["task"], data["system"], data["options"])
 

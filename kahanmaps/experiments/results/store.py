@@ -220,6 +220,7 @@ class Store(HtmlDisplay):
         return store
 
     def close(self) -> None:
+        """Close the database and release the lock. May be called twice."""
         if self._connection is not None:
             with suppress(sqlite3.Error):
                 self._connection.close()
@@ -591,7 +592,7 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """Yield the tasks with their records in plan order; with `missing` also those without a record."""
+        """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
         chosen = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED}
@@ -689,6 +690,7 @@ class Store(HtmlDisplay):
         return self._fetch(sql, (experiment.id,))
 
     def unplanned(self) -> int:
+        """Return the number of results whose task belongs to no plan."""
         sql = """
             SELECT count(*) FROM result AS r INDEXED BY result_summary
             WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""

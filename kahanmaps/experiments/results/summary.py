@@ -67,6 +67,7 @@ class Summary(HtmlDisplay):
     groups: tuple[Group, ...]
 
     def to_json(self) -> dict[str, Any]:
+        """Return the summary as plain data; quantiles that exceed all doubles are None."""
         groups = []
         for group in self.groups:
             data = {"group": dict(zip(self.by, group.values, strict=True)), **asdict(group)}
@@ -108,6 +109,7 @@ class Summary(HtmlDisplay):
         ]
 
     def lines(self) -> Iterator[str]:
+        """Yield the lines of the tables, with tabs between cells and an empty line between tables."""
         for number, table in enumerate(self.tables()):
             if number:
                 yield ""

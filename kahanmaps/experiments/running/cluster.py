@@ -113,6 +113,7 @@ class ClusterWorkers(Executor):
 
     @property
     def in_flight(self) -> int:
+        """The number of jobs submitted whose records have not been returned."""
         return len(self._tries)
 
     def submit(self, job: Job) -> None:
@@ -192,7 +193,6 @@ class ClusterWorkers(Executor):
             self._send(jobs)
 
     def _send(self, jobs: list[Job]) -> None:
-        """Submit a group to the scheduler. A lost scheduler is reported by `wait`."""
         documents = {name: self._documents(name) for job in jobs for name in job.task.documents}
         group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
         times = [job.limits.time for job in jobs]

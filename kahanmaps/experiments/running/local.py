@@ -106,6 +106,7 @@ class LocalWorkers:
 
     @property
     def in_flight(self) -> int:
+        """The number of jobs submitted whose records have not been returned."""
         return len(self._running)
 
     def submit(self, job: Job) -> None:
@@ -128,6 +129,7 @@ class LocalWorkers:
         return records
 
     def close(self) -> None:
+        """Kill every worker at once."""
         for worker in list(self._workers):
             self._end(worker)
         self._idle.clear()
@@ -447,7 +449,6 @@ def failure(error: BaseException) -> dict[str, Any]:
 
 @cache
 def _versions() -> dict[str, str]:
-    """Return the versions that a result may depend on."""
     import flint
 
     return {
@@ -470,7 +471,6 @@ def _limit_memory(memory: int | None, idle: int | None) -> None:
 
 
 def _address_space() -> int | None:
-    """Return the address space of this process in bytes, None if unknown."""
     with suppress(OSError), open("/proc/self/statm") as file:
         return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     return None

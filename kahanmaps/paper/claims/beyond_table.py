@@ -121,7 +121,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
         elif kind == "J":
             J[place[0] * n + place[1]], J[place[1] * n + place[0]] = 1, -1
         else:
-            # Add 1 to the derivative along the coordinates of the monomial, for each order of them.
+            # Add 1 to the third (second, first) derivative along the coordinates, in each order.
             where = [i for i, e in enumerate(place) for _ in range(e)]
             entries = {3: cubic, 2: hessian, 1: linear}[len(where)]
             for order in itertools.permutations(where):

@@ -273,7 +273,7 @@ def compare(
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps over which the drift is measured, by default 10,000.
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
-        integrals: functions, texts or pairs (name, text); by default known integrals, or those of a quick search.
+        integrals: functions, texts or pairs (name, text); by default known integrals, or the results of a quick search.
         linear_bins: whether the bins of the drift have equal lengths; by default they grow with the step.
         orders: whether to measure errors and orders, for which the solution is computed as reference.
         seed: the random seed of the initial point.
@@ -386,7 +386,6 @@ def _shown(number: fmpq) -> str:
 
 
 def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
-    """Return the initial points as exact numbers."""
     if given is None:
         return (small_start(system, eps, seed),)
     if isinstance(given, str):

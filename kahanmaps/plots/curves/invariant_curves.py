@@ -241,5 +241,4 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
 
 
 def _to_floating_point(value: Any) -> Any:
-    """Convert a ball to a floating-point number."""
     return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

@@ -48,9 +48,11 @@ class PlaneCubic:
         return 4 * p, 4 * q, 4 * r
 
     def h_at(self, u: Any, v: Any) -> Any:
+        """Return the value of h."""
         return PlanarBlock(*self.h).h(u, v)
 
     def D_at(self, u: Any, v: Any) -> Any:
+        """Return the value of D."""
         p, q, r = self.D
         return p * u * u + q * u * v + r * v * v
 

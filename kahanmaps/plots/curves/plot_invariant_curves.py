@@ -113,7 +113,7 @@ def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
 
 
 class _Pen:
-    """The style of dots: colored by step with a `scale` for a single orbit, otherwise by orbit."""
+    """The style of dots: colored by step if there is a `scale` (for a single orbit), by orbit if there is none."""
 
     def __init__(self, scale: Any, style: Style) -> None:
         self.scale, self.style = scale, style

@@ -82,7 +82,7 @@ def portrait_of(
 
     `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. With `join`
     the neighbours of each point on the curve of its orbit are computed, unless an axis is the step. Raises InputError
-    otherwise.
+    for other axes or colors.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
