@@ -1,1 +1,1 @@
-"""The command line of kahanmaps: thin commands that parse, call one library function, and print."""
+"""The command line of kahanmaps: each command parses its options, calls one library function, and prints the result."""

@@ -1,6 +1,6 @@
-"""The program `kahanmaps`: Ctrl-C and SIGTERM end it with status 130 and a message, at any time.
+"""The program `kahanmaps`. Ctrl-C and SIGTERM end it with status 130 and a message, even during imports.
 
-The handlers are installed before anything large is imported: an interrupt during imports would print a traceback.
+The handlers are installed before large modules are imported, since an interrupt would then print a traceback.
 """
 
 import _signal  # type: ignore[import-not-found]  # the module `signal` loads enumerations first
@@ -14,17 +14,17 @@ def _end(signum: int, frame: object) -> None:
     try:
         os.write(2, b"interrupted\n")
     finally:
-        os._exit(_INTERRUPTED)  # at this time nothing needs to be cleaned up
+        os._exit(_INTERRUPTED)  # during imports there is nothing to clean up
 
 
-# Address space in bytes that each library needs to be loaded and to work: measured, times 1.5.
+# Address space in bytes that each library needs for loading and working: 1.5 times the measured value.
 _MIN_MEMORY = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20, "llvmlite": 300 << 20}
 
 
 class _MemoryCheck:
-    """A module finder that finds nothing, and raises MemoryError before a library is loaded without enough memory.
+    """A module finder that raises MemoryError if memory does not suffice for a library, and never finds a module.
 
-    Without it OpenBLAS, used by numpy, ends the process with status 1, which means `refuted` here.
+    Without this check OpenBLAS (used by numpy) would end the process with status 1, which means `refuted`.
     """
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
@@ -42,30 +42,30 @@ def main() -> int:
     default_handlers = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
     handled = [
         number for number, action in default_handlers.items() if _signal.getsignal(number) == action
-    ]  # not ignored
+    ]  # signals that the parent process does not ignore
     for number in handled:
         _signal.signal(number, _end)
     import atexit
     import gc
     import resource
 
-    gc.set_threshold(20_000, 10, 10)  # by default, collecting garbage takes a tenth of the time of the imports
+    gc.set_threshold(20_000, 10, 10)  # by default, garbage collection takes a tenth of the import time
     from kahanmaps_cli.main import main as run
     from kahanmaps_cli.signals import end_interrupts, handle, raise_interrupt
 
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         sys.meta_path.insert(0, _MemoryCheck())
-    for number in handled:  # at exit Python removes handlers, and the status is already known
+    for number in handled:  # at exit Python removes handlers; ignore signals, since the status is known
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
         for number in handled:
             handle(number, raise_interrupt)
         status = run()
         if status == _INTERRUPTED:
-            os._exit(status)  # everything is flushed; unloading large libraries would take a second
+            os._exit(status)  # streams are flushed; unloading large libraries would take a second
         return status
-    except KeyboardInterrupt:  # outside the `try` of `run`
+    except KeyboardInterrupt:  # raised outside the `try` of `run`
         _end(_signal.SIGINT, None)
         raise
     finally:

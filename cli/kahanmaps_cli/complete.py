@@ -1,7 +1,7 @@
 """Shell completion of systems and files.
 
-It must be fast, so it imports nothing that computes; errors are silent, since a traceback would disturb the command
-line.
+Completion must be fast, so this module does not import the library. Errors are not reported, since a traceback would
+disturb the command line.
 """
 
 from __future__ import annotations
@@ -34,6 +34,6 @@ def complete_toml(context: click.Context, parameter: click.Parameter, incomplete
                     matches.append(f"{prefix}{entry.name}/")
                 elif entry.name.endswith(".toml"):
                     matches.append(prefix + entry.name)
-    except OSError:  # there is no such folder
+    except OSError:  # the folder does not exist
         return []
     return sorted(matches)

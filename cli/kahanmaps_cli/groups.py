@@ -1,4 +1,4 @@
-"""Groups that suggest commands for misspelt names, and click's errors in the wording of the other messages."""
+"""Command groups that suggest commands for misspelt names, and click's errors reworded like all other messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kahanmaps.errors import quoted
 
 
 class SuggestingGroup(click.Group):
-    """A group that suggests similar commands for an unknown name, and the replacement of a removed command."""
+    """A group that suggests similar commands for an unknown name, and replacements for removed commands."""
 
     removed: ClassVar[dict[str, str]] = {}  # name of a command -> what to use instead
 
@@ -26,13 +26,13 @@ class SuggestingGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def hint(self, written: str, known: list[str]) -> str:
-        """Return ' Did you mean ...?', or an empty text where no command is similar."""
+        """Return ' Did you mean ...?', or an empty text if no command is similar."""
         begin = [name for name in known if len(written) > 2 and name.startswith(f"{written}-")]
         close = begin or close_to(written, known, 0.5)
         return f" Did you mean {' or '.join(close)}?" if close else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands with their first sentences in full; click would cut them."""
+        """Write the list of commands with complete first sentences, which click would cut."""
         commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
         rows = [
             (name, command.get_short_help_str(limit=1000))
@@ -44,7 +44,7 @@ class SuggestingGroup(click.Group):
 
 
 def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Return up to three known words similar to `written`: the best one, and others nearly as similar."""
+    """Return up to three words of `known`: the word most similar to `written`, and words nearly as similar."""
     from difflib import SequenceMatcher, get_close_matches
 
     close = get_close_matches(written, known, n=3, cutoff=cutoff)
@@ -52,7 +52,7 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
     return [word for word, ratio in zip(close, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
-# (command, option) -> what to use instead of a removed option
+# removed option as (command, option) -> what to use instead
 REMOVED_OPTIONS = {
     **{
         ("report", name): "'kahanmaps batch show' shows the results of a batch, 'batch export' writes them for pandas"

@@ -1,6 +1,6 @@
 """The entry point: the lazily loaded commands, and the conversion of errors to messages and exit statuses.
 
-Exit statuses: 0 the claim holds or the work is done; 1 refuted (it has no other meaning); 2 usage error or bad input; 3
+Exit statuses: 0 the claim holds or the work is done; 1 refuted (never anything else); 2 usage error or bad input; 3
 undecided or stopped early, or the output was lost; 70 an internal error; 130 interrupted by Ctrl-C or SIGTERM.
 """
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL = 0, 1, 2, 3, 70
 
-COMPLETION = "_KAHANMAPS_COMPLETE"  # set by the shell to request completions
+COMPLETION = "_KAHANMAPS_COMPLETE"  # environment variable, set by the shell to request completions
 
 # heading -> name -> (module in kahanmaps_cli.commands, one line for the list of commands)
 SECTIONS = {
@@ -102,7 +102,7 @@ eps is half the time step throughout: h = 2 eps."""
 
 
 class LazyGroup(SuggestingGroup):
-    """A group that imports a command only when it is needed, so that --help stays light."""
+    """A group that imports a command only when it is needed, so that --help is fast."""
 
     removed: ClassVar = {
         "schema": "the keys of JSON are described in docs/cli.md",
@@ -179,7 +179,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     try:
         prepare_standard_streams()
-        if any("\0" in word for word in argv or ()):  # possible only for callers of this function
+        if any("\0" in word for word in argv or ()):  # a shell cannot pass NUL, but a Python caller can
             raise click.UsageError("found a zero byte in an argument, expected text without one")
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
         sys.stdout.flush()
@@ -197,7 +197,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt) as stop:  # click turns KeyboardInterrupt into Abort
         return _interrupted(stop.__cause__ or stop)
-    except SystemExit as stop:  # of click: 0 after a completion, 1 after a broken pipe
+    except SystemExit as stop:  # raised by click: 0 after a completion, 1 after a broken pipe
         return UNDECIDED if stop.code else HOLDS
     except BrokenPipeError:
         return UNDECIDED
@@ -208,7 +208,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             cause = cause.__cause__ or cause.__context__
         if cause is not None:
             return _interrupted(cause)
-        return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
+        return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # completion prints nothing
     finally:
         discard_unwritable_output()
 

@@ -167,7 +167,7 @@ backward_option: Callable[[F], F] = click.option(
 
 
 def integral_option(help_text: str, flag: str = "--integral", into: str = "integrals") -> Callable[[F], F]:
-    """Return the option --integral [NAME=]EXPR: pairs of a name, which may be empty, and an expression."""
+    """Return the option --integral [NAME=]EXPR, whose values are pairs of a name (may be empty) and an expression."""
     return click.option(
         flag, into, type=NameValue(name_is_optional=True), multiple=True, metavar="[NAME=]EXPR", help=help_text
     )
@@ -177,7 +177,7 @@ seconds_option: Callable[[F], F] = click.option(
     "--seconds", type=Seconds(), metavar="T", help="Stop after T seconds of wall-clock time (default: no limit)."
 )
 
-# The work limit determines the result of a search; the limit by the clock may cut it short.
+# The work limit (effort) determines the result of a search; the time limit (seconds) may stop the search earlier.
 effort_options: Callable[[F], F] = stack(
     click.option(
         "--effort",
@@ -232,7 +232,7 @@ def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, A
 
 
 def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
-    """Return eps from --eps or --time-step; None if neither is given and neither is `required`."""
+    """Return eps from --eps or --time-step; None if neither option is given and eps is not `required`."""
     if eps is not None and time_step is not None:
         raise click.UsageError("give --eps or --time-step, not both (the time step is 2 eps)")
     if time_step is not None:
@@ -243,7 +243,7 @@ def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
 
 
 def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
-    """Return eps from --eps or --time-step, required if the map depends on eps; None if it does not."""
+    """Return eps from --eps or --time-step, required if the map depends on eps; None if the map has no eps."""
     eps = requested_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
 
@@ -259,7 +259,7 @@ def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
 
 
 def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) -> tuple[str | None, str | None]:
-    """Return the first and the second system; an inline system is the first, and SYSTEM then names the second."""
+    """Return the first and the second system; if the first is inline, SYSTEM names the second."""
     if is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":
@@ -275,14 +275,14 @@ def load_pair(
     if other is None or not given:
         without_parameters = {"quiet": options.get("quiet")}
         return load_system(reference, options), None if other is None else load_system(other, without_parameters)
-    if other == "-":  # which can be read once
+    if other == "-":  # standard input can be read only once
         raise click.UsageError("-p with OTHER on standard input is ambiguous: write OTHER to a file")
     named = [
         set(given) if are_equations(other_system) else set(_loaded(other_system, {}).document.get("parameters", ()))
         for other_system in (other, *([] if reference in (None, "-") else [reference]))
     ]
     of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
-    if len(named) == 1:  # the first system is inline or on standard input: its parameters are unknown
+    if len(named) == 1:  # the first system is inline or on standard input: its parameters are not known yet
         of_first = options["parameters"]
     of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
     shared = [name for name, _ in of_second if (name, given[name]) in of_first]
@@ -353,7 +353,7 @@ def load_with_start(
 ) -> tuple[Any, Any]:
     """Load one or two systems and the initial point, which may contain parameters.
 
-    An algebraic number given by -p that is no parameter of the system is used in the initial point only.
+    An algebraic number given by -p that is not a parameter of the system is used only in the initial point.
     """
     text = options["start"]
     if not isinstance(text, str):
@@ -398,7 +398,6 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
 
 
 def _list(texts: Sequence[str]) -> list[str]:
-    """Split the values of a repeatable option at semicolons."""
     return [part.strip() for text in texts for part in text.split(";")]
 
 

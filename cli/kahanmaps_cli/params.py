@@ -15,7 +15,7 @@ from kahanmaps.errors import ExpressionError, InputError, quoted
 from kahanmaps_cli.screen.terminal import color_option
 
 if TYPE_CHECKING:
-    OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
+    OptionType = click.ParamType[Any]  # generic only in recent versions of click
 else:
     OptionType = click.ParamType
 
@@ -24,7 +24,7 @@ HELP_OPTIONS = ["-h", "--help"]
 _NAME = re.compile(r"(?<![0-9.A-Za-z_])[A-Za-z_]")
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _HINTS = {"\u2212\u2013": "write the minus sign as -", ";": "separate the numbers of a point by commas"}
-_MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # of a step number, of any other integer
+_MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # maximal number of digits of a step number, and of any other integer
 
 
 class ParameterKind(OptionType):
@@ -48,7 +48,7 @@ class ParameterKind(OptionType):
 
 
 def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
-    """Read a number or a point; the error has a hint on characters that are often used by mistake."""
+    """Read a number or a point; the error has hints about characters that are often typed by mistake."""
     try:
         return (read or lib.parse_number)(text)
     except ExpressionError as error:
@@ -63,18 +63,18 @@ Arithmetic = partial(
 
 
 def PointText(has_names: bool = False) -> ParameterKind:
-    """A point: exact numbers separated by commas; with `has_names` they may contain names."""
+    """Return the type of points: exact numbers separated by commas, which may contain names if `has_names`."""
 
     def read(text: str) -> Any:
         if has_names and _NAME.search(text):
-            return text  # names are resolved when the system is loaded
+            return text  # the names are evaluated when the system is loaded
         return _read_number(text, lib.parse_point)
 
     return ParameterKind("point", read)
 
 
 def Seconds() -> ParameterKind:
-    """A time above 0, in seconds."""
+    """Return the type of positive times in seconds."""
 
     def read(text: str) -> float:
         try:
@@ -105,7 +105,7 @@ def Steps() -> ParameterKind:
 
 
 def Shard() -> ParameterKind:
-    """I/N: the I-th of N parts."""
+    """Return the type of I/N, the I-th of N parts."""
 
     def read(text: str) -> tuple[int, ...]:
         pieces = text.partition("/")[::2]
@@ -118,7 +118,7 @@ def Shard() -> ParameterKind:
 
 
 def Section() -> ParameterKind:
-    """A section of `verify`: its number, or the name of one that the paper does not number."""
+    """Return the type of sections of `verify`: a number, or the name of a section that the paper does not number."""
 
     def read(text: str) -> int:
         name = text.strip()
@@ -132,7 +132,7 @@ def Section() -> ParameterKind:
 
 
 def ShortInteger() -> ParameterKind:
-    """An integer of bounded length, which replaces `type=int` in all commands."""
+    """Return the type of integers of bounded length, which replaces `type=int` in all commands."""
 
     def read(text: str) -> int:
         text = text.strip()
@@ -144,12 +144,12 @@ def ShortInteger() -> ParameterKind:
 
 
 def Whole(least: int = 0) -> ParameterKind:
-    """An integer that is at least `least`."""
+    """Return the type of integers that are at least `least`."""
 
     def read(text: str) -> int:
         text = _without_exponent(text.strip())
         digits = text.removeprefix("-").removeprefix("+")
-        # Python's own limit on digits would raise another error.
+        # Python's limit on digits would raise another error.
         if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
             raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
         return int(text)
@@ -158,11 +158,11 @@ def Whole(least: int = 0) -> ParameterKind:
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
-    """NAME=VALUE; with `name_is_optional` a text without a name is the value."""
+    """Return the type of NAME=VALUE; with `name_is_optional` a text without a name is the value."""
 
     def read(text: str) -> tuple[str, str]:
         name, equals, value = (piece.strip() for piece in text.partition("="))
-        if name_is_optional and "," in name:  # a formula without a name, followed by definitions of letters
+        if name_is_optional and "," in name:  # the text is a formula without a name, followed by definitions of letters
             return "", text.strip()
         if equals and name and value and name.isprintable():
             return name, value
@@ -197,16 +197,14 @@ def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -
     return args
 
 
-@cache  # apply the rules to a command once
+@cache  # the rules must be applied to a command only once
 def with_common_rules(command: click.Command) -> click.Command:
-    """Apply the rules of all commands to a command and its subcommands.
-
-    They have --color, integers of bounded length for `type=int`, and refuse an option with one value given twice.
-    """
+    """Give a command and its subcommands --color and integers of bounded length; refuse options given twice."""
     parse_args = command.parse_args
-    # click has no hook for it
+    # click has no hook for this check
     command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
-    # click copies the help option from the context of its first use, which may not be that of the group.
+    # click copies the help option from the context in which it is first used, which need not be the context of the
+    # group.
     command.context_settings.setdefault("help_option_names", HELP_OPTIONS)
     for parameter in command.params:
         if parameter.type is click.INT:

@@ -1,4 +1,4 @@
-"""Interrupts: the first Ctrl-C or SIGTERM ends long work with valid output, the next one ends it at once."""
+"""Interrupts: the first Ctrl-C or SIGTERM ends long work with valid output, the second ends the process at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 INTERRUPTED = 130  # the exit status
-_REPEAT_SECONDS = 1.0  # of CPU time
+_REPEAT_SECONDS = 1.0  # CPU time between repeated interrupts
 
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
@@ -17,7 +17,7 @@ def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
 
     Python runs a handler only after the current call into C returns, and a call of FLINT with long numbers may take
     minutes. So the handler is installed with System V semantics: the disposition is reset to the default when the
-    first signal arrives. Where the C library lacks sysv_signal, a second signal waits as well.
+    first signal arrives. If the C library has no sysv_signal, a second signal also waits for the call to return.
     """
     previous = signal.signal(number, handler)
     C = ctypes.CDLL(None)
@@ -31,7 +31,7 @@ def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
 def raise_interrupt(signum: int, frame: Any) -> None:
     """Raise KeyboardInterrupt, and again after each second of CPU time until `end_interrupts` is called.
 
-    An exception may be lost: Python turns one that is raised while a class is created into a RuntimeError, which an
+    An exception may be lost: if it is raised while a class is created, Python turns it into a RuntimeError, which an
     `except Exception` around an import (in matplotlib, of three-dimensional axes) takes for a missing library.
     """
     signal.signal(signal.SIGVTALRM, signal.default_int_handler)
@@ -40,7 +40,7 @@ def raise_interrupt(signum: int, frame: Any) -> None:
 
 
 def end_interrupts() -> None:
-    """Stop raising KeyboardInterrupt: to be called where it has been caught."""
+    """Stop raising KeyboardInterrupt; call this function after catching it."""
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
 

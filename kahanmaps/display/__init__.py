@@ -1,1 +1,1 @@
-"""Display of values as LaTeX, HTML and lines of text: a file for the values of each folder, or of several."""
+"""Display of values as LaTeX, HTML and lines of text; each file displays the values of one or more packages."""

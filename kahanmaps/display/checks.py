@@ -1,6 +1,6 @@
-"""Claims and verdicts as text and as HTML for notebooks and pages; no information is carried by color alone.
+"""Claims and verdicts as text and as HTML for notebooks and pages; no information is given by color alone.
 
-The text of a report is the output of a command in a pipe and of `print`: lines that start with a word and a tab.
+`print` shows a report as the same text as its command in a pipe: lines that start with a word and a tab.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_record_suffix
 
-_MAX_CLAIMS = 30  # in a notebook
-_MAX_TEXT = 400  # characters
+_MAX_CLAIMS = 30  # displayed in a notebook
+_MAX_TEXT = 400  # characters of a displayed sentence
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ html_form.register(Certainty, markup.verdict)
 
 
 def verdict_html(finding: Finding) -> str:
-    """Return the verdict of a finding; that of a control says whether it is as expected."""
+    """Return the verdict of a finding; for a control it says whether the verdict is as expected."""
     word = markup.verdict(finding.verdict)
     if finding.place.get("misprint"):
         return f"{word} as printed"
@@ -85,7 +85,7 @@ def counts(findings: Iterable[Finding]) -> str:
 
 
 def eps_sentence(report: Report) -> str:
-    """Return a sentence on the eps for which the report holds, with the time step."""
+    """Return a sentence that states the eps for which the report holds, and the time step."""
     context = report.context
     if "eps" not in context:
         return ""
@@ -94,7 +94,7 @@ def eps_sentence(report: Report) -> str:
 
 
 def ending_sentence(report: Report) -> str:
-    """Return a sentence on why a requested orbit ended early; empty if none did."""
+    """Return a sentence that says why a requested orbit ended early; empty if no orbit ended early."""
     if not report.ended_early:
         return ""
     return f"The requested orbit ended early: {report.context.get('orbit', {}).get('message', 'no reason given')}."
@@ -107,7 +107,7 @@ def systems_sentence(report: Report) -> str:
 
 @html_form.register
 def report_html(report: Report) -> str:
-    """Return the findings of a check as a table; of many claims, counts by section and those that are not proved."""
+    """Return the findings of a check as a table; for many claims, counts by section and the unproved claims only."""
     title = f"{report.check}: {systems_sentence(report)}"
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_text(counts(report.findings))})</p>"]
     chosen = list(report.findings)
@@ -130,7 +130,7 @@ def report_html(report: Report) -> str:
 
 
 def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
-    """Group the findings of `verify` by the titles of their sections; those of other checks have an empty title."""
+    """Group the findings of `verify` by the titles of their sections; findings of other checks have an empty title."""
     by_section: dict[str, list[Finding]] = {}
     for finding in findings:
         number, title = finding.place.get("section"), str(finding.place.get("section_title", ""))
@@ -191,7 +191,7 @@ def verdict_text(finding: Finding) -> str:
 
 
 def details(finding: Finding, printed: set[str], width: int | None = None) -> list[str]:
-    """Return the lines below a claim; `printed` are the hypotheses that were printed before."""
+    """Return the lines that follow a claim; `printed` are the hypotheses that were printed before."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
@@ -203,7 +203,7 @@ def details(finding: Finding, printed: set[str], width: int | None = None) -> li
 
 
 def summary(evidence: Evidence, printed: set[str] | None = None) -> str:
-    """Return the evidence as a sentence; each hypothesis is printed once per report, and `printed` collects them."""
+    """Return the evidence as a sentence; hypotheses in `printed` are omitted, and new hypotheses are added to it."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary

@@ -15,7 +15,7 @@ def store_html(store: Store) -> str:
     """Return the progress of each experiment as a table."""
     try:
         status = store.status()
-    except StoreError as error:  # closed
+    except StoreError as error:  # the store is closed
         return markup.titled("database of results", f"<p>{markup.escape(error)}</p>")
     rows = [
         (

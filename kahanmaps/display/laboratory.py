@@ -1,7 +1,7 @@
-"""The display of results of the laboratory: the lines that commands and `print` show, and a table in notebooks.
+"""Display of results of the laboratory: as lines in commands and `print`, as a table in notebooks.
 
-`lines_of` gives the lines of a result, as cells. `print` separates cells by tabs; a notebook shows them as a table of
-bounded size, with typeset formulas and marked verdicts. Nothing is computed again.
+`lines_of` returns the lines of a result, each a sequence of cells. `print` separates cells by tabs; a notebook shows a
+table of bounded size, with typeset formulas and colored verdicts. Displaying a result computes nothing.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from kahanmaps.maps.convention import eps_record, eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_ROWS = 60  # of a table in a notebook
+_ROWS = 60  # maximal number of rows of a table in a notebook
 _TEXT = 300
 _LENGTHS_SHOWN = 12
 WORDS = (
@@ -59,7 +59,7 @@ class HtmlCell:
         return self.text
 
 
-Line = Sequence[object]  # cells: `HtmlCell`, or anything with a text by str()
+Line = Sequence[object]  # its cells: `HtmlCell`, or objects that str() converts to text
 
 
 def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> HtmlCell:
@@ -86,18 +86,18 @@ def _found_tensor(result: FoundTensor | IntegralInIterates) -> str:
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
-    """The eps of a result, with the time step, as a phrase; empty for a map that does not depend on eps."""
+    """Return a phrase with the eps of a result and the time step; empty if the map does not depend on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
 
 @singledispatch
 def lines_of(result: object) -> Iterator[Line]:
-    """The lines of a result, as its command prints them below the heading."""
+    """Yield the lines of a result that its command prints after the heading."""
     raise TypeError(f"no display is registered for {type(result).__name__}")
 
 
 def result_text(result: object) -> str:
-    """The lines of a result, with cells separated by tabs."""
+    """Return the lines of a result as text, with cells separated by tabs."""
     return "\n".join("\t".join(map(str, line)) for line in lines_of(result))
 
 
@@ -126,7 +126,7 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 
 def analysis_title(analysis: Analysis) -> str:
-    """The title of a report: the system, its dimension and parameters, and eps."""
+    """Return the title of a report: the system, its dimension and parameters, and eps."""
     eps_text = eps_suffix(analysis.eps, analysis.file.map)
     values = "".join(f", {name} = {value}" for name, value in analysis.file.parameters.items())
     formulas = f"; formulas for every {', '.join(analysis.symbols)}" if analysis.symbols else ""
@@ -134,7 +134,7 @@ def analysis_title(analysis: Analysis) -> str:
 
 
 def analysis_head(analysis: Analysis) -> str:
-    """The head of the report: the title, the equations, and the meaning of the words."""
+    """Return the head of the report: the title, the equations, and explanations of the words for verdicts."""
     return f"analyze: {analysis_title(analysis)}\n{analysis.file.map}\n{WORDS}"
 
 
@@ -176,7 +176,7 @@ def _integrals(search: IntegralSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _densities(search: DensitySearch) -> Iterator[Line]:
-    """Yield the formula with its verdict and evidence, then further densities, or the reason why there is none."""
+    """Yield a density with its verdict and evidence, then further densities, or the reason why there is no density."""
     return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
@@ -239,7 +239,7 @@ def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
 
 @lines_of.register
 def _heights(survey: HeightSurvey) -> Iterator[Line]:
-    """A line for each orbit, and the conclusion from all of them."""
+    """Yield a line for each orbit, and the conclusion from all orbits."""
     for orbit in survey.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
         yield "orbit", *([f"eps {orbit.eps}"] if survey.has_eps else []), f"start {point}", orbit.growth.text
@@ -248,7 +248,7 @@ def _heights(survey: HeightSurvey) -> Iterator[Line]:
 
 @lines_of.register
 def _census(census: Census) -> Iterator[Line]:
-    """The counts, and the longest cycles."""
+    """Yield the counts of cycles, and the longest cycles."""
     if not census.examined:
         yield "points", census.points
         yield "stopped", "time limit, before the images of all points were known"
@@ -272,7 +272,7 @@ def _census(census: Census) -> Iterator[Line]:
 
 @lines_of.register
 def _singularities(run: SingularityRun) -> Iterator[Line]:
-    """The denominator, and each exceptional hypersurface with its outcome."""
+    """Yield the denominator of the map, and each exceptional hypersurface with its singularity pattern or outcome."""
     yield (f"# map of degree {run.map_degree}, {run.text}",)
     if run.word is not None:
         yield (f"# {run.word.text}",)
@@ -301,7 +301,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 @lines_of.register
 def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
-    """One-parameter groups, a scaling, the finite group by its generators, and the completed searches."""
+    """Yield one-parameter groups, a scaling, generators of the finite group, and the completed searches."""
     for x in symmetries.infinitesimal:
         kind = "linear" if x.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(x.rhs)})"
@@ -357,7 +357,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
-    """Yield a system as options of a command, and B if g = B f; in a notebook, its equations."""
+    """Return g as options of a command, with B if g = B f; a notebook shows the equations of g."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:
@@ -372,12 +372,12 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 
 
 def _about(what: str, result: Any, *subtitle: str) -> tuple[str, str]:
-    """A title with the name of the system, and a subtitle that ends with eps."""
+    """Return a title that contains the name of the system, and a subtitle that ends with eps."""
     parts = (*subtitle, eps_sentence(result.eps, result.file.map))
     return f"{what} of {markup.shortened(result.file.name)}", "; ".join(filter(None, parts))
 
 
-# Titles and subtitles of the results that are displayed by their lines.
+# Titles and subtitles of the results that are displayed as lines.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
     IntegralSearch: lambda result: _about("integrals", result, f"{result.formula_count} found; {result.count_text}"),
     DensitySearch: lambda result: _about("densities", result, "dx/phi is invariant"),

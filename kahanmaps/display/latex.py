@@ -3,11 +3,11 @@ r"""Names, polynomials and rational functions as LaTeX, and as formulas in HTML.
     x1 -> x_1    x12 -> x_{12}    eps -> \varepsilon    alpha2 -> \alpha_2    al -> al    my_H -> \mathrm{my\_H}
     x1~ -> \tilde{x_1}
 
-The text is for math mode. Factors are separated by spaces, so that formulas can be parsed again. In HTML a formula is
-enclosed in \( and \), which notebooks typeset; pages convert it to MathML.
+The LaTeX is for math mode. Factors are separated by spaces, so that formulas can be parsed again. In HTML a formula is
+enclosed in \( and \); notebooks typeset it, and pages convert it to MathML.
 
-Neither MathJax nor MathML breaks lines. So a long formula is a <span class="formula"> with one piece for each term,
-between which the browser wraps; a long quotient is written with a slash.
+Neither MathJax nor MathML breaks lines. Hence a long formula is a <span class="formula"> with one element for each
+term, and the browser breaks lines between elements; a long quotient is written with a slash.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from kahanmaps.display.markup import escape
 from kahanmaps.display_protocols import latex_form
 from kahanmaps.errors import InputError, counted
 
-# TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
+# TeX has no commands for Greek letters that look Latin, such as omicron and capital Alpha.
 GREEK_NAMES = (
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
@@ -40,17 +40,17 @@ _ESCAPES = {
 
 
 def latex_name(name: str) -> str:
-    r"""Return a name as LaTeX: final digits become an index, and eps and Greek names Greek letters.
+    r"""Return a name as LaTeX: final digits become an index; eps and names of Greek letters become these letters.
 
-    A name other than letters followed by digits is set upright, with TeX's special characters escaped. Different names
-    give different text. Raises InputError for text that is empty or not printable.
+    A name that is not of the form letters, digits is set upright, with TeX's special characters escaped. Different
+    names give different text. Raises InputError for text that is empty or not printable.
 
     >>> print(latex_name("x1"), latex_name("eps"), latex_name("Gamma12"), latex_name("al"), latex_name("modified_H"))
     x_1 \varepsilon \Gamma_{12} al \mathrm{modified\_H}
     """
     if not name or not name.isprintable():
         raise InputError(f"found the name {name[:40]!r}, expected printable text")
-    bare = name.rstrip("~")  # x~ is the image of x, x~~ that of x~
+    bare = name.rstrip("~")  # x~ is the image of x, x~~ the image of x~
     if bare and bare != name:
         return r"\tilde{" + latex_name(name[:-1]) + "}"
     match = _WITH_INDEX.fullmatch(name)
@@ -87,7 +87,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
 
 @latex_form.register
 def latex_rational_function(function: RationalFunction) -> str:
-    r"""Return a rational function over Q as LaTeX, without nested fractions, factored where this is shorter.
+    r"""Return a rational function over Q as LaTeX, without nested fractions, and factored if this is shorter.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
@@ -99,7 +99,7 @@ def latex_rational_function(function: RationalFunction) -> str:
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
-    r"""Return a polynomial as LaTeX; beyond about this number of characters, its beginning and number of terms.
+    r"""Return a polynomial as LaTeX; if it exceeds about `characters`, return its beginning and its number of terms.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
@@ -155,7 +155,7 @@ LATEX = Notation(
 )
 
 
-# A formula with at most this number of characters of plain text is not broken: it fits on a phone.
+# A formula with at most this number of characters as plain text fits on a phone, and is not broken.
 _ONE_PIECE = 32
 _FLAT = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
 
@@ -185,12 +185,12 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
         name = latex_name(left) if left == "'" or not left.endswith("'") else f"{latex_name(left[:-1])}'"
         text = f"{name} = {text}"
     if r"\frac" in text and not is_long:
-        text = rf"\displaystyle {text}"  # without it a fraction within a line has the small letters of an index
+        text = rf"\displaystyle {text}"  # without it, a fraction in a line of text is set in small type
     return typeset(text, is_long)
 
 
 def typeset(latex: str, is_long: bool = True) -> str:
-    r"""Return a formula in LaTeX as HTML, with one piece for each term where it `is_long`.
+    r"""Convert a formula in LaTeX to HTML; if `is_long`, each term is an element of its own.
 
     >>> print(typeset(r"\frac{x + 1}{2} - y = 0"))
     <span class="formula">\(\frac{x + 1}{2}\) \({}- y = 0\)</span>
@@ -199,7 +199,7 @@ def typeset(latex: str, is_long: bool = True) -> str:
     flat = latex.replace(r"\left(", "(").replace(r"\right)", ")")
     for word in flat.split(" ") if is_long else [flat]:
         if word in ("+", "-") and depth == 0 and pieces[-1]:
-            pieces.append(f"{{}}{word}")  # an empty group before a sign gives it the spaces that it has between terms
+            pieces.append(f"{{}}{word}")  # the empty group makes the sign a binary operator, with spaces
         else:
             pieces[-1] += f" {word}" if pieces[-1] else word
         depth += word.count("{") - word.count("}")
@@ -208,7 +208,7 @@ def typeset(latex: str, is_long: bool = True) -> str:
 
 
 def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: int | None = None) -> str:
-    """Return the equations x' = f(x) as HTML on separate lines, which wrap and are cut after `characters` each."""
+    """Return the equations x' = f(x) as HTML, each on a line that wraps and is cut after `characters` characters."""
     lines = (formula(f, f"{name}'", characters) for name, f in zip(variables, rhs, strict=True))
     return "<br/>\n".join(lines)
 

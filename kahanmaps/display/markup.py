@@ -1,7 +1,7 @@
 """HTML elements shared by notebooks and reports, as well-formed XML with reproducible bytes.
 
-They set neither background nor font, so that they fit into light and dark pages. Words such as *proved* have a symbol
-besides their color, so that they can be distinguished without colors.
+The elements set neither background nor font, so that they fit into light and dark pages. Verdicts such as *proved* have
+a symbol and a color, so that they can be distinguished without colors.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from kahanmaps.errors import counted, printable
 from kahanmaps.maps.convention import eps_record_suffix
 
-# A symbol, and a color to be mixed with that of the text; the contrast is above 4.5 : 1 on white and on near black.
+# A symbol, and a color that is mixed with the text color; the contrast exceeds 4.5 : 1 on white and on near-black.
 WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
@@ -27,11 +27,11 @@ WORDS = {
 }
 _LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
 _OPEN_ROWS = 12
-_SHORTENED = 60  # characters of a number or a name
+_SHORTENED = 60  # maximal number of characters of a displayed number or name
 
 
 def escape(text: object) -> str:
-    """Escape text for HTML; characters that XML forbids, such as control characters, are written as escapes.
+    """Escape text for HTML; characters that XML forbids, such as control characters, become \\xNN escapes.
 
     >>> escape('<b title="x">&')
     '&lt;b title=&quot;x&quot;&gt;&amp;'
@@ -64,7 +64,7 @@ def code(text: object) -> str:
 
 
 def shortened(text: object, width: int = _SHORTENED) -> str:
-    """Shorten a text that is longer than `width` to its two ends and its length, without escaping it.
+    """Shorten a text that is longer than `width` to its beginning, its end and its length, without escaping it.
 
     >>> shortened("1" * 100, 20)
     '11111111…11111111 (100 characters)'
@@ -87,7 +87,7 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table; `head` and `caption` are text, cells are HTML. The last cell of a short row spans the others.
+    """Return a table; `head` and `caption` are text, cells are HTML. The last cell of a short row fills the row.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
@@ -108,7 +108,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
 
 
 def folded(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Return a table of which only the first 12 rows are shown before a click on the number of the others.
+    """Return a table that shows the first 12 rows; a click on the number of further rows shows all.
 
     >>> print(folded([["a"]]) == table((), [["a"]]), folded([["a"]] * 15).count("<summary>3 more lines</summary>"))
     True 1
@@ -121,7 +121,7 @@ def folded(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
-    """Return a table of two columns: a word as text, and its value as HTML."""
+    """Return a table of two columns: a word (text) and its value (HTML)."""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
         f"<td {_LEFT}>{what}</td></tr>"
@@ -131,7 +131,7 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def listed(entries: Iterable[str]) -> str:
-    """Return a list of entries that are HTML."""
+    """Return an HTML list of entries, which are HTML."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
 
 

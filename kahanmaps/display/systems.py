@@ -1,6 +1,6 @@
 """Systems, members, maps and orbits as HTML and LaTeX for notebooks, bounded in size.
 
-Nothing is computed that was not computed before.
+Displaying a value computes nothing new.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-CHARACTERS = 300  # of one formula, about
+CHARACTERS = 300  # approximate limit for the length of one formula
 _TEXT = 200
 _EQUATIONS = 12
 
@@ -48,7 +48,7 @@ def system_latex(system: QuadraticSystem) -> str:
     """Return the equations x' = f(x)."""
     names = [rf"\dot{{{latex_name(name)}}}" for name in system.variables]
     rows = [(x, latex_cut(f, CHARACTERS)) for x, f in zip(names, system.rhs[: _EQUATIONS + 1], strict=False)]
-    rows += [(x, "") for x in names[len(rows) :]]  # only counted
+    rows += [(x, "") for x in names[len(rows) :]]  # these rows are only counted
     return latex_aligned(rows, _EQUATIONS)
 
 
@@ -66,14 +66,14 @@ def file_latex(file: SystemFile) -> str:
 
 
 def map_html(map_: MapFamily) -> str:
-    """Return the equations of the vector field of a Kahan map, or those of another map."""
+    """Return the equations of the vector field of a Kahan map, or the equations of another map."""
     if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
     return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
 
 
 def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:
-    """Return at most `most` equations as HTML, each cut after about this number of characters."""
+    """Return at most `most` equations as HTML, each cut after about `characters` characters."""
     shown = equations(system.variables[:most], system.rhs[:most], characters)
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
 
@@ -206,7 +206,6 @@ def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
 
 
 def _plain(text: object) -> str:
-    """Return a number or field as the argument of \\text{...}."""
     return str(text).replace("_", r"\_")
 
 
@@ -230,7 +229,7 @@ def orbit_html(orbit: Orbit) -> str:
         status = "no point computed yet: iterate over it"
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
-    eps, flow = orbit.map.eps, orbit.map.flow  # None where maps at several eps, of several fields were composed
+    eps, flow = orbit.map.eps, orbit.map.flow  # None for compositions of maps with different eps or vector fields
     at_eps = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
     at_eps += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
     title = f"orbit{direction},{at_eps} over {field}"
@@ -239,7 +238,7 @@ def orbit_html(orbit: Orbit) -> str:
 
 @html_form.register
 def trajectory_html(orbit: Trajectory) -> str:
-    """Return the first points, and the last one if all points are known."""
+    """Return the first points, and the last point if all points were stored."""
     computed = vars(orbit).get("points")
     points_shown = orbit.preview(_POINTS) if computed is None else [*computed[:_POINTS], *computed[_POINTS:][-1:]]
     variables = orbit.variables
@@ -265,7 +264,7 @@ def _cells(point: OrbitPoint, count: int) -> list[str]:
 
 @html_form.register
 def period_html(period: OrbitPeriod) -> str:
-    """Return the period of an orbit and those in its planes."""
+    """Return the period of an orbit and the periods in its planes."""
     sentence, *planes = period.text.split("\n")
     inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
     return markup.titled(markup.shortened(sentence, 200), inside)
@@ -273,7 +272,7 @@ def period_html(period: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(period: OrbitPeriod) -> str:
-    """Return the period, the periods in the planes, and whether the orbit meets a pole."""
+    """Return the period, the periods in the planes, and whether the orbit reaches a pole."""
     lines = [f"period\t{_period_word(period)}"]
     for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]

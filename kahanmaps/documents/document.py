@@ -1,4 +1,4 @@
-"""Reading a system file: a document of plain data becomes systems, members and claims, or a list of mistakes.
+"""Conversion of a document (plain data of a system file) to systems, members and claims, or a list of mistakes.
 
 Every part is read as far as possible, so that all mistakes of a file are reported together, each with its key.
 """
@@ -37,20 +37,20 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _LONGEST_NAME = 1000
-_MAX_FACTORS = 64  # of a composition, those of its parts counted too
-_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number where a rational one reveals the same mistakes
+_MAX_FACTORS = 64  # maximal number of maps in a composition, including maps of its parts
+_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number if a rational number reveals the same mistakes
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
-    """Return the Kahan map of right-hand sides in the variables, symbols and eps (which must not occur)."""
+    """Return the Kahan map of right-hand sides (in the ring of variables, symbols and eps, but without eps)."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
         return KahanFamily(QuadraticSystem(tuple(rhs), symbols))
     return KahanFamily(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
 
 
-# For each method: the function that makes a map of right-hand sides (polynomials in the variables, the symbols, then
-# eps) and their degree, the default of the degree, and its largest value.
+# For each method: the function that constructs a map from right-hand sides (polynomials in the variables, the symbols,
+# then eps) and their degree, the default of the degree, and its largest value.
 _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamily], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
@@ -61,7 +61,7 @@ Values = dict[str, RationalFunction]
 
 
 class _Part(NamedTuple):
-    """A map of a composition, its power, the values of its symbols, and the entry with the map as a table."""
+    """A map of a composition, its exponent, the values of its symbols, and its entry written as a table."""
 
     map: MapFamily
     power: int
@@ -70,7 +70,7 @@ class _Part(NamedTuple):
 
 
 class DocumentReader(PartReader):
-    """Reads a document in one pass: every part as far as possible, collecting mistakes."""
+    """Reads a document: every part as far as possible, while collecting mistakes. Each reader is used once."""
 
     def read(self) -> dict[str, Any]:
         """Return the fields of a `SystemFile`. Raises SystemFileError with all mistakes of the document."""
@@ -90,7 +90,7 @@ class DocumentReader(PartReader):
         stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
         name = self.document.get("name", "".join(c if c.isprintable() else "_" for c in stem))
         if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
-            # The name is in the first line of many outputs: it may contain no line ends and no escape sequences.
+            # The name occurs in the first line of many outputs: it must not contain line ends or escape sequences.
             self._mistake(
                 "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
             )
@@ -117,7 +117,7 @@ class DocumentReader(PartReader):
             read_structured_facts(catalog, self.variables, self._mistake)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        # The document, with its name and the values of the parameters in use; long integers are text, as JSON needs it.
+        # The document, with the name and the current parameter values; long integers are text, as JSON requires.
         document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": name, **document}
         if self.parameters:
@@ -175,13 +175,13 @@ class DocumentReader(PartReader):
                     return parsed_map
 
                 map_ = AlgebraicMap(map_, root, at_number)
-            self.variables = map_.variables  # a polarised map has more of them
+            self.variables = map_.variables  # a polarised map has more variables than its system
             for clash in set(self.variables) & set(self.parameters):
                 self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
         return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
-        """Return the map of the document with these parameters as symbols. Raises InputError for a [family]."""
+        """Return the map of the document with the parameters `symbols` symbolic. Raises InputError for a [family]."""
         if kind == "family":
             raise InputError(
                 f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
@@ -233,7 +233,7 @@ class DocumentReader(PartReader):
                 written = "\nan algebraic number is written: root of t^2 - 2"
                 hint = written if isinstance(given, str) and "sqrt" in given else ""
                 self._mistake(path, f"{error}{hint}")
-                self.parameters[name] = fmpq(1)  # or each use of the parameter would be reported as a further mistake
+                self.parameters[name] = fmpq(1)  # so that its uses are not reported as further mistakes
                 self.has_bad_parameter = True
         if self.root is not None:
             self.symbols = (self.root[0],)
@@ -253,7 +253,7 @@ class DocumentReader(PartReader):
                     from kahanmaps.family.cubics import default_variables
 
                     self.variables = default_variables(len(A))
-            elif kind != "composition":  # which has the variables of its first map
+            elif kind != "composition":  # a composition has the variables of its first map
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
         if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
@@ -335,7 +335,7 @@ class DocumentReader(PartReader):
         return self._checked_map(explicit_map, "map", self.variables, image, inverse)
 
     def _checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
-        """Return the map if it is defined and dominant, and a given inverse is correct; otherwise note a mistake."""
+        """Return the map if it is defined and dominant and a given inverse is correct; if not, note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None
@@ -364,7 +364,7 @@ class DocumentReader(PartReader):
         return None if H is None else hamiltonian
 
     def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """Return the Kahan map of J grad H, where both may contain symbols."""
+        """Return the Kahan map of J grad H, where J and H may contain symbols."""
         H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [
@@ -402,7 +402,7 @@ class DocumentReader(PartReader):
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 
     def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """Read a composition; parts given by name are replaced by their contents, so the document is self-contained."""
+        """Read a composition; parts given by name are replaced by their content: the document is self-contained."""
         entries = self._required("composition", section, "of")
         if not isinstance(entries, list) or not entries:
             if entries is not None:
@@ -464,9 +464,9 @@ class DocumentReader(PartReader):
         return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
 
     def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
-        """Return the values that a composition gives to the parameters of one of its maps.
+        """Return the values that a composition assigns to the parameters of one of its maps.
 
-        The first result has the rational numbers, the second one the functions of the symbols.
+        The first dict contains the values that are rational numbers, the second one the functions of symbols.
         """
         numbers: dict[str, fmpq] = {}
         values: Values = {}
@@ -475,7 +475,7 @@ class DocumentReader(PartReader):
             self._mistake(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
-        if isinstance(table, dict) and "parameters" not in table:  # it can use the parameters of this file
+        if isinstance(table, dict) and "parameters" not in table:  # the map can use the parameters of this file
             context = ring(self.symbols)
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
@@ -506,7 +506,7 @@ class DocumentReader(PartReader):
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
-            # A table without own parameters has those of the file that contains it.
+            # A table without its own parameters has the parameters of the file that contains it.
             outer = {name: format_number(number) for name, number in self.parameters.items()}
             document = {"parameters": {**outer, **dict.fromkeys(self.symbols, 1)}, **value}
         elif not isinstance(value, str):

@@ -1,11 +1,11 @@
 """Conversion of differential equations in common notations to the right-hand sides of a system file.
 
-A text is a list of equations separated by ; or , or line breaks, perhaps in one pair of brackets. The left side is a
-derivative, the right side a formula, in which x(t) means x:
+A text is a list of equations separated by ; or , or line breaks, which may be enclosed in brackets. The left side of an
+equation is a derivative, the right side a formula, in which x(t) means x:
 
     x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
 
-The text is cut into tokens once and never evaluated; formulas are read by `kahanmaps.algebra.parsing`.
+The text is split into tokens and never evaluated; `kahanmaps.algebra.parsing` reads the formulas.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from kahanmaps.errors import InputError, quoted
 MAX_CHARACTERS = 2_000_000  # of all equations together
 _OPEN, _CLOSE = ("(", "[", "{"), (")", "]", "}")
 _EQUALS = ("=", "==", ":=")
-# Decomposed, a dot above a letter is a character of its own; two dots, and a double quote, are two primes.
+# In decomposed Unicode a dot above a letter is a separate character; two dots or a double quote mean two primes.
 _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "″": 2, '"': 2, "\u0308": 2, "‴": 3}
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
-_MAX_TOKENS = 16  # of a derivative other than by primes
+_MAX_TOKENS = 16  # maximal number of tokens of a derivative written without primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
-# Derivatives, with blanks only between two words, and their order. (They are compiled when equations are read.)
+# Patterns of derivatives (with blanks only between two words) and the order. They are compiled when they are needed.
 _WRITTEN = (
     (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
     (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
@@ -47,15 +47,15 @@ _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 class _Derivative(NamedTuple):
     name: str
     order: int
-    end: int  # index of the token after it
+    end: int  # index of the token after the derivative
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Replace equations in [system] by a list of right-hand sides and the variables.
 
-    If the variables are not given, they are in the order of their equations; velocities of equations of second order
-    come last. Other documents are returned unchanged. The notes list new names. Raises InputError for a text that is
-    not an equation, and for equations of other variables than those given.
+    If the variables are not given, they are ordered as their equations; velocities of equations of second order come
+    last. A document without equations is returned unchanged. The second result is a list of notes on new names. Raises
+    InputError for a text that is not an equation, and for an equation of a variable that is not among the given ones.
 
     >>> without_left_sides({"system": {"rhs": "x' = x*y, dy/dt = -x"}})
     ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
@@ -88,7 +88,7 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
 
 
 def tokens_of(text: str) -> list[str]:
-    """Split a text into tokens, including blanks. Raises InputError if it is too long."""
+    """Split a text into tokens, including blanks. Raises InputError if the text is too long."""
     if len(text) > MAX_CHARACTERS:
         raise InputError(f"found equations of {len(text)} characters, expected at most {MAX_CHARACTERS}")
     decomposed = text if text.isascii() else unicodedata.normalize("NFD", text)
@@ -96,7 +96,7 @@ def tokens_of(text: str) -> list[str]:
 
 
 def pieces_of(text: str) -> list[list[str]]:
-    """Return the tokens of each equation or formula of a list. Raises InputError for unbalanced brackets."""
+    """Return the tokens of each equation or formula in a list. Raises InputError for unbalanced brackets."""
     tokens = _without_outer_brackets(_list_in(tokens_of(text)))
     pieces: list[list[str]] = [[]]
     depth = 0
@@ -150,11 +150,11 @@ def read_equations(
 
     Args:
         pieces: the tokens of each equation.
-        variables: the names of the variables and of the velocities of equations of second order, if they are given.
-        parameters: names that are taken.
+        variables: the names of the variables and of the velocities of equations of second order; by default new names.
+        parameters: the names of parameters, which velocities must not have.
 
     Returns:
-        The right-hand sides by variable, in the order of the equations, then those of the velocities; the names of the
+        The right-hand sides by variable, in the order of the equations, the velocities last; the names of the
         velocities; and sentences on new names.
 
     Raises:
@@ -190,7 +190,7 @@ def read_equations(
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """Return the derivative that begins at a token (x', dx/dt, x_dot, diff(x(t), t)), or None."""
+    """Return the derivative (x', dx/dt, x_dot, diff(x(t), t)) that begins at a token; None if there is none."""
     first = tokens[start] if start < len(tokens) else ""
     if not is_name(first):
         return None
@@ -200,7 +200,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
         order, end = order + _PRIMES[tokens[end]], end + 1
     if order:
         return _Derivative(first, order, _argument(tokens, end))
-    text, last, ends = "", "", dict[int, int]()  # the length of the text up to a token -> the place of the next token
+    text, last, ends = "", "", dict[int, int]()  # length of the text up to a token -> index of the next token
     for position, token in enumerate(tokens[start : start + _MAX_TOKENS], start + 1):
         is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
         text, last = f"{text}{' ' * is_apart}{token}", token
@@ -213,14 +213,14 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
 
 
 def _argument(tokens: Sequence[str], position: int) -> int:
-    """Return the position after (t) or [t], if it is there, otherwise the same position."""
+    """Return the position after (t) or [t]; without such an argument, return `position`."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
 def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
     """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
     tokens_kept = [token for token in tokens if not token.isspace()]
-    gaps, blank = list[str](), ""  # the blanks before each word: "x y" must not become "xy"
+    gaps, blank = list[str](), ""  # keep the blank before a word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
             blank = " "
@@ -231,7 +231,7 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
     k = 0
     while k < len(tokens_kept):
         derivative = derivative_at(tokens_kept, k)
-        # x_dot is the derivative of x, but for a variable that is itself called x_dot.
+        # x_dot is the derivative of x unless a variable is called x_dot.
         if (
             derivative
             and derivative.name in orders
@@ -251,7 +251,7 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
 
 
 def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
-    """Return the velocity of each variable with an equation of second order: a given name, or vx for x."""
+    """Return the name of the velocity of each variable with an equation of second order: a given name, or vx for x."""
     second_order = [name for name, order in orders.items() if order == 2]
     extra_names = [name for name in variables if name not in orders]
     if len(extra_names) == len(second_order):
@@ -289,7 +289,7 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
-    """Return a hint at what to type instead of an unsupported statement."""
+    """Return a hint that says what to type instead of an unsupported statement."""
     if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
         name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
         name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"

@@ -15,8 +15,8 @@ _NUMBERS = (int, float, complex)
 def formula_text(value: Any) -> str:
     """Convert a right-hand side or a claim to text, exactly.
 
-    Raises InexactNumber for floats, also inside expressions of SymPy, where Python evaluates 1/3*x with a float;
-    InputError for irrational numbers in such expressions.
+    Raises InexactNumber for floats, also inside SymPy expressions (Python evaluates 1/3 in 1/3*x to a float). Raises
+    InputError for irrational numbers in SymPy expressions.
 
     >>> formula_text("x*y"), formula_text(2)
     ('x*y', '2')
@@ -36,7 +36,7 @@ def formula_text(value: Any) -> str:
 
 
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
-    """Replace the irrational number in SymPy expressions by a name, if there is exactly one; return its value too."""
+    """Replace the irrational number in SymPy expressions by a name, if there is exactly one; also return its value."""
     from_sympy = [side for side in sides if _is_sympy(side)]
     irrational_numbers = {part for side in from_sympy for part in _irrational(side)}
     if len(irrational_numbers) != 1 or any(part.is_Float for part in irrational_numbers):
@@ -66,7 +66,7 @@ def number(value: Any) -> Any:
 
 
 def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
-    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None for anything else.
+    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None for other objects.
 
     Raises InputError for other equations of SymPy.
     """
@@ -82,7 +82,7 @@ def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
 
 
 def _irrational(value: Any) -> Iterator[Any]:
-    """Return the irrational numbers that occur in an expression of SymPy."""
+    """Yield the irrational numbers that occur in a SymPy expression."""
     from sympy import preorder_traversal
 
     parts = preorder_traversal(value)

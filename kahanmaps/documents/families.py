@@ -1,13 +1,13 @@
-"""Families of the catalogue, whose members are named with arguments, such as `lv(7,3)`, and generated on demand.
+"""Families of systems in the catalogue: a member such as `lv(7,3)` has arguments, and is generated on demand.
 
 The Bogoyavlenskij-Itoh systems LV(n, k) are Lotka-Volterra systems:
 
     x_i' = x_i sum_j a_ij x_j,    a_ij = -a_ji,    a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k,
 
-with 2k + 1 <= n. For n = 2k + 1 each species preys on the next k on a circle. For larger n the species k + 1, ..., n -
-k have the same interactions with all others: if their sum replaces them, LV(n, k) becomes LV(2k + 1, k). The partial
-sums of these species solve one Riccati equation, also for the map, so that their cross-ratios are integrals.
-docs/mathematics.md has the proofs. Sources: itoh-1987, bogoyavlenskij-1988, damianou-2017.
+with 2k + 1 <= n. For n = 2k + 1 the species form a circle, on which each preys on the next k species. For larger n the
+species k + 1, ..., n - k have the same interactions with all others: replaced by their sum, they reduce LV(n, k) to
+LV(2k + 1, k). Their partial sums solve the same Riccati equation, also for the map, so that cross-ratios are integrals
+(proofs: docs/mathematics.md). Sources: itoh-1987, bogoyavlenskij-1988, damianou-2017.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SHOWN_DEGREES = 4
 
 
 class NamedFamily(NamedTuple):
-    """A family of systems: the notation of its members, a title, and the document for integer arguments."""
+    """A family of systems: the notation of members, a title, and the function from integers to documents."""
 
     form: str
     example: str
@@ -52,7 +52,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         k: at least 0, and at most (n - 1)/2.
 
     Returns:
-        Plain data in the format of a system file, with the integrals that are written in few terms.
+        Plain data in the format of a system file, with integrals that have few terms.
 
     Raises:
         InputError: for other n and k.
@@ -77,13 +77,13 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         det = f"1 - eps^2*({first}^2 + ({m})^2 + {last}^2 - {minus})"
         integrals[f"I{len(integrals) + 1}"] = f"{first}*({m})*{last}/({det})"
     rows = []
-    for i in range(n):  # sum_j a_ij x_j, the positive terms first
+    for i in range(n):  # sum_j a_ij x_j, positive terms first
         signs = {j: (1 if abs(j - i) < n - k else -1) * (1 if j > i else -1) for j in range(n) if j != i}
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
     cross_ratios, is_full = n - 2 * k - 2, n == 2 * k + 1
-    # Known statements about the flow and the map, each with its status.
+    # Known statements about the flow and the map, each with a status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
         "and cross-ratios.",
@@ -127,7 +127,7 @@ FAMILIES = {"lv": NamedFamily("lv(n,k)", "lv(7,3)", "Bogoyavlenskij-Itoh systems
 
 
 def family_member(reference: str) -> tuple[str, dict[str, Any]] | None:
-    """Return the name, without spaces, and the document of a member of a family; None for other names.
+    """Return the name (without spaces) and the document of a member of a family; None for other names.
 
     Raises InputError for arguments that are missing or that the family does not have.
 

@@ -1,8 +1,8 @@
-"""System files: a differential equation or map in TOML, read with all mistakes reported together, and written.
+"""Reading and writing of system files: a differential equation or map in TOML; all mistakes are reported together.
 
 A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear],
 [map] and [composition], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them.
-Numbers are exact: decimals are read as decimals, quoted or not.
+Numbers are exact: decimals, quoted or not, are read as rational numbers.
 """
 
 from __future__ import annotations
@@ -51,9 +51,10 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 class SystemFile(HtmlDisplay, LatexDisplay):
     """A system or map with the parameters and claims of its file.
 
-    `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are None unless the file (or
-    the Python object it was made from) declares them. `integrals` and `density` are claims: rational functions in the
-    variables and `eps`. `document` is the file as plain data, with names in place of the values of parameters.
+    `map` is the map; for a differential equation it is the Kahan map. `hamiltonian` and `member` are None unless the
+    file (or the Python object from which it was made) declares them. `integrals` and `density` are claims: rational
+    functions of the variables and `eps`. `document` is the file as plain data, with names of parameters in its
+    formulas.
     """
 
     name: str
@@ -70,7 +71,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def label(self) -> str:
-        """The title in pictures and pages: the name or, for an inline system, its equations if they are short."""
+        """The title in pictures and pages: the name; for an inline system its equations, if they are short."""
         if self.name != "inline" or not self.is_quadratic:
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
@@ -78,7 +79,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return equations if len(equations) <= _LONGEST_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
-        """Return the name or the equations of the system after a letter: f = euler_top, or f: (x' = y, y' = -x)."""
+        """Return the name or the equations of the system, with a letter: f = euler_top, or f: (x' = y, y' = -x)."""
         return f"{letter} = {self.name}" if self.label == self.name else f"{letter}: ({self.label})"
 
     @property
@@ -96,8 +97,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     def f(self, *point: Any, **named: Any) -> Any:
         """Return the right-hand sides at a point: f(x), f({"x": 1, "y": 2}), f("1,2"), f(1, 2) or f(x=1, y=2).
 
-        They are exact for exact numbers, and an array for an array of floats of shape (dim,) or (points, dim). Raises
-        InputError for a map without a vector field.
+        The values are exact for exact numbers; an array of floats of shape (dim,) or (points, dim) gives an array.
+        Raises InputError for a map without a vector field.
         """
         return self.system.f(*point, **named)
 
@@ -119,12 +120,12 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     subs = with_parameters
 
     def kahan(self, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:
-        """Return the Kahan map at an exact eps, or at the time step h = 2 eps; raise InputError for other systems."""
+        """Return the Kahan map at an exact eps, or at the time step h = 2 eps. Raises InputError for other maps."""
         _ = self.system
         return self.at(resolve_eps(eps, time_step, h))
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """Draw a portrait and return its axes; the arguments are those of `km.portrait` after the system."""
+        """Draw a portrait and return its axes; the arguments are the arguments of `km.portrait` after the system."""
         return import_module("kahanmaps.plots.plot").plot.portrait(self, *arguments, **options)
 
     @property
@@ -171,9 +172,9 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def real_approximation(self) -> SystemFile:
-        """The file for floating point: an algebraic parameter is replaced by a rational number close to it.
+        """The file for floating point: an algebraic parameter is replaced by a rational approximation.
 
-        Raises InputError if the number is not real.
+        Raises InputError if the parameter is not real.
         """
         if not isinstance(self.map, AlgebraicMap):
             return self
@@ -182,13 +183,13 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def normal_form(self) -> SystemNormalForm | NoNormalForm:
-        """The normal form of the system, computed at each access, or the reason why there is none."""
+        """The normal form of the system, or the reason why there is none; it is computed at each access."""
         if not self.is_quadratic:
             return NoNormalForm(f"it is {self.map.kind}")
         return system_normal_form(self.system, self.hamiltonian, self.member)
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
-        """Raise InputError unless the function is one of the system's variables and eps, in this order."""
+        """Raise InputError unless the arguments of the function are the system's variables and eps, in this order."""
         expected = self.claim_names
         n = self.dim
         if function.names != with_iterates(expected[:n], iterates_in(*function.names), expected[n:]):
@@ -199,7 +200,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def catalog(self) -> Mapping[str, Any]:
-        """Title, sources, convention and facts, for files of the catalogue."""
+        """Title, sources, convention and facts of a file of the catalogue."""
         section: Mapping[str, Any] = self.document.get("catalog", {})
         return section
 
@@ -244,7 +245,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
-        """Return the file as text, from which `parse_system` reads an equal file."""
+        """Return the file as TOML text; `parse_system` reads an equal file from it."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -255,7 +256,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return f"SystemFile({self.name}: {shorten(repr(self.map), 100)}{values})"
 
     def __str__(self) -> str:
-        """The equations, with the values of the parameters in them."""
+        """Return the equations, with values in place of parameters."""
         return f"{self.name}:\n{self.map}"
 
     def __eq__(self, other: object) -> bool:
@@ -276,7 +277,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
 
 def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form for float orbits, or the reason why there is none, as for the method "generic"."""
+    """Return the normal form for float orbits, or the reason why there is none (e.g. `method` is "generic")."""
     normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
     if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
         return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")
@@ -284,7 +285,7 @@ def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNorm
 
 
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """Read a system from a TOML file; `parameters` replace those of the file.
+    """Read a system from a TOML file; `parameters` replace parameter values of the file.
 
     Raises SystemFileError with every mistake of the file, InputError if it cannot be read.
     """
@@ -294,7 +295,7 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """Parse a system from text in TOML, or in the format of XPP; `where` names it in messages.
+    """Parse a system from text in TOML or in the format of XPP; `where` names the text in messages.
 
     >>> parse_system('variables = ["x"]\\n[system]\\nrhs = ["x", "x"]', "example")
     Traceback (most recent call last):
@@ -310,7 +311,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 
 
 def _document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
-    """Return the plain data of a text in TOML or with equations in lines, and notes on them."""
+    """Return the plain data of a text in TOML or with one equation in each line, and notes on its interpretation."""
     is_of_xpp = where.endswith(ENDING)
     try:
         if not is_of_xpp:
@@ -348,8 +349,8 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
 def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
     """Return the second of two maps in the variables of the first, and a note if they differ.
 
-    Variables are matched by name where the names agree, otherwise by position. Raises InputError if the dimensions
-    differ, and for maps other than Kahan's whose variables have the same names in another order.
+    Variables are matched by name if both maps have the same names, otherwise by position. Raises InputError if the
+    dimensions differ, and for maps other than Kahan's whose variables have the same names in another order.
     """
     f, g = file.map, other.map
     if f.dim != g.dim:

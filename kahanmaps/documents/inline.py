@@ -1,4 +1,4 @@
-"""Systems given by equations on the command line or in Python, converted to system files."""
+"""Conversion of systems given by equations, on the command line or in Python, to system files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def inline_file(
     variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | Sequence[str]]
 ) -> str:
-    """Return the file with one section of this kind; `variables` are names separated by commas.
+    """Return the text of a file with one section of this kind; `variables` are names separated by commas.
 
     >>> print(inline_file("x,y", {"a": "1/2"}, "system", {"rhs": ["a*y", "-x"]}))
     variables = ["x", "y"]
@@ -35,7 +35,7 @@ def inline_file(
     "a" = "1/2"
     """
 
-    def value(data: Any) -> str:  # JSON strings, and lists of them, are those of TOML
+    def value(data: Any) -> str:  # strings and lists of strings are the same in JSON and TOML
         return json.dumps(data, ensure_ascii=False)
 
     lines = [] if variables is None else [f"variables = {value([name.strip() for name in variables.split(',')])}"]
@@ -115,7 +115,7 @@ def _from_hamiltonian(H: Any, variables: Any = None, **parameters: Any) -> Syste
     return System(None, variables, hamiltonian=H, **parameters)
 
 
-# In the manner of other libraries: System.from_sympy([y, x**2], (x, y)).
+# An alias in the style of other libraries: System.from_sympy([y, x**2], (x, y)).
 vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
 vars(System)["from_hamiltonian"] = _from_hamiltonian
 
@@ -130,9 +130,9 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any
 
 
 def as_file(value: Any) -> SystemFile:
-    """Convert a value to a file: a file, system, map, catalogue name or path, or equations as `System` takes them.
+    """Convert a file, system, map, catalogue name, path, or equations in the notation of `System` to a file.
 
-    A map at one eps is one that does not depend on eps. Raises InputError for anything else.
+    A map at one eps is converted to a map that does not depend on eps. Raises InputError for other values.
     """
     if isinstance(value, SystemFile):
         return value

@@ -1,7 +1,7 @@
 """Parsing of functions of a point and its iterates: x~ is the image of x, x~~ the image of x~.
 
-A formula may contain letters for functions, which are defined after it: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. Then F0~ is
-F0 with one more ~ at every variable.
+A formula may contain letters for functions that are defined after the formula: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. Then
+F0~ is F0 with one more ~ at every variable.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
 MAX_ITERATES = 16
-_MAX_PRODUCTS = 1_000_000  # of terms, where letters are replaced
+_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced
 
 
 def iterates_in(*texts: str) -> int:
@@ -30,7 +30,7 @@ def iterates_in(*texts: str) -> int:
 
 
 def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the variables, then the variables with ~, ~~, ... up to `count`, then the others.
+    """Return the variables, then the variables with ~, ~~, ... up to `count` times ~, then the names `others`.
 
     >>> with_iterates(["x", "y"], 1, ["eps"])
     ('x', 'y', 'x~', 'y~', 'eps')
@@ -100,7 +100,7 @@ def parse_with_iterates(
     gens, coordinates = context.gens(), (count + 1) * n
 
     def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
-        # Variables of the last iterate, which have no successor, do not occur in P.
+        # Variables of the last iterate have no image in the ring, and do not occur in P.
         moved = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
         return P.compose(*moved, *gens[coordinates:], ctx=context)
 

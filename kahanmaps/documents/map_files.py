@@ -24,7 +24,7 @@ from kahanmaps.maps.kahan import KahanFamily
 
 
 def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
-    """Return the file of a map; a map at one eps is a map that does not depend on eps.
+    """Return the file of a map; a map at one eps becomes a map that does not depend on eps.
 
     Raises InputError for a map over another field than Q, and for one with symbols other than an algebraic number.
 
@@ -43,11 +43,11 @@ def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
     else:
         document = {"name": name, **_document(family)}
     file = parse_system(to_toml(document, ("name", "variables"), ("parameters", *KINDS)), name)
-    return replace(file, map=family) if family.time_steps else file  # its flow is not in its formulas
+    return replace(file, map=family) if family.time_steps else file  # the formulas do not contain the flow
 
 
 def without_eps(map_: Map) -> MapFamily:
-    """Return a map over Q at one eps, or a composition of maps at several, as a map that does not depend on eps."""
+    """Convert a map over Q at one eps, or a composition of maps at several, to a map that does not depend on eps."""
     if map_.field is not QQ:
         raise InputError(f"found {map_!r}, expected a map over the rational numbers")
     variables = map_.variables or tuple(f"x{k + 1}" for k in range(map_.dim))
@@ -68,7 +68,7 @@ def _rows(equation: Equation, variables: Sequence[str]) -> Rows:
 
 
 def _document(map_: MapFamily) -> dict[str, Any]:
-    """Return the variables of a map and its section in a file."""
+    """Return the document of a map: its variables and one section."""
     variables, n = list(map_.variables), map_.dim
     if isinstance(map_, KahanFamily):
         return {"variables": variables, "system": {"rhs": [format_polynomial(f) for f in map_.system.rhs]}}

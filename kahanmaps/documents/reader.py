@@ -1,6 +1,6 @@
 """Reading the parts of a system file: tables, texts, polynomials and matrices, with a list of mistakes.
 
-The names that may occur are the variables, the parameters with their values, and the symbols.
+Formulas may contain the variables, the parameters, which have values, and the symbols.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ EXPECTED = {
 }
 
 
-# A function of the key ("file" or "system") and the value that name a part of a composition. It returns the document of
-# this part, a name that no other document has, and such a function for the parts of this document.
+# A function that looks up a part of a composition, given by a key ("file" or "system") and its value. It returns the
+# document of the part, a unique name of this document, and the look-up function for parts of this document.
 LookUp = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
-    """Reads the parts of a document: holds its names and the mistakes found so far."""
+    """Reads the parts of a document; collects its names and mistakes."""
 
     def __init__(
         self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], look_up: LookUp | None = None
@@ -64,17 +64,17 @@ class PartReader:
         self.where = where
         self.overrides = overrides
         self.look_up = look_up
-        self.inside: tuple[str, ...] = ()  # the files whose compositions this document is part of
-        self.parts = [0]  # the number of parts read so far, in a list that the readers of all parts share
+        self.inside: tuple[str, ...] = ()  # files whose compositions contain this document
+        self.parts = [0]  # number of parts read so far; a list, which the readers of all parts share
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
-        self.has_bad_parameter = False  # a parameter could not be read: what depends on it is not checked
+        self.has_bad_parameter = False  # a parameter is invalid: checks that need its value are omitted
         self.variables: tuple[str, ...] | None = None
-        self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
-        self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number, which is such a symbol
+        self.symbols: tuple[str, ...] = ()  # parameters that stay symbols in the map
+        self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number; it is one of the symbols
 
     def _mistake(self, key: str, sentence: str) -> None:
-        # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
+        # Keys come from the file: no escape sequences in them may reach a terminal.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
     def _refused(self, key: str, sentence: str) -> T | None:
@@ -83,7 +83,7 @@ class PartReader:
         return None
 
     def _try_make(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
-        """Return make(*arguments); on InputError note a mistake and return None."""
+        """Return make(*arguments); if it raises InputError, note a mistake and return None."""
         try:
             return make(*arguments)
         except InputError as error:
@@ -113,7 +113,7 @@ class PartReader:
     ) -> fmpq_mpoly | None:
         """Return a polynomial in the variables, `extra_names` and, for a map, the symbols and eps.
 
-        Its degree in the variables is at most `at_most`; otherwise note a mistake and return None.
+        If the text is invalid, or the degree in the variables exceeds `at_most`, note a mistake and return None.
         """
         text = self._text(path, value)
         if text is None or self.variables is None:
@@ -166,7 +166,7 @@ class PartReader:
         return table.get(key)
 
     def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
-        """Read a list with one entry for each variable; otherwise note a mistake and return None."""
+        """Return a list with one entry for each variable; for other values note a mistake and return None."""
         path = f"{section}.{key}"
         if value is None:
             return None
@@ -180,7 +180,7 @@ class PartReader:
         return value
 
     def _each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
-        """Read every entry of a list, noting all mistakes; return None if an entry cannot be read."""
+        """Read every entry of a list and note all mistakes; return None if an entry cannot be read."""
         entries = value if isinstance(value, list) else []
         results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
         valid = [result for result in results if result is not None]

@@ -2,7 +2,7 @@
 
     degrees = [3, 9, 19, 33, 51]          of the iterates Phi, Phi^2, ... on a generic line
     growth = "quadratic"                  bounded, linear, quadratic or exponential
-    dynamical_degree = "x^2 - 2*x - 1"    the minimal polynomial of lim d_n^(1/n), its largest real root
+    dynamical_degree = "x^2 - 2*x - 1"    minimal polynomial of lim d_n^(1/n), the largest real root
     verdict = "integrable"                integrable, linearisable or not integrable
     codimension = 2                       of the smallest variety known to contain a generic orbit
 
@@ -10,8 +10,8 @@
     monomials = ["x1^2", "x2^2", "x3^2", "1"]
     dimension = 2
 
-All of them are for generic parameters and generic eps, so relations do not contain parameters. The evidence for them is
-stated in the facts of the section.
+All these facts hold for generic parameters and generic eps, so relations do not contain parameters. The `facts` of the
+section state the evidence.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ClaimedRelations(NamedTuple):
 
 
 def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[ClaimedRelations, ...]:
-    """Return the relations of a [catalog] section, their functions as exact polynomials in `variables`.
+    """Return the relations of a [catalog] section; their functions are exact polynomials in `variables`.
 
     `section` is `SystemFile.catalog`. The result is empty if the section states no relations. Raises InputError for
     functions that cannot be read. Source: petrera-pfadler-suris-2009.
@@ -71,7 +71,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
 def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     """Return the functions given by "degree <= d" or by a list of polynomials, as exact polynomials in `variables`.
 
-    Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or occur twice.
+    Raises InputError for other values, for more than 100000 monomials, and for functions that are 0 or occur twice.
     Source: petrera-pfadler-suris-2009.
 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
@@ -104,7 +104,7 @@ def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> 
 def read_structured_facts(
     section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
-    """Validate a [catalog] section, all keys of which are known; call `mistake(key, sentence)` for each mistake."""
+    """Validate a [catalog] section whose keys are known to be valid; call `mistake(key, sentence)` for each mistake."""
     at_most = 10**9 if variables is None else len(variables)
     bound = "an integer, 0 or more" if variables is None else f"an integer from 0 to {at_most}, the dimension"
     rules: dict[str, tuple[Callable[[Any], bool], str]] = {
@@ -155,7 +155,6 @@ def _are_tables(value: Any) -> bool:
 
 
 def _is_minimal(text: Any) -> bool:
-    """Return whether a text is an irreducible monic polynomial in x."""
     try:
         polynomial = parse_polynomial(text, ["x"])
     except InputError:

@@ -1,4 +1,4 @@
-"""The system or map of a file, with some of its parameters as symbols."""
+"""Conversion of a file to its system or map with some parameters as symbols."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def split_names(names: Sequence[str]) -> Sequence[str]:
-    """Return names given as a sequence, or as one text "a, b"."""
+    """Return names that are given as a sequence or as one text "a, b"."""
     return names.replace(",", " ").split() if isinstance(names, str) else names
 
 
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
-    """Return the map of a file with the given parameters as symbols, and the other parameters at their values.
+    """Return the map of a file, in which the parameters `symbols` are symbols and the others have their values.
 
-    Raises InputError as `with_symbols` does; for a map other than Kahan's, only if a name is not a parameter.
+    Raises InputError as `with_symbols` does; for maps other than Kahan's only for names that are not parameters.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -56,18 +56,18 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
-    """Return the system of a file with the given parameters as symbols, and the other parameters at their values.
+    """Return the system of a file, in which the parameters `symbols` are symbols and the others have their values.
 
     Args:
         file: the system.
-        symbols: names of its parameters; eps is always a symbol and must not be named.
+        symbols: names of parameters; eps is always a symbol and must not be named.
 
     Returns:
         The system, with exact right-hand sides.
 
     Raises:
         InputError: for a name that is not a parameter, for right-hand sides that are not polynomials of degree at most
-            2 if the symbols are free, and for a member of the family, which would have to be one for all values.
+            2 for free symbols, and for a member of the family, since it need not be a member for all values of symbols.
 
     >>> from kahanmaps.documents.catalog import load
     >>> with_symbols(load("euler_top"), ["a1"]).rhs

@@ -20,23 +20,23 @@ from kahanmaps.errors import InputError, SystemFileError
 
 
 class TomlKind(NamedTuple):
-    """A kind of TOML file: its name, the largest size, and the class of errors for its mistakes."""
+    """A kind of TOML file: its name, the largest size, and the class of errors that report its mistakes."""
 
     name: str
     most: int
     error: type[SystemFileError]
 
     def read(self, path: str | Path) -> bytes:
-        """Read the bytes of a file, at most one more than allowed. Raises InputError if it cannot be read."""
+        """Read the bytes of a file, at most one byte more than allowed. Raises InputError if it cannot be read."""
         try:
-            # Reading a pipe or a device may never end. But /dev/fd/63 is the shell's <(...).
+            # Reading a pipe or a device may never end; but /dev/fd/63, which a shell passes for <(...), is allowed.
             mode = os.stat(path).st_mode
             is_of_shell = stat.S_ISFIFO(mode) and str(path).startswith(("/dev/fd/", "/dev/stdin"))
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
                 raise InputError(f"cannot read the {self.name} {path}: it is a pipe or a device, expected a file")
             with open(path, "rb") as stream:
                 return stream.read(self.most + 1)
-        except InputError:  # a ValueError as well
+        except InputError:  # InputError is also a ValueError
             raise
         except OSError as error:
             raise InputError(f"cannot read the {self.name} {path}: {error.strerror or error}") from error
@@ -44,13 +44,13 @@ class TomlKind(NamedTuple):
             raise InputError(f"cannot read the {self.name} {str(path)!r}: {error}") from error
 
     def document(self, text: str | bytes, where: str) -> dict[str, Any]:
-        """Parse a text to plain data, decimals as text; `where` names it in messages. Raises `error`, InputError."""
+        """Parse TOML to plain data, with decimals as text; `where` names it in messages. Raises `error`, InputError."""
         if len(text) > self.most:
             raise InputError(f"{where} is larger than {self.most} bytes, the limit for a {self.name}")
         try:
             # Some editors put a byte order mark first.
             decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
-            # Python's own limit on digits applies to integers written without quotes, before we see them.
+            # Python's limit on digits applies while unquoted integers are parsed.
             return tomllib.loads(decoded, parse_float=lambda number: number.replace("_", ""))
         except (RecursionError, ValueError) as error:
             hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
@@ -63,7 +63,7 @@ class TomlKind(NamedTuple):
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
-    """Write a document: first the keys `top`, then the tables `sections`, in this order; others are omitted.
+    """Write a document: first the keys `top`, then the tables `sections`, in this order; other entries are omitted.
 
     >>> print(to_toml({"name": "a", "system": {"rhs": ["x^2"]}}, ["name"], ["system"]), end="")
     name = "a"
@@ -119,6 +119,6 @@ def _toml_value(value: Any) -> str:
 
 
 def _toml_string(text: str) -> str:
-    # A JSON string is a TOML basic string, except that DEL must be escaped. Other characters are escaped for terminals.
+    # A JSON string is a TOML basic string, except that DEL must be escaped. Other escapes protect terminals.
     characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
     return "".join(characters)

@@ -1,9 +1,9 @@
 """Reading of XPPAUT files (.ode): equations, parameters and definitions.
 
-The reader accepts x' = ..., dx/dt = ..., par, number, init, x(0) = ..., and definitions name = formula and
-!name = formula, which are substituted. Options (@), aux, set and boundary conditions concern the integration and are
+The reader accepts x' = ..., dx/dt = ..., par, number, init, x(0) = ..., and definitions name = formula and !name =
+formula, which are substituted. Options (@), aux, set and boundary conditions concern only the integration: they are
 skipped, with a note. Statements that would change the equations (functions, arrays, Markov variables, tables, maps
-x(t+1)) raise an error with the line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
+x(t+1)) raise an error that quotes the line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
 "Structure of ODE files".
 """
 
@@ -80,13 +80,13 @@ class _Lines:
     """The content of the lines read so far."""
 
     def __init__(self) -> None:
-        self.equations: list[tuple[str, list[str]]] = []  # the left side, and the tokens of the right one
+        self.equations: list[tuple[str, list[str]]] = []  # the left side as text, the right side as tokens
         self.parameters: dict[str, str] = {}
         self.initial: dict[str, str] = {}
         self.left_out: dict[str, None] = {}
         self.notes: list[str] = []
         self.definitions: dict[str, str] = {}
-        self.has_capitals = False  # in the names of the file
+        self.has_capitals = False  # whether names in the file contain capital letters
 
     def read(self, line: str) -> None:
         """Read a line. Raises InputError if it cannot be read."""
@@ -116,11 +116,11 @@ class _Lines:
             split = tokens.index("=") + 1
             if is_equation:
                 self.equations.append(("".join(tokens[:split]), tokens[split:]))
-            else:  # a value of an earlier definition
+            else:  # a definition NAME = formula, which may contain earlier definitions
                 self.definitions[tokens_kept[0]] = f"({self.expanded(tokens[split:])})"
 
     def _values(self, tokens: list[str], values: dict[str, str]) -> None:
-        """Read pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; an initial value alone is 0, as in XPP."""
+        """Read pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; in init a name alone means 0, as in XPP."""
         k = 0
         while k < len(tokens):
             name = tokens[k]
@@ -129,11 +129,11 @@ class _Lines:
             value, k = "0", k + 1
             if tokens[k : k + 1] == ["="]:
                 end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
-                if tokens[end + 1 : end + 2] == ["/"]:  # XPP stops reading here, without a message
+                if tokens[end + 1 : end + 2] == ["/"]:  # XPP ignores the rest of the line, without a message
                     end += 2
                     self.notes.append(f"{name} = {''.join(tokens[k + 1 : end + 1])} is read literally, unlike in XPP")
                 value, k = "".join(tokens[k + 1 : end + 1]), end + 1
-            elif values is self.parameters:  # XPP takes 0, which is rarely intended
+            elif values is self.parameters:  # XPP would use 0, which is rarely intended
                 raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
             values[name] = value
             k += tokens[k : k + 1] == [","]

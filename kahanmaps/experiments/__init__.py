@@ -1,4 +1,4 @@
-"""Batches of experiments described by one spec: planned, run in worker processes, stored, resumed.
+"""Plan, run, store and resume batches of experiments described by one spec.
 
 Input         spec.py (a spec in TOML) and experiment.py; options.py (the options of tasks), grid.py (values and their
               combinations), registry.py and tasks.py (the kinds of tasks)

@@ -24,10 +24,10 @@ class BatchCommands(AttributeHints):
     run = staticmethod(run)
 
     def __reduce__(self) -> str:
-        return "batch"  # there is one, `km.batch`
+        return "batch"  # the only instance is `km.batch`
 
     def __call__(self, spec: Any, db: str | Path | None = None, **options: Any) -> Any:
-        """Run the tasks of a spec, as `run` does."""
+        """Run the tasks of a spec; see `experiments.running.run.run`."""
         if not isinstance(spec, str | Path) and not hasattr(spec, "experiments"):
             raise InputError(
                 f"found a {type(spec).__name__}, expected the path or the text of a spec (docs/batch.md); "
@@ -46,7 +46,7 @@ class BatchCommands(AttributeHints):
             return store.find(key)
 
     def summary(self, db: str | Path, by: Sequence[str] = (), values: Sequence[str] | None = None) -> Summary:
-        """Return counts and quantiles for each group of tasks; `by` names the entries that define a group."""
+        """Return counts and quantiles for each group of tasks; tasks with equal entries `by` form a group."""
         with Store.open(db, readonly=True) as store:
             return summarise(store.rows(missing=True), by, values)
 

@@ -1,4 +1,4 @@
-"""Experiments of a batch: many tasks of one kind, created lazily; and how they are read from a spec.
+"""Experiments of a batch, and their reading from a spec: an experiment is many tasks of one kind, created lazily.
 
 `SpecDocument` checks the shape of a spec: its keys and the types of their values. `ExperimentReader` reads one table
 [experiments.NAME], whose meaning depends on its task, and reports every mistake to the document.
@@ -31,7 +31,7 @@ from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, ta
 from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
 from kahanmaps.experiments.results.system_spec import ENDINGS, family_spec, find_file, spec_of
 
-PARAMETERS = "parameters."  # prefix of the name of a value that is a parameter of the system
+PARAMETERS = "parameters."  # prefix of option names that set a parameter of the system
 DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
@@ -54,8 +54,8 @@ def _read_digits(value: Any) -> None:
         raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
 
 
-# A shape is a function that raises ValueError, or a tuple of a type, a description and, for a list or a table, its
-# parts: either the shape that all items have, or a dict with the shapes of the allowed keys of a table.
+# A shape is a function that raises ValueError for invalid values, or a tuple of a type and a description. For a list or
+# a table the tuple also has the shape of all items, or a dict of allowed keys and their shapes.
 _ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
 _LIMITS = (
     dict,
@@ -93,7 +93,7 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]
 
 
 def _mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the paths in a value that do not have the expected shape, with a sentence."""
+    """Yield the path of each part of `value` that does not have the expected shape, and a sentence that says why."""
     if callable(shape):
         try:
             shape(value)
@@ -122,15 +122,15 @@ def _mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, 
 
 
 def key_of(path: KeyPath) -> str:
-    """Return a path as text, with lists counted from 1: experiments.a.zip[1]."""
+    """Return a path as text; positions in lists are counted from 1, as in experiments.a.zip[1]."""
     return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 
 class SpecDocument:
-    """A spec; paths of systems in it are relative to `folder`.
+    """A spec, whose paths of system files are relative to `folder`.
 
-    `mistakes` are pairs of a key and a sentence, those of the shape first. `documents` are those of the systems that
-    were read. With `skip_bad` systems that cannot be read are skipped in all experiments, as with on_error = "skip".
+    `mistakes` are pairs of a key and a sentence; wrong shapes come first. `documents` contains the documents of the
+    systems that were read. With `skip_bad` all experiments skip systems that cannot be read, as with on_error = "skip".
     """
 
     def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:
@@ -151,7 +151,7 @@ class SpecDocument:
         self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
 
     def valid_value(self, *path: str | int) -> Any:
-        """Return the value at a path, None where it is missing or has a wrong shape."""
+        """Return the value at a path; None if it is missing or has a wrong shape."""
         if any(bad == path[: len(bad)] for bad in self._misshapen):
             return None
         value: Any = self.document
@@ -164,7 +164,7 @@ class SpecDocument:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment: a kind of task, the values that all its tasks share (`fixed`), and the grid of those that vary."""
+    """An experiment: a kind of task, the values that all its tasks share (`fixed`), and the grid of varying values."""
 
     name: str
     kind: TaskKind
@@ -172,7 +172,7 @@ class Experiment:
     fixed: Mapping[str, Any]
     grid: Grid
     limits: TaskLimits
-    skipped: Sequence[tuple[str, str]] = ()  # systems that cannot be used, and why
+    skipped: Sequence[tuple[str, str]] = ()  # systems that cannot be used, with reasons
 
     @property
     def size(self) -> int:
@@ -181,7 +181,7 @@ class Experiment:
 
     @property
     def product(self) -> str:
-        """The number of tasks of the experiment as a product: 4 m x 10,000 seed x 3 eps."""
+        """The number of tasks as a product of the numbers of values: 4 m x 10,000 seed x 3 eps."""
         return " x ".join(f"{len(self.grid.axes[group[0]]):,} {'+'.join(group)}" for group in self.grid.groups)
 
     @cached_property
@@ -197,7 +197,7 @@ class Experiment:
                 continue
             read, axes[name] = values.option.read, []
             for piece in values.pieces:
-                if isinstance(piece, RationalRange):  # by its ends
+                if isinstance(piece, RationalRange):  # a range is represented by its end points
                     axes[name].append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
                 else:
                     axes[name].append(list(piece))
@@ -221,16 +221,16 @@ class Experiment:
 
 
 class ExperimentReader:
-    """Reads the table of an experiment, once.
+    """Reads the table of an experiment; each reader is used once.
 
-    `files` are the systems of the key system; `is_family` means random members instead. `kind` is None where the task
-    is unknown.
+    `files` are the system files named by the key `system`. If `is_family`, the systems are random members of the family
+    instead. `kind` is None if the task is unknown.
     """
 
     def __init__(self, spec: SpecDocument, name: str) -> None:
         self.spec = spec
         self.name = name
-        self.raw: dict[str, Any] = spec.document["experiments"][name]  # as it was written, whatever its shape
+        self.raw: dict[str, Any] = spec.document["experiments"][name]  # unchecked: its shape may be wrong
         self.kind: TaskKind | None = None
         self.files: list[SystemFile] = []
         self.skipped: list[tuple[str, str]] = []
@@ -249,7 +249,7 @@ class ExperimentReader:
         system_specs = self._read_systems()
         kind = self.kind
         if kind is None:
-            return None  # what an option means depends on the task
+            return None  # the meaning of options depends on the task
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
         keys: dict[str, str] = {}
         for option, option_key, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
@@ -273,7 +273,7 @@ class ExperimentReader:
 
     @contextmanager
     def _at(self, key: str) -> Iterator[None]:
-        """Report an InputError in the block with this key."""
+        """Report an InputError that the block raises as a mistake at this key."""
         try:
             yield
         except InputError as error:
@@ -284,11 +284,11 @@ class ExperimentReader:
         self.spec.mistake(f"experiments.{self.name}.{key}", sentence)
 
     def valid_value(self, *path: str | int) -> Any:
-        """Return the value at a path in this table, None where it is missing or has a wrong shape."""
+        """Return the value at a path in this table; None if it is missing or has a wrong shape."""
         return self.spec.valid_value("experiments", self.name, *path)
 
     def entries(self, part: str) -> list[tuple[str, str, Any]]:
-        """Return the entries of the table of options or axes: canonical names, keys, values."""
+        """Return a canonical name, a key and a value for each entry of the table `part` (options or axes)."""
         entries: list[tuple[str, str, Any]] = []
         for key, raw in (self.valid_value(part) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
@@ -298,11 +298,11 @@ class ExperimentReader:
         return entries
 
     def given(self) -> dict[str, str]:
-        """Return the keys of the options in the spec, valid or not, by canonical names."""
+        """Map the canonical name of each option in the spec, valid or not, to its key."""
         return {name: key for part in ("axes", "options") for name, key, _ in self.entries(part)}
 
     def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
-        """Return the valid values of one of the tables by canonical names, and report the others."""
+        """Map the canonical name of each option in the table `part` to its valid values, and report invalid ones."""
         valid: dict[str, AxisValues] = {}
         for name, key, raw in self.entries(part):
             with self._at(key):
@@ -333,7 +333,7 @@ class ExperimentReader:
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
-        if name == "seconds":  # its name up to 0.2, when results depended on the clock
+        if name == "seconds":  # name of an option of version 0.2, whose results depended on the clock
             replacement = (
                 f"{EFFORT} = 1 (one more doubles the work)" if EFFORT in options else 'limits = {time = "60 s"}'
             )
@@ -343,7 +343,7 @@ class ExperimentReader:
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
 
     def _read_axis(self, key: str, option: Option, raw: Any) -> AxisValues | None:
-        """Return the values of one option; None where a mistake was reported."""
+        """Return the values of one option; None after reporting a mistake."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
@@ -360,7 +360,7 @@ class ExperimentReader:
         return values
 
     def _written_zips(self) -> list[list[str] | None]:
-        """Return the canonical names of the axes of each zip, None for one of a wrong shape, which was reported."""
+        """Return the canonical names of the axes of each zip; None for a zip of wrong shape, already reported."""
         zips: list[list[str] | None] = []
         for number, written in enumerate(self.valid_value("zip") or []):
             is_valid = self.valid_value("zip", number) is not None
@@ -378,7 +378,7 @@ class ExperimentReader:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
-                if name not in given_axes:  # otherwise another mistake was reported
+                if name not in given_axes:  # the values of an axis in the spec are invalid, and were reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             repeated = [name for k, name in enumerate(names) if name in names[:k] or name in used]
             if len(names) < 2:
@@ -412,7 +412,7 @@ class ExperimentReader:
         )
         key = self.given().get("max_digits")
         if "digits" in own_limits and self.valid_value("limits", "digits") is None:
-            pass  # reported with the shape
+            pass  # reported as a wrong shape
         elif "max_digits" not in kind.options:
             if "digits" in own_limits:
                 self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
@@ -428,7 +428,7 @@ class ExperimentReader:
 
     def _require_options(self, kind: TaskKind) -> None:
         if any(self.valid_value(part) is None and part in self.raw for part in ("options", "axes")):
-            return  # a missing option may be in the table of a wrong shape
+            return  # an option that seems to be missing may be in a table of wrong shape
         given = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)
         for name in kind.required:
@@ -450,11 +450,11 @@ class ExperimentReader:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether the system is a file or, if its value is wrong, might be one."""
+        """Whether the system is a file, or its value is wrong and might mean a file."""
         return self.kind is not None and self.kind.needs is not None and not self.is_family
 
     def _read_systems(self) -> list[dict[str, Any]]:
-        """Return the specs of the valid systems, none where the task needs none, and report the others."""
+        """Return the specs of the valid systems, and report invalid ones; [] if the task needs no system."""
         raw = self.valid_value("system")
         if raw is None:
             if self.kind is not None and self.kind.needs is not None and self.raw.get("system") is None:
@@ -478,7 +478,7 @@ class ExperimentReader:
     def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
         """Return the specs of the files named by the value of a key."""
         system_specs: dict[str, dict[str, Any]] = {}
-        names: dict[str, str] = {}  # of the files with these documents
+        names: dict[str, str] = {}  # digest of a document -> name of its file
         for number, reference in enumerate(references, start=1):
             item_key = f"{key}[{number}]" if len(references) > 1 else key
             with self._at(item_key):
@@ -488,7 +488,7 @@ class ExperimentReader:
                         system_spec = spec_of(file, self.spec.documents)
                         if self._skips and key == "system":
                             self._require_kind(file)
-                    except InputError as error:  # go on, to report all mistakes together
+                    except InputError as error:  # continue, so that all mistakes are reported together
                         if self._skips and key == "system":
                             self.skipped.append((name, str(error)))
                         else:
@@ -529,7 +529,7 @@ class ExperimentReader:
         return [str(path.relative_to(self.spec.folder)) for path in paths]
 
     def _require_kind(self, file: SystemFile) -> None:
-        """Raise InputError where the task needs a member of the family and the file has none."""
+        """Raise InputError if the task needs a member of the family and the file does not contain one."""
         if self.kind is None or file.member is not None or self.kind.needs not in (MEMBER, MEMBER_OR_OTHER):
             return
         if self.kind.needs == MEMBER_OR_OTHER and OTHER in self.given():

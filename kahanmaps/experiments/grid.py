@@ -1,4 +1,4 @@
-"""Values and their combinations: lists, exact ranges "1/10..1/2 step 1/10", products and zips, all lazy.
+"""Values of options (lists, exact ranges "1/10..1/2 step 1/10") and their combinations (products, zips), all lazy.
 
 The size of a grid is known without iterating over it.
 """
@@ -18,14 +18,14 @@ from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import Option
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
-_MAX_VALUES = 2**62  # of an axis: the limit of Python's `len`
+_MAX_VALUES = 2**62  # values of an axis: Python's `len` cannot exceed 2^63
 _TOO_MANY = "too many values"
 
 Mistake = tuple[tuple[int, ...], str]  # the position in a list, and a sentence
 
 
 class RationalRange(Sequence[fmpq]):
-    """The numbers first, first + step, ... up to last, which is included only if last - first is a multiple of step.
+    """The numbers first, first + step, ... up to last; last is included if last - first is a multiple of step.
 
     >>> [str(value) for value in RationalRange.from_text("1/10..1/2 step 1/5")]
     ['1/10', '3/10', '1/2']
@@ -67,7 +67,7 @@ class RationalRange(Sequence[fmpq]):
 
 
 class AxisValues(Sequence[Any]):
-    """The canonical values of an option, in pieces: single values and ranges."""
+    """The canonical values of an option: a sequence of pieces, each a single value or a range."""
 
     def __init__(self, option: Option, pieces: Sequence[Sequence[Any]]) -> None:
         self.option = option
@@ -92,7 +92,7 @@ def is_range(raw: Any) -> bool:
 
 
 def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisValues | None, list[Mistake]]:
-    """Read the values of an option in a spec; return also the mistakes with their positions (from 1) in a list.
+    """Read the values of an option in a spec; also return the mistakes, with positions in the list counted from 1.
 
     `raw` is one value, a range or a list of both. With `repeats` a single value may occur several times.
     """
@@ -107,7 +107,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
         try:
             if option.numbers and is_range(item):
                 values_range = RationalRange.from_text(item)
-                # If the ends are valid, so are all values in between, except eps = 0 and fractions.
+                # If both end points are valid, so are all values between them, except eps = 0 and fractions.
                 values = AxisValues(option, [values_range])
                 zero = values_range.numerators.index(0) if 0 in values_range.numerators else 0
                 for k in {0, min(1, len(values_range) - 1), len(values_range) - 1, zero}:
@@ -133,7 +133,7 @@ def has_repeats(values: AxisValues) -> bool:
 
 
 class Grid:
-    """All combinations of named axes, the last one varying fastest; zipped axes, equally long, vary together.
+    """All combinations of the values of named axes; the last axis varies fastest, and zipped axes vary together.
 
     >>> grid = Grid({"m": [2, 3], "seed": range(3), "steps": [10, 20]}, zips=[("m", "steps")])
     >>> grid.size, grid[3]

@@ -1,9 +1,10 @@
 """The tasks of the laboratory: preserved structures and growth of degrees, singularities, cycles, Lyapunov exponents.
 
-As in tasks.py results are small, short texts and numbers to group by; `report = true` stores the full result. Without
-eps an analysis is for every eps. The effort limits its work, and so belongs to the key; "status" says what is open. The
-verdict is that of the formulas that were found. Growth and numbers of integrals are measured, and have entries of their
-own. Singularities, cycles and exponents are only measured, and have no verdict.
+As in tasks.py, results are short texts and numbers by which tasks can be grouped; `report = true` stores the full
+result. If eps is not given, an analysis is valid for every eps. The effort limits the work, hence it belongs to the key
+of the task; "status" says what is undecided. The verdict is the weakest verdict of the formulas that were found. Growth
+and numbers of integrals are measured, and are separate entries. Singularities, cycles and exponents are measured,
+without a verdict.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 POISSON = {"symbolic": "symbols", "max_degree": "degree"}
-_ENDINGS = ("constant", "singular")  # of sequences of degrees known for all iterates without a recurrence
+_ENDINGS = ("constant", "singular")  # ends of a degree sequence that is known for all iterates without a recurrence
 
 
 @analysis(
@@ -55,7 +56,7 @@ def scan_parameters(
     system: SystemFile,
     over: list[str],
     eps: Any = None,
-    by: str = "degrees",  # the only value; kept for the keys of earlier databases
+    by: str = "degrees",  # the only allowed value; part of the keys in databases of earlier versions
     terms: int | None = None,
     primes: list[int] | None = None,
     effort: int = 1,
@@ -73,7 +74,7 @@ def scan_parameters(
     ]
     return {
         "status": result.ended,
-        "growth": by_growth[0][0] if by_growth else None,  # the slowest
+        "growth": by_growth[0][0] if by_growth else None,  # the slowest growth
         "components": len(result.components),
         "confirmed": sum(component.is_confirmed for component in result.components),
         "integrable": [
@@ -193,7 +194,7 @@ def all_analyses(result: Analysis) -> Result:
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
     final, confined = result.conclusion, {run.verdict for run in result.singularities}
-    # The parts that were begun and not completed, for lack of budget or of formulas.
+    # The analyses that were begun but not completed, since the work limit was reached or formulas were missing.
     states = {
         "degrees": result.degrees is None or result.degrees.recurrence is not None or result.degrees.ended in _ENDINGS,
         "integrals": result.integrals is None or _state_of_integrals(result.integrals) == "complete",
@@ -241,7 +242,7 @@ def confinement(
         "confinement": first.verdict if agree else UNDECIDED,
         "status": "budget" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
-        "followed": first.followed,  # number of steps, if something is not confined
+        "followed": first.followed,  # number of steps, if some singularity is not confined
         **fields(first, "map_degree", "critical_degree"),
         "exceptional_count": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
         "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),
@@ -280,7 +281,7 @@ def cycles(
     runs = [cycle_census(system.map, value, prime, **limits) for value in values]
     return {
         "status": "complete" if all(census.complete for census in runs) else "sampled",
-        "points": str(runs[0].points),  # may be longer than integers of databases
+        "points": str(runs[0].points),  # as text: it may exceed the integers of a database
         "longest": max(census.longest for census in runs),
         "runs": [
             {
@@ -337,14 +338,13 @@ def _state_of_integrals(search: IntegralSearch) -> str:
 
 
 def _state_of_densities(search: DensitySearch) -> str:
-    """Return "found", "none" (measured, up to the degree that was tried) or "open" (see the reason)."""
+    """Return "found", "none" (measured, up to the largest degree searched) or "open" (undecided, see the reason)."""
     if search.densities:
         return "found"
     return "none" if search.reason.startswith("no polynomial") else "open"
 
 
 def _weakest(verdicts: Iterable[Certainty]) -> str | None:
-    """Return the weakest of the verdicts, None if there are no formulas."""
     given = list(verdicts)
     return str(combined(given)) if given else None
 
@@ -354,8 +354,8 @@ def _growth(growth: DegreeGrowth) -> Result:
     recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
         "growth": str(growth.growth),
-        "looks_exponential": growth.looks_exponential,  # an estimate if there is no recurrence
-        "unconfirmed": growth.unconfirmed,  # why a recurrence that fits is not given
+        "looks_exponential": growth.looks_exponential,  # an estimate if no recurrence is known
+        "unconfirmed": growth.unconfirmed,  # why a recurrence that fits the degrees is not returned
         "singularities": None if growth.patterns is None else growth.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,
         "minimal_polynomial": None if rate is None else format_univariate(fmpq_poly(rate.minimal_polynomial)),
@@ -377,5 +377,5 @@ def _hypersurfaces(run: SingularityRun) -> list[Result]:
 
 
 def _number(value: Any) -> float | None:
-    """Return a float of numpy as a number of JSON."""
+    """Return a number as a Python float, which JSON can represent."""
     return float(value) if isfinite(value) else None

@@ -1,7 +1,7 @@
-"""The options of all tasks: each name has one meaning, and values are exact.
+"""The options of all tasks: a name means the same option in every task, and values are exact.
 
-An option converts the value in a spec to canonical plain data (exact numbers as text, so that 0.1 and 1/10 give one
-task), and this, in the worker process, to an argument of the library.
+An option converts a value in a spec to canonical plain data (exact numbers become text, so that 0.1 and 1/10 give one
+task). In the worker process it converts these data to an argument of the library.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 
 @dataclass(frozen=True)
 class Option:
-    """An option of tasks with its name and help.
+    """An option of tasks.
 
-    `read` converts the value in a spec to plain data or raises InputError, `make` converts plain data to an argument of
-    the library; None means "not given". `numbers` says whether ranges "a..b step c" are allowed.
+    `read` converts a value in a spec to plain data or raises InputError; `make` converts plain data to an argument of
+    the library. The plain value None means that the option is not given. `numbers` says whether ranges "a..b step c"
+    are allowed.
     """
 
     name: str
@@ -79,7 +80,7 @@ def flag(name: str, help: str) -> Option:
 
 
 def choice(name: str, help: str, words: Sequence[str]) -> Option:
-    """Return an option whose value is one of some words."""
+    """Return an option whose value is one of `words`."""
 
     def read(value: Any) -> str:
         if value not in words:
@@ -90,7 +91,7 @@ def choice(name: str, help: str, words: Sequence[str]) -> Option:
 
 
 def point(name: str, help: str, most: int | None = None) -> Option:
-    """Return an option whose value is a text of numbers separated by commas; a list would mean several values."""
+    """Return an option whose value is a text of numbers separated by commas: a list would mean several values."""
 
     def read(value: Any) -> str:
         numbers = parse_point(_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
@@ -104,7 +105,7 @@ def point(name: str, help: str, most: int | None = None) -> Option:
 def integers(name: str, help: str, expected: str, allowed: Sequence[int], ordered: bool = False) -> Option:
     """Return an option whose value is a text of integers separated by commas, or a single integer.
 
-    Unless `ordered` they form a set, whose canonical form is increasing and without repetitions.
+    Unless `ordered`, the integers form a set: its canonical form is increasing, without repetitions.
     """
 
     def read(value: Any) -> str:
@@ -130,7 +131,7 @@ def _read_prime(value: Any) -> str:
     expected = f"a prime of at most {_PRIME_BITS} bits"
     number = _integer(value, expected, range(2, 1 << _PRIME_BITS))
     GF(number)
-    return str(number)  # as text: JSON and databases may not hold long integers
+    return str(number)  # as text: JSON and databases may be unable to represent long integers
 
 
 def _read_names(value: Any) -> str:
@@ -212,7 +213,7 @@ def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fract
 
 
 EFFORT = "effort"
-OTHER = "other"  # read by the spec, which resolves paths; its canonical form is a system spec
+OTHER = "other"  # read with the spec, relative to whose folder paths are resolved; its canonical form is a system spec
 
 VOCABULARY = {
     option.name: option
@@ -264,7 +265,7 @@ VOCABULARY = {
 }
 
 DRAWS = ("eigenvalues", "generic")
-# Options of a random member of the family; its seed is that of VOCABULARY.
+# Options of a random member of the family, apart from the option seed, which is in VOCABULARY.
 FAMILY = {
     option.name: option
     for option in (

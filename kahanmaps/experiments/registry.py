@@ -4,9 +4,9 @@
     def family_space(system: SystemFile) -> Result:
         '''Compute the space of cubics that belong to A.'''
 
-The parameters are names of `options.VOCABULARY`, optional if they have a default; `system`, if present, is the system.
-A result is plain data; its "verdict" becomes the verdict of the record. A task of the laboratory only summarizes the
-result of a function, which is called with these options and defaults:
+Parameters are options in `options.VOCABULARY`, optional if they have a default; `system` is the system of the task. The
+result is plain data; its entry "verdict" becomes the verdict of the record. A task of the laboratory only summarizes
+the result of a library function, called with these options and defaults:
 
     @analysis("find-density", "preserve.densities:find_densities", eps=None, effort=1, seed=0)
     def density(search: DensitySearch) -> Result:
@@ -35,9 +35,9 @@ Result = dict[str, Any]
 FullResult = tuple[Result, Any]  # a result, and the object whose `to_json` gives the full report
 Function = Callable[..., Result | FullResult]
 Summary = Callable[[Any], Result]
-ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options with another name in the laboratory
+ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options, and other names of the same library arguments
 
-# The kind of system that a task needs.
+# The kinds of systems that tasks may need.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
 
 
@@ -59,7 +59,7 @@ class TaskKind:
         return tuple(name for name in self.options if name not in self.defaults)
 
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
-        """Perform the task; `options` are canonical, and `other` is a system."""
+        """Perform the task; `options` are canonical, except that the option `other` is a system."""
         options = dict(options)
         is_full = self.reports and options.pop(REPORT, False)
         arguments = {
@@ -108,7 +108,7 @@ def task(
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
         if (
             name in _KINDS and _KINDS[name].function.__code__ != function.__code__
-        ):  # equal if the module is imported twice
+        ):  # the same task, registered again when its module is imported twice
             raise TypeError(f"there are two tasks with the name {name}")
         if reports:
             names, defaults[REPORT] = [*names, REPORT], False
@@ -125,8 +125,8 @@ def analysis(
 ) -> Callable[[Summary], Summary]:
     """Register a function of the laboratory ("module:name", imported when it is called) as a kind of task.
 
-    It is called with the system file (or its attribute `of`) and the options, some of them `renamed`. The `defaults`
-    are given here and not in the library, since they enter the keys of tasks.
+    The arguments are the system file (or its attribute `of`) and the options; `renamed` maps options to parameter
+    names. The `defaults` are given here, not in the library, since they enter the keys of tasks.
     """
 
     def register(summarize: Summary) -> Summary:
@@ -145,7 +145,7 @@ def analysis(
 
 
 def task_kinds() -> Mapping[str, TaskKind]:
-    """Return all kinds of tasks by name, including those of KAHANMAPS_TASKS."""
+    """Return a dict from the names to all kinds of tasks, including tasks of users (KAHANMAPS_TASKS)."""
     for library_module in LIBRARY:
         import_module(library_module)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):

@@ -1,10 +1,10 @@
-"""The spec of a batch, in TOML: experiments, each a task for many systems and many values of its options.
+"""The spec of a batch in TOML: each experiment is a task for many systems and many values of its options.
 
     [experiments.commute]
     task = "check-commute"
     system = "family"                        # or a name of the catalogue, a path, or a list of these
-    options = { draw = "generic" }           # the same for all tasks
-    zip = [["m", "steps"]]                   # axes that vary together; all others are combined
+    options = { draw = "generic" }           # equal for all tasks
+    zip = [["m", "steps"]]                   # axes that vary together; all other axes are combined
 
     [experiments.commute.axes]               # one value, a list, a range, or a list with ranges in it
     m = "2..5"
@@ -12,13 +12,13 @@
     seed = "0..9999"
     eps = ["1/10", "0.05", "1/3..2/3 step 1/6"]
 
-    [experiments.commute.limits]             # of one task; [limits] at the top is for all experiments
+    [experiments.commute.limits]             # of one task; a top-level table [limits] is for all experiments
     time = "60 s"
     memory = "1 GB"
     digits = 20000
 
-All mistakes in a spec are reported together, each with its key; docs/batch.md lists all keys. Tables of experiments are
-read in experiment.py.
+All mistakes in a spec are reported together, each with its key; docs/batch.md lists all keys. The module experiment.py
+reads the table of an experiment.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _TOML = TomlKind("spec", MAX_BYTES, SpecError)
 
 @dataclass(frozen=True)
 class Spec:
-    """The experiments of a spec, and the system documents that their tasks name."""
+    """The experiments of a spec, and the system documents to which their tasks refer."""
 
     name: str
     experiments: tuple[Experiment, ...]
@@ -60,7 +60,7 @@ class Spec:
 
 
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
-    """Read the spec in a TOML file; paths of systems in it are relative to its folder.
+    """Read the spec in a TOML file; paths of system files in it are relative to the folder of the spec.
 
     With `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
     SpecError with all mistakes, and InputError if the file cannot be read.
@@ -78,7 +78,7 @@ def parse_spec(
     max_tasks: int = MAX_TASKS,
     skip_bad: bool = False,
 ) -> Spec:
-    """Read the spec from text in TOML; `where` names it in messages.
+    """Read a spec from TOML text; `where` names the text in messages.
 
     >>> table = '[experiments.a]\\ntask = "orbit"\\nsystem = "lorenz"\\n'
     >>> spec = parse_spec(table + 'axes = {eps = ["0.1", "1/7"], seed = "0..4"}')

@@ -1,4 +1,4 @@
-"""The tasks of checks, the paper, members and orbits, one function each.
+"""The tasks for checks, the claims of the paper, members of the family, and orbits; each task is one function.
 
 Results are small: counts, verdicts, numbers, and the witnesses of refutations. `report = true` stores the full report,
 as printed by `--json`.
@@ -32,14 +32,14 @@ from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
 _MIN_COMPILED = 5_000_000  # orbits times steps
-_MAX_POINT = 400  # characters of a last point; of a longer one only the hash is stored
+_MAX_POINT = 400  # maximal number of characters of a stored last point; a longer point is stored as its hash only
 
 
 _CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
 def _register_check(check: Check) -> None:
-    """Register the task of a check of one system, or of a pair at two time steps."""
+    """Register a task for a check, of one system or of a pair of systems with two time steps."""
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
@@ -137,7 +137,7 @@ def orbit(
         normal_form=normal_form,
     )
     reached = deque(trajectory, 1)
-    if not reached:  # perhaps none of the requested iterates was reached
+    if not reached:  # the orbit may end before the first requested iterate
         first = trajectory.orbit.start
         exact = parsed_arithmetic.kind == "exact"
         reached.append(OrbitPoint(0, parsed_arithmetic.field, IntegerPoint.from_rationals(first) if exact else first))
@@ -180,7 +180,7 @@ def ensemble(
     normal_form = float_normal_form(system, method)
     chosen = choose_method(method, "float", normal_form, None)
     form = normal_form.form if chosen.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
-    # Both kernels give the same numbers, but compiling one takes longer than a short task.
+    # Both kernels give the same numbers, but compiling takes longer than a short task.
     kernel = "numpy" if orbits * steps < _MIN_COMPILED else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
@@ -237,7 +237,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 
 def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
-    """Return a random initial point that depends on the system too: a fixed one may be special for some systems."""
+    """Return a random initial point determined by seed and system: a fixed point may be special for some systems."""
     return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 
 

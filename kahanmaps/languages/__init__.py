@@ -1,9 +1,9 @@
-"""Systems and their Kahan maps as files for other programs.
+"""Conversion of systems and their Kahan maps to files for other programs.
 
 formulas        the formulas of a system: right-hand sides, equation and closed form of the map, integrals, a density
-convert         these formulas as one function, and the files of all languages but LaTeX
-languages.toml  how these languages write functions and linear equations; expressions are written by SymPy's printers
+convert         the function `convert`, and the files in all languages except LaTeX
+languages.toml  syntax of functions and linear equations in these languages; SymPy's printers write expressions
 latex           the document in LaTeX
 
-A further language is a table in languages.toml and an entry in the lists of `convert` and of its command.
+A new language needs a table in languages.toml and an entry in the lists of `convert` and of its command.
 """

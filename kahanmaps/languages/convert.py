@@ -1,7 +1,7 @@
 """Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
-Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; the code around
-them is in languages.toml. Exact numbers stay exact in all languages but C, Fortran and NumPy, whose numbers are floats.
+The code printers of SymPy (the extra `[sympy]`) write expressions, except for PARI; languages.toml contains the code
+around expressions. Numbers stay exact in all languages except C, Fortran and NumPy, which use floats.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from kahanmaps.maps.kahan import SystemLike
 LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
 
-_LINE = 100  # characters of a line of an expression, after which it is broken
-_TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
-_MAX_INTEGER = 2**31  # of the integers of C and Fortran
-# Names without another meaning in any of the languages: a small letter with digits (but not i, which may be the
-# imaginary unit, and e), and words with an underscore (but those of GP's debugger). All other words may be functions.
+_LINE = 100  # maximal number of characters in a line of an expression
+_TERMS_TOGETHER = 100  # longer sums are split by brackets: parsers recurse over sums
+_MAX_INTEGER = 2**31  # bound for integers in C and Fortran
+# Names that have no other meaning in any language: a lower-case letter with digits (except i, which may be the
+# imaginary unit, and e), and words with an underscore (except those of GP's debugger). Other words may be functions.
 _FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
 
@@ -54,7 +54,7 @@ def convert(
         language: one of `LANGUAGES`, such as "pari" or "latex".
         what: a list of `PARTS`; None for the system, the map, and the integrals and density if they are known.
         name: prefix of the names of all functions, so that one session can load two systems; ignored in LaTeX.
-        symbols: parameters that stay symbols (not in a [family] file); they are arguments of functions after eps.
+        symbols: parameters that stay symbols (not in a [family] file); functions have them as arguments after eps.
         command: the command line that creates this file, for the initial comment.
 
     Returns:
@@ -108,14 +108,14 @@ def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
 
 
 class _Writer:
-    """The writer of a file: it chooses all names first, and writes functions after those that they call."""
+    """The writer of a file: it first chooses all names; a function is written after the functions that it calls."""
 
     def __init__(self, language: str, formulas: Formulas, prefix: str) -> None:
         tables = tomllib.loads(files(__package__).joinpath("languages.toml").read_text("utf-8"))
         self.language: dict[str, Any] = tables["defaults"] | tables[language]
         self.formulas = formulas
         self.polynomial = _polynomial_writer(self.language)
-        self.written: dict[str, str] = {}  # name in the language -> text
+        self.written: dict[str, str] = {}  # name of a function in the language -> its text
         self.used = {"point", "image", "eps", "value"}  # names in lower case, since Fortran ignores case
         self.prefix = [prefix] if prefix else []
         kind = "kahan" if formulas.rhs else "map"
@@ -123,14 +123,14 @@ class _Writer:
         default_names |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
         default_names |= {"kahan_map_formula": default_names["kahan_map"] + "_formula"}
         default_names |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
-        # Maps functions to their names in the file.
+        # Names of functions in the file: our name -> name in the file.
         self.names = {key: self._fresh_name(*self.prefix, name) for key, name in default_names.items()}
         for key in (*formulas.integrals, *formulas.forms):
             self.names[f"integral {key}"] = self._fresh_name(*self.prefix, "integral", key)
         self.placeholders = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
         self.placeholders |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
         self.placeholders |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
-        # The names of variables and symbols in the file: unchanged unless they have another meaning, and all different.
+        # Names of variables and symbols in the file: unchanged unless a name has another meaning; all are distinct.
         names = (*formulas.names, *formulas.new)
         free = {name for name in names if _FREE.fullmatch(name) and (self.language["underscores"] or "_" not in name)}
         self.safe = {name: self._fresh_name(name) for name in names if name in free}
@@ -139,7 +139,7 @@ class _Writer:
         self.symbols = [self.safe[name] for name in formulas.symbols]
 
     def _fresh_name(self, *words: str) -> str:
-        """Return an unused name made of these words, with a number if necessary, and reserve it."""
+        """Return an unused name composed of these words, with a number if necessary, and reserve it."""
         number = 1
         while True:
             numbered = [*words, str(number)] if number > 1 else words
@@ -178,7 +178,7 @@ class _Writer:
         return "\n\n".join(filter(None, pieces)) + "\n"
 
     def _write_part(self, part: str) -> None:
-        """Write the functions of a part and those that they call; rewriting a function has no effect."""
+        """Write the functions of a part and the functions that they call; each function is written only once."""
         formulas, is_kahan = self.formulas, bool(self.formulas.rhs)
         point = {"point": formulas.variables}
         if part == "system":
@@ -243,7 +243,7 @@ class _Writer:
         points: Mapping[str, Sequence[str]] | None = None,
         eps: bool = True,
     ) -> None:
-        """Write a function; `points` gives each argument that is a point with the names of its coordinates in the body.
+        """Write a function; `points` maps each argument that is a point to the names of its coordinates in the body.
 
         Without `points` the function has one point, used as a vector.
         """
@@ -289,7 +289,7 @@ class _Writer:
             sums = [self.polynomial(side.context().from_dict(group), self.safe) for group in groups]
             texts.append(sums[0] if len(sums) == 1 else " + ".join(f"({text})" for text in sums))
         expression = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
-        lines = [""]  # all but the last end with + or -, so that no language ends the statement there
+        lines = [""]  # every line but the last ends with + or -: no language ends the statement there
         for piece in re.split(r"(?<= [+-] )", expression):
             if lines[-1] and len(lines[-1]) + len(piece) > _LINE:
                 lines.append("")
@@ -301,7 +301,7 @@ class _Writer:
         return self._listed("vector", list(map(self._expression, entries)))
 
     def _listed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
-        """Return entries in the brackets of a vector, a row or a matrix, on one line if they fit."""
+        """Return entries in the brackets of a vector, a row or a matrix, on one line if it is not too long."""
         has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _LINE
         before, after = (Template(bracket).substitute(self.placeholders) for bracket in self.language[kind])
         return before + (between + (" " if has_room else "\n        ")).join(entries) + after
@@ -318,16 +318,16 @@ class _Writer:
         return Template(self.language[template]).substitute(self.placeholders | more)
 
     def _comment(self, line: str) -> str:
-        # A backslash at its end would continue the comment of C and Maple, the brackets are those of Mathematica.
+        # A backslash at the end would continue a comment in C and Maple; the brackets end a comment in Mathematica.
         safe = re.sub(r"\\$", "/", line.replace("(*", "( *").replace("*)", "* )"))
         before, after = self.language["comment"]
         return f"{before}{safe}{after}".rstrip()
 
 
 def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Mapping[str, str]], str]:
-    """Return the function that writes a polynomial with the names of the language for those of its ring.
+    """Return the function that writes a polynomial, given names in the language for the names in its ring.
 
-    Raises InputError where SymPy is needed and not installed.
+    Raises InputError if SymPy is needed and not installed.
     """
     if not language["printer"]:  # PARI
         return lambda polynomial, safe: Notation(
@@ -342,7 +342,7 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
         ) from error
 
     class ExactPrinter(StrPrinter):  # type: ignore[misc]
-        def _print_Rational(self, value: Any) -> str:  # 1/2 would be a float of Python
+        def _print_Rational(self, value: Any) -> str:  # without this, 1/2 would be a float in Python
             return f"Rational({value.p}, {value.q})"
 
     is_fortran = language["printer"] == "fcode"
@@ -361,6 +361,6 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
             text = str(code(sympy.Add(*terms), **settings))
         except ValueError as error:  # Python refuses to print more than 4300 digits
             raise InputError(f"found a number that is too long for SymPy: {error}") from error
-        return re.sub(r"&\n\s*", "", text)  # long lines of Fortran are broken later, with those of other languages
+        return re.sub(r"&\n\s*", "", text)  # long lines are broken later, in all languages
 
     return write

@@ -26,21 +26,21 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
-# The closed form of the map, all components together, before common factors are removed.
+# Limits for the closed form of the map (all components together) before common factors are removed.
 MAX_TERMS = 4_000
 MAX_DIMENSION_OF_FORMULAS = 8
 
 
 class Formulas:
-    """The formulas of a system file; the parameters in `symbols` stay symbolic, the others are numbers.
+    """The formulas of a system file; the parameters `symbols` stay symbolic, all other parameters are numbers.
 
     An algebraic number is also a symbol. `names` are the variables, then the symbols; `rhs`, its derivatives `jacobian`
-    and `H` are polynomials in these names, all others in these names and eps. For maps other than Kahan's `rhs` is
+    and `H` are polynomials in these names, other formulas in these names and eps. For maps other than Kahan's `rhs` is
     empty. `new` are names for the coordinates of the image x~ of a point.
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
-        """Collect the formulas; raises InputError if these parameters cannot be symbols."""
+        """Collect the formulas. Raises InputError if the parameters cannot be symbols."""
         self.file = file
         if isinstance(file.map, AlgebraicMap):
             if symbols:
@@ -60,7 +60,7 @@ class Formulas:
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
         self.integrals: Mapping[str, RationalFunction] = file.integrals
         self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H
-        if self.symbols:  # then claims are parsed again, with these names
+        if self.symbols:  # parse the claims again, with these names
             constants = {name: value for name, value in file.parameters.items() if name not in self.symbols}
             document = file.document
 
@@ -75,7 +75,7 @@ class Formulas:
 
     @cached_property
     def equation(self) -> list[list[fmpq_mpoly]]:
-        """The rows of (M | r), where M x~ = r is the map: M = I - eps f'(x), r = M x + 2 eps f(x) for Kahan's."""
+        """The rows of (M | r), where M x~ = r defines the map; for Kahan's M = I - eps f'(x), r = M x + 2 eps f(x)."""
         return [[*row[:-1], -row[-1]] for row in self.map.rows]
 
     @cached_property
@@ -90,8 +90,8 @@ class Formulas:
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
         """Yield the integrals of a Hamiltonian system in x and x~: name, formula as text, function.
 
-        For a member they are x^T M x~/eps with its matrices, otherwise H(x) + grad H(x)^T (x~ - x)/3; they are
-        functions of the variables, those of x~ (`new`), the symbols and eps.
+        For a member these are x^T M x~/eps with the M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3: functions of
+        the variables, the coordinates `new` of x~, the symbols and eps.
         """
         if self.H is None:
             return
@@ -115,8 +115,8 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """The messages for integrals and density if they are neither claimed in the file nor given by a theorem."""
-        if self.H is not None:  # then the modified H and det(I - eps f'(x)) are known
+        """The messages for integrals or a density that are neither claimed in the file nor given by a theorem."""
+        if self.H is not None:  # the modified H and the density det(I - eps f'(x)) are known
             return {}
         messages = {}
         if not self.integrals:
@@ -132,13 +132,13 @@ class Formulas:
         return messages
 
     def inverse_form(self) -> list[RationalFunction]:
-        """Return the components of the inverse of a map that is not Kahan's. Raises InputError if none is found."""
+        """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is not found."""
         return self._solved([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError if they are too large, after at most about a second unless coefficients are long.
+        Raises InputError if they are too large; this takes at most about a second unless coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load
@@ -157,7 +157,7 @@ class Formulas:
                 raise _too_large(f"a polynomial of {len(product)} terms, expected at most {MAX_TERMS} in all")
             return product
 
-        # (M | r) annihilates (x~, -1), hence the vector of its maximal minors, the last of which is -+det M.
+        # (M | r) annihilates (x~, -1); so it is proportional to the maximal minors, of which the last is -+det M.
         *numerators, denominator = kernel_minors(equation, times)
         components = []
         for minor in numerators:

@@ -1,4 +1,4 @@
-r"""Conversion to LaTeX: a complete article of displayed formulas, long sums broken between terms."""
+r"""Conversion to LaTeX: a complete article of displayed formulas, in which long sums are broken between terms."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.convention import describe_eps
 
-_LINE = 140  # characters of source on a line of a formula
-# The point and its image; x may be the name of a variable.
+_LINE = 140  # maximal number of source characters in a line of a formula
+# Symbols for the point and its image, distinct from x, which may be the name of a variable.
 _X, _Y = r"\mathbf x", r"\widetilde{\mathbf x}"
 
 Rows = list[tuple[str, str]]
 
 
 def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
-    """Return the document as text, with a display for each of the parts (of `convert.PARTS`), in LaTeX with amsmath.
+    """Return a LaTeX document (with amsmath) that displays each of `parts`, which are names in `convert.PARTS`.
 
     Raises InputError if the closed form of the map is requested and too large.
     """
@@ -34,7 +34,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
         lines += [rf"\noindent {sentence}: the time step is ${2 * formulas.map.time_steps} \varepsilon$.", ""]
     for part in parts:
         title, rows = _display(part, formulas)
-        # A long right-hand side is broken between its terms: it is always a sum outside braces.
+        # A long right-hand side is broken between terms of the sum outside braces.
         aligned = []
         for left, right in rows:
             pieces = [""]
@@ -52,7 +52,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
 
 
 def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
-    """Return the title of a part, and the two sides of its equations."""
+    """Return the title of a part and the two sides of each of its equations."""
     claimed = "" if formulas.file.catalog else ", as the file claims"
     if part == "system":
         left = (rf"\dot{{{latex_name(name)}}}" for name in formulas.variables)
@@ -97,7 +97,6 @@ def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Ro
 
 
 def _equations(formulas: Formulas) -> Rows:
-    """Return the components of a map that is not Kahan's, or the rows of M x~ = r."""
     rows: Rows = []
     for row in formulas.equation:
         entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]
@@ -129,7 +128,7 @@ def _label(name: str) -> str:
 
 
 def _quotient(left: str, function: RationalFunction) -> Rows:
-    """Return left = P/Q in one row if it is short; otherwise P and Q, without fractions, have rows of their own."""
+    """Return the row left = P/Q if it is short, otherwise separate rows for P and Q without fractions."""
     quotient = latex_rational_function(function)
     if len(quotient) <= _LINE or function.is_polynomial:
         return [(left, quotient)]

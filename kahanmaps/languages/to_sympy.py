@@ -1,4 +1,4 @@
-"""Polynomials, rational functions, systems and maps as expressions of SymPy, exactly."""
+"""Exact conversion of polynomials, rational functions, systems and maps to SymPy expressions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_MAX_DIMENSION = 6  # of a map whose equations are solved
+_MAX_DIMENSION = 6  # maximal dimension of a map whose equations are solved
 
 
 def _sympy() -> Any:
@@ -34,7 +34,7 @@ def _sympy() -> Any:
 
 @singledispatch
 def sympy_form(value: object) -> Any:
-    """Return a value as an expression of SymPy; of a system or a map as a dictionary from symbols to expressions."""
+    """Convert a value to a SymPy expression; a system or a map becomes a dict from symbols to expressions."""
     raise InputError(f"found a {type(value).__name__}, expected a function, a system or a map at one eps")
 
 

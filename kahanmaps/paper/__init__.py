@@ -1,1 +1,1 @@
-"""The paper of Petrera and Suris: every claim as a short function, and their verification."""
+"""The claims of the paper of Petrera and Suris, each as a short function, and their verification."""

@@ -1,7 +1,7 @@
-"""Negative controls: input that violates exactly one hypothesis, for which the claims that need it must fail.
+"""Negative controls: input that violates exactly one hypothesis; the claims that need this hypothesis must fail.
 
-A control takes the paper's objects and returns changed ones; the change is random. A claim names the controls that
-refute it. A claim that no control can refute would not be a check.
+A control takes the paper's objects and returns them with one random change. A claim names the controls that must refute
+it; a claim that no control can refute would check nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 @dataclass(frozen=True)
 class Control:
-    """A negative control: the hypothesis that it violates, and how."""
+    """A negative control: the violated hypothesis as text, and the function that changes the objects."""
 
     breaks: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -24,7 +24,7 @@ class Control:
 
 
 def broken_H(o: PaperObjects) -> PaperObjects:
-    """H plus the cube of a random linear form; for m = 1, where every cubic is allowed, f is doubled but not H."""
+    """Add the cube of a random linear form to H; for m = 1, where every cubic is allowed, double f but not H."""
     if o.m == 1:
         return o.changed(base=o.f.transformed(o.I * o.number(2)))
     u = o.vector("break 1")
@@ -32,13 +32,13 @@ def broken_H(o: PaperObjects) -> PaperObjects:
 
 
 def broken_J(o: PaperObjects) -> PaperObjects:
-    """J plus a random skew matrix of rank 2; for m = 1, where A^T J = J A holds for every skew J, 2 J."""
+    """Add a random skew matrix of rank 2 to J; for m = 1, where A^T J = J A for every skew J, double J."""
     u, v = o.vector("break 1"), o.vector("break 2")
     return o.changed(J=o.J + u * v.transpose() - v * u.transpose(), base=None)
 
 
 def broken_f(o: PaperObjects) -> PaperObjects:
-    """f plus a random vector times the square of a random linear form; H is unchanged."""
+    """Add a random vector times the square of a random linear form to f; H is unchanged."""
     p, u = o.vector("break 1"), o.vector("break 2")
     return o.changed(base=SystemOver(o.K, o.f.tensor + o.tensor(p, u, u), o.f.B, o.f.c))
 
@@ -49,13 +49,13 @@ def broken_B(o: PaperObjects) -> PaperObjects:
 
 
 def repeated_root(o: PaperObjects) -> PaperObjects:
-    """A + (lambda_2 - lambda_1) E_1, E_1 the projector to lambda_1: still skew-Hamiltonian, H still in its space."""
+    """Replace A by A + (lambda_2 - lambda_1) E_1: A stays skew-Hamiltonian, H stays in its space."""
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
     return o.changed(A=A, roots=(o.lam[1], *o.lam[1:]), known_chi=None)
 
 
 def linear_f(o: PaperObjects) -> PaperObjects:
-    """The quadratic part of H alone: then f is linear, and maps with all time steps commute."""
+    """Replace H by its quadratic part: then f is linear, and its maps with different time steps commute."""
     zero = o.zeros(o.n * o.n, o.n)
     return o.inhomogeneous().changed(third=zero, gradient_of_linear_part=o.zeros(o.n, 1), base=None, draw=o.vector)
 
@@ -65,14 +65,14 @@ def _rank_1(o: PaperObjects) -> Any:
 
 
 CONTROLS: dict[str, Control] = {
-    "A": Control("A is not skew-Hamiltonian", lambda o: o.changed(A=o.A + _rank_1(o))),  # H, J and the roots stay
+    "A": Control("A is not skew-Hamiltonian", lambda o: o.changed(A=o.A + _rank_1(o))),  # H, J, roots unchanged
     "H": Control("H is outside the space of A", broken_H),
     "J": Control("J is not the standard structure, and A^T J = J A fails", broken_J),
     "f": Control("f is not Hamiltonian", broken_f),
-    # f'' v gains a random matrix times the first component of v.
+    # Add a random matrix times the first component of v to f'' v.
     "f''": Control("f'' is not the derivative of f'", lambda o: o.changed(error_of_second=_rank_1(o))),
     "B": Control("B^2 = I fails: B_i(lambda_i) = 2", broken_B),
-    # B_i takes the value 1 at its own root as well, so that all associated systems are f.
+    # Set B_i(lambda_i) = 1: then every B_i is I, and all associated systems are f.
     "B=I": Control(
         "all B_i are I", lambda o: o.changed(minus=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
     ),
@@ -89,7 +89,7 @@ CONTROLS: dict[str, Control] = {
     "A=B": Control("A itself has A^2 = I", lambda o: o.changed(A=o.B(0)), least_m=2),
     "H0": Control("H = 0", lambda o: o.changed(third=o.zeros(o.n * o.n, o.n), base=None)),
     "linear": Control("f is linear", linear_f),
-    # With quadratic and linear terms, such that A nabla^2 H = nabla^2 H A^T still holds.
+    # Add quadratic and linear terms to H such that A nabla^2 H = nabla^2 H A^T still holds.
     "inhomogeneous": Control("H is not homogeneous", PaperObjects.inhomogeneous),
     "unvaried": Control(
         "nothing is varied: H homogeneous, J standard, equal steps, distinct roots", lambda o: o.changed(varied=False)
@@ -98,7 +98,7 @@ CONTROLS: dict[str, Control] = {
 
 
 def broken(name: str, objects: PaperObjects) -> PaperObjects:
-    """The objects changed by a control; the vectors drawn so far stay the same."""
+    """Return the objects changed by a control; vectors that were drawn before are unchanged."""
     changed = CONTROLS[name].function(objects)
     changed.draw = objects.vector
     return changed

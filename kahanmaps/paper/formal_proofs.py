@@ -1,9 +1,9 @@
 """Formal proofs of the facts (5)-(12), which hold for every quadratic f and every cubic H in every dimension.
 
-In dimension 6 there would be too many coordinates. None are needed: the facts follow from a few identities between
-multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any symmetric trilinear form and
-J any skew matrix. Each function yields the pairs of expressions that have to be equal; docs/mathematics.md, "Formal
-proofs", says how the claims follow from them.
+A proof in coordinates would have too many of them in dimension 6. The facts follow without coordinates from a few
+identities between multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any symmetric
+trilinear form and J any skew matrix. Each function yields the pairs of expressions that have to be equal;
+docs/mathematics.md, "Formal proofs", says how the claims follow from them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ EPS = fmpq_poly([0, 1])
 
 @dataclass(frozen=True, eq=False)
 class Expression:
-    """A linear combination of terms with coefficients in Q[eps]; equal expressions have equal coefficients."""
+    """A linear combination of terms with coefficients in Q[eps]; `==` compares the coefficients."""
 
     coefficients: dict[Term, Scalar]
 
@@ -46,7 +46,7 @@ class Expression:
     __rmul__ = __mul__
 
     def times(self, other: Expression) -> Expression:
-        """Return the product of two combinations of words, which do not commute."""
+        """Return the (non-commutative) product of two linear combinations of words."""
         pairs = product(self.coefficients.items(), other.coefficients.items())
         return combine([(left + right, a * b) for (left, a), (right, b) in pairs])
 
@@ -60,13 +60,13 @@ def combine(terms: list[tuple[Term, Scalar]]) -> Expression:
 
 
 def letter(name: str) -> Expression:
-    """Return a letter as an expression."""
+    """Return the expression that is a single letter."""
     return Expression({(name,): fmpq_poly([1])})
 
 
 @dataclass(frozen=True)
 class Multilinear:
-    """A multilinear map of which only the symmetry is known: 1 symmetric, -1 skew, 0 none."""
+    """A multilinear map known only by its symmetry: 1 for symmetric, -1 for skew, 0 for none."""
 
     name: str
     symmetry: int = 0
@@ -111,7 +111,7 @@ class KahanEquation:
         return self.Q(x, v) * 2 + self.B(v)
 
     def E(self, x: Expression, y: Expression, eps: Scalar = EPS) -> Expression:
-        """Return y - x - 2 eps (Q(x, y) + B(x + y)/2 + c), which is 0 where y = Phi(x)."""
+        """Return y - x - 2 eps (Q(x, y) + B(x + y)/2 + c), which is 0 if y = Phi(x)."""
         return y - x - (self.Q(x, y) * 2 + self.B(x + y) + self.c * 2) * eps
 
     def M(self, x: Expression, v: Expression) -> Expression:
@@ -145,18 +145,19 @@ def jacobian_of_any_map(Q: Multilinear = Q) -> Pairs:
 def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -> Pairs:
     """Yield the identities that imply (11), for three successive points x, y, z of an orbit.
 
-    H(x) = T(x, x, x) with a last coordinate 1 of x. G_uv is the covector with G_uv . w = 3 T(u, v, w) for all w with
-    last coordinate 0. Kahan's equation reads y - x = 2 eps J G_xy, hence T(u, v, y - x) = (2 eps/3) G_uv . J G_xy.
+    H(x) = T(x, x, x), where a last coordinate 1 is appended to x. G_uv is the covector with G_uv . w = 3 T(u, v, w) for
+    all w with last coordinate 0. Kahan's equation reads y - x = 2 eps J G_xy, hence T(u, v, y - x) = (2 eps/3) G_uv . J
+    G_xy.
     """
     pairing = skew or Multilinear("G.JG", symmetry=-1)
     steps = {"xy": Y - X, "yz": Z - Y}
-    parts = ((X, Y, "xy", "xy"), (Y, Z, "yz", "xy"), (X, Y, "xy", "yz"))  # u, v, name of G_uv, step from there
+    parts = ((X, Y, "xy", "xy"), (Y, Z, "yz", "xy"), (X, Y, "xy", "yz"))  # u, v, the name of G_uv, and the step
     differences = (T(u, v, steps[step]) for u, v, _, step in parts)
     by_the_equation = (pairing(letter(G), letter(step)) for _, _, G, step in parts)
     none = Expression({})
     yield sum(differences, none), T(Y, Y, Z) - T(X, X, Y)
     yield sum(by_the_equation, none), none
-    yield T(X, X, X) + T(X, X, Y - X), T(X, X, Y)  # H + (1/3) nabla H . (y - x), which is the second form
+    yield T(X, X, X) + T(X, X, Y - X), T(X, X, Y)  # the second form of the integral, H + (1/3) nabla H . (y - x)
 
 
 def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:

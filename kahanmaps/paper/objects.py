@@ -1,9 +1,9 @@
-"""The objects that the paper denotes by letters, at a point over a field; claims are functions of these objects.
+"""The objects that the paper denotes by letters, at a point x over a field; claims are functions of these objects.
 
-Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K; x
-and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
-rational functions, an algebra Q[t]/chi, complex balls, dual numbers, or mere bounds for sizes. Vectors are columns. No
-hypothesis is checked here: the controls evaluate input that violates one.
+The notation is that of the paper: A, J, H (with the chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated
+g and K, x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`: the rationals, GF(p), rational
+functions, an algebra Q[t]/chi, complex balls, dual numbers, or bounds for degrees and coefficients. Vectors are
+columns. Hypotheses are not checked here, since controls violate them on purpose.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
 Method = TypeVar("Method", bound=Callable[..., Any])
-# The data that consist of elements of K: numbers, matrices, tuples of them, a system.
+# The fields of `PaperObjects` that consist of elements of K: numbers, matrices, tuples of these, a system.
 _IN_K = (
     *("A", "J", "third", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part"),
     *("gradient_of_linear_part", "lower_terms", "minus", "step_eps", "base", "error_of_second"),
@@ -32,10 +32,7 @@ _IN_K = (
 
 
 def remembered(method: Method) -> Method:
-    """Cache the values of a method by the identity of its arguments, to which references are kept.
-
-    The claims need the same values many times.
-    """
+    """Cache the values of a method by the `id` of its arguments; references keep the arguments alive."""
     name = method.__name__
 
     @wraps(method)
@@ -52,10 +49,10 @@ def remembered(method: Method) -> Method:
 class PaperObjects:
     """The paper's objects over the field `K`.
 
-    `third` holds the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw`
-    gives further vectors by name (random ones at a point, indeterminates in a proof). `step_eps` is the eps of the maps
-    and `minus` the value of B_i at its own root; other values are for controls. So are `method`, which may be the
-    explicit Euler method, and `error_of_second`, an error of the tensor f''.
+    `third` contains the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H.
+    `draw` returns further vectors by name (random vectors at a point, indeterminates in a proof). `step_eps` is the eps
+    of the maps, and `minus` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler
+    method), and `error_of_second`, an error of the tensor f''.
     """
 
     K: Field
@@ -68,19 +65,19 @@ class PaperObjects:
     _memory: dict[Any, Any] = field(default_factory=dict)
     A: Any
     third: Any
-    J: Any = None  # [[0, I], [-I, 0]] unless it is given
+    J: Any = None  # by default [[0, I], [-I, 0]]
     roots: tuple[Any, ...] | None
-    hessian_of_quadratic_part: Any = None  # of an inhomogeneous H
+    hessian_of_quadratic_part: Any = None  # for an inhomogeneous H
     gradient_of_linear_part: Any = None
     minus: Any = None
-    base: SystemOver | None = None  # f_0, where it comes from a rational system
+    base: SystemOver | None = None  # f_0, if it is given by a rational system
     sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to be tested; None: all
-    associate_matrices: tuple[Any, ...] | None = None  # their B, where they are given without the roots of chi
-    free_indices: tuple[int, ...] | None = None  # those i that a claim for all i is tried at; None: all
-    order: int = 3  # to which order in eps^2 series are expanded
-    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient of the inhomogeneous part, where it is given
-    known_chi: tuple[Any, ...] | None = None  # coefficients of chi, constant term first, where they are in K
-    varied: bool = True  # whether variations are applied; False for their control
+    associate_matrices: tuple[Any, ...] | None = None  # their matrices B, if given without the roots of chi
+    free_indices: tuple[int, ...] | None = None  # indices i for which a claim "for all i" is tested; None: all
+    order: int = 3  # order in eps^2 up to which series are expanded
+    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 of lower terms of H
+    known_chi: tuple[Any, ...] | None = None  # coefficients of chi in K, constant term first
+    varied: bool = True  # whether variations are applied; False for the control
 
     def __post_init__(self) -> None:
         if self.step_eps is None:
@@ -117,7 +114,7 @@ class PaperObjects:
         return self.vector("x")
 
     def vector(self, name: str) -> Any:
-        """Return an independent vector: the point x, another point, a direction."""
+        """Return the independent vector with this name: the point x, another point, or a direction."""
         if name not in self._memory:
             self.used.add(name)
             self._memory[name] = self.draw(name)
@@ -158,7 +155,7 @@ class PaperObjects:
         return (left.transpose() * right)[0, 0]
 
     def sum(self, terms: Sequence[Any]) -> Any:
-        """Return the sum of numbers, vectors or matrices (at least one)."""
+        """Return the sum of a non-empty sequence of numbers, vectors or matrices."""
         total = terms[0]
         for term in terms[1:]:
             total = total + term
@@ -192,17 +189,17 @@ class PaperObjects:
 
     @remembered
     def jac(self, f: SystemOver, x: Any) -> Any:
-        """The Jacobi matrix f'(x)."""
+        """Return the Jacobi matrix f'(x)."""
         return f.jacobian(x.entries())
 
     def second(self, f: SystemOver, v: Any) -> Any:
-        """Return the matrix f''v, with f'(x + v) = f'(x) + f''v."""
+        """Return the matrix f''v, for which f'(x + v) = f'(x) + f''v."""
         second = f.hessian_times(v.entries())
         return second if self.error_of_second is None else second + self.error_of_second * v[0, 0]
 
     @remembered
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
-        """Return Phi_f(x, eps), or Phi_f(x, times eps)."""
+        """Return Phi_f(x, `times` eps)."""
         eps = self.step_eps * self.number(times)
         if self.method == "euler":
             return x + self.value(f, x) * (eps * self.number(2))
@@ -284,7 +281,7 @@ class PaperObjects:
 
     @remembered
     def hess(self, x: Any, i: int = 0) -> Any:
-        """The Hesse matrix of H_i, nabla^2 H_i = A^i nabla^2 H_0 (the chain's definition)."""
+        """Return the Hesse matrix nabla^2 H_i = A^i nabla^2 H_0 at x (by definition of the chain)."""
         hessian = self._reshaped(self.third * x)
         if self.hessian_of_quadratic_part is not None:
             hessian = hessian + self.hessian_of_quadratic_part
@@ -297,22 +294,22 @@ class PaperObjects:
 
     @remembered
     def grad(self, x: Any, i: int = 0) -> Any:
-        """nabla H_i = A^i nabla H_0."""
+        """Return nabla H_i(x) = A^i nabla H_0(x)."""
         gradient = self._reshaped(self.third * x) * x * self.number(1, 2)
         if self.hessian_of_quadratic_part is not None:
             gradient = gradient + self.hessian_of_quadratic_part * x + self.gradient_of_linear_part
         return self.A_to(i) * gradient
 
     def H(self, x: Any, i: int = 0) -> Any:
-        """Return H_i(x), where nabla H_i = A^i nabla H_0 if it exists, by Euler's formula for each degree."""
+        """Return H_i(x) by Euler's formula for each degree; nabla H_i = A^i nabla H_0 if such an H_i exists."""
         return self.potential(self.A_to(i), x)
 
     def gradient_of_chain(self, i: int, x: Any) -> Any:
-        """The gradient of the function H_i at x, by differentiation."""
+        """Return the gradient at x of the function `H`(x, i), by differentiation."""
         return self.gradient(lambda o, x: o.H(x, i), x)
 
     def potential(self, matrix: Any, x: Any) -> Any:
-        """The function that vanishes at 0 with gradient `matrix` nabla H_0, if there is one."""
+        """Return at x the function with gradient `matrix` nabla H_0 that is 0 at 0, if there is one."""
         value = self.dot(x, matrix * (self._reshaped(self.third * x) * x)) * self.number(1, 6)
         if self.hessian_of_quadratic_part is not None:
             value = value + self.dot(x, matrix * (self.hessian_of_quadratic_part * x)) * self.number(1, 2)
@@ -342,7 +339,7 @@ class PaperObjects:
 
     @property
     def lam(self) -> tuple[Any, ...]:
-        """The roots of chi: the eigenvalues of A, each of them double."""
+        """The roots of chi, which are the eigenvalues of A; each eigenvalue is double."""
         self.used.add("roots")
         if self.roots is None:
             raise LookupError("the roots of chi do not lie in this field")
@@ -350,7 +347,7 @@ class PaperObjects:
 
     @property
     def each(self) -> range:
-        """The indices i of the roots."""
+        """The indices i of the roots lambda_i."""
         return range(len(self.lam))
 
     @property
@@ -360,9 +357,10 @@ class PaperObjects:
 
     @remembered
     def lagrange(self, i: int) -> list[Any]:
-        """The coefficients of B_i(lambda), of degree < m, with B_i(lambda_i) = -1 and B_i(lambda_j) = 1.
+        """Return the coefficients of the polynomial B_i of degree < m with B_i(lambda_i) = -1 and B_i(lambda_j) = 1.
 
-        From the roots by Lagrange's formula 1 + (B_i(lambda_i) - 1) prod (lambda - lambda_j)/(lambda_i - lambda_j).
+        Lagrange's formula: B_i(lambda) = 1 + (B_i(lambda_i) - 1) prod_{j != i} (lambda - lambda_j)/(lambda_i -
+        lambda_j).
         """
         product, denominator = [self.K.one], self.K.one
         for j in self.each:
@@ -375,7 +373,7 @@ class PaperObjects:
         return coefficients
 
     def polynomial_in_A(self, coefficients: Sequence[Any]) -> Any:
-        """The polynomial in A with these coefficients, constant term first."""
+        """Return the polynomial in A with these coefficients, constant term first."""
         return self.sum([self.A_to(k) * coefficient for k, coefficient in enumerate(coefficients)])
 
     @remembered
@@ -392,7 +390,7 @@ class PaperObjects:
         return product
 
     def associates(self) -> Iterator[Any]:
-        """The matrices B of the associated systems except I, up to sign."""
+        """Yield the matrices B of the associated systems up to sign, except I."""
         if self.associate_matrices is not None:
             yield from self.associate_matrices
             return
@@ -402,7 +400,7 @@ class PaperObjects:
             yield self._memory["B", signs]
 
     def all_signs(self) -> tuple[tuple[int, ...], ...]:
-        """The sign vectors of the associated systems that are tested."""
+        """The sign vectors s of the associated systems that are tested."""
         count = len(self.lam)
         if self.sign_vectors is not None:
             return self.sign_vectors
@@ -416,11 +414,11 @@ class PaperObjects:
         return self.hamiltonian_system(B)
 
     def g_(self, i: int) -> SystemOver:
-        """g_i, the system associated by B_i."""
+        """Return g_i, the system associated to f by B_i."""
         return self.g(self.B(i))
 
     def Kf(self, B: Any, x: Any) -> Any:
-        """K(x) with nabla K = B nabla H_0."""
+        """Return K(x), where nabla K = B nabla H_0 and K(0) = 0."""
         return self.potential(B, x)
 
     @cached_property
@@ -444,7 +442,7 @@ class PaperObjects:
 
     @remembered
     def integral(self, g: SystemOver, x: Any) -> Any:
-        """eps^{-1} x^T J x^ with x^ = Phi_g(x): H~ for g = f, K~ for an associated g."""
+        """Return eps^{-1} x^T J x^, where x^ = Phi_g(x): H~ for g = f, K~ for an associated g."""
         return self.dot(x, self.J * self.step(g, x)) / self.eps
 
     @remembered
@@ -460,7 +458,7 @@ class PaperObjects:
 
     @remembered
     def modified(self, B: Any, x: Any) -> Any:
-        """K + (2 eps/3) nabla K^T (I - eps g')^{-1} g for the associated g, a function that tends to K."""
+        """Return K + (2 eps/3) nabla K^T (I - eps g')^{-1} g for the associated g; it tends to K for eps -> 0."""
         g = self.f if B is self.I else self.g(B)
         increment = self.solve(self.minus_eps_jac(g, x), self.value(g, x))
         return self.potential(B, x) + self.dot(B * self.grad(x), increment) * self.eps * self.number(2, 3)
@@ -482,7 +480,7 @@ class PaperObjects:
 
     @remembered
     def projector(self, i: int) -> Any:
-        """The projector onto the eigenspace of A for lambda_i: prod (A - lambda_j)/(lambda_i - lambda_j), j != i."""
+        """Return the projector onto the eigenspace for lambda_i: prod_{j != i} (A - lambda_j)/(lambda_i - lambda_j)."""
         product = self.I
         for j in self.each:
             if j != i:
@@ -491,11 +489,11 @@ class PaperObjects:
 
     @remembered
     def eigenvalue_of_square(self, i: int, x: Any) -> Any:
-        """The eigenvalue of f'^2 on the eigenspace of A^T for lambda_i, that is -D_i, D_i = det of the planar f'."""
+        """Return -D_i, the eigenvalue of f'^2 on the eigenspace of A^T for lambda_i; D_i = det f' on this plane."""
         return self.trace(self.projector(i).transpose() * self.square(x)) * self.number(1, 2)
 
     def block_determinant(self, i: int, x: Any) -> Any:
-        """D_i, the determinant of the planar f'."""
+        """Return D_i, the determinant of f' on the plane of lambda_i."""
         return -self.eigenvalue_of_square(i, x)
 
     @remembered
@@ -505,7 +503,7 @@ class PaperObjects:
 
     @remembered
     def p0(self, x: Any) -> Any:
-        """p_0 = (4 - m)/8 tr f'^2, for m = 3 the paper's 1/8 tr f'^2."""
+        """Return p_0 = (4 - m)/8 tr f'^2; for m = 3 this is the paper's 1/8 tr f'^2."""
         return self.eighth_of_trace(x) * self.number(4 - self.m)
 
     @remembered
@@ -515,7 +513,7 @@ class PaperObjects:
 
     @remembered
     def coefficient_of_power(self, k: int, x: Any) -> Any:
-        """pi_k with f'^2 = sum_k pi_k (A^T)^k; for m = 3 the paper's p, q, r."""
+        """Return pi_k, where f'^2 = sum_k pi_k (A^T)^k; for m = 3 these are the paper's p, q, r."""
         value = self.p0(x) if k == 0 else self.K.zero
         for i in self.each:
             value = value + self.lagrange(i)[k] * self.q(i, x)
@@ -536,7 +534,7 @@ class PaperObjects:
 
     @remembered
     def P0(self, x: Any) -> Any:
-        """P_0 = ((m - 2)^2 + (4 - m) sum 1/s_j)/4, for m = 3 the paper's (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4."""
+        """P_0 = ((m - 2)^2 + (4 - m) sum 1/s_j)/4; for m = 3 this is the paper's (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4."""
         m = self.m
         return (self.number((m - 2) ** 2) + self.number(4 - m) * self.reciprocals(x)) * self.number(1, 4)
 
@@ -573,10 +571,11 @@ class PaperObjects:
         return PaperObjects(**{**kept, "_memory": {}, **changes})
 
     def inhomogeneous(self) -> PaperObjects:
-        """Return the objects with quadratic and linear terms in H, such that A nabla^2 H = nabla^2 H A^T still holds.
+        """Add random quadratic and linear terms to H such that A nabla^2 H = nabla^2 H A^T still holds.
 
-        The quadratic part has the Hesse matrix X = sum over three vectors u of sum_i A^i u u^T C_i(A)^T with Horner's
-        polynomials C_i of chi: A X - X A^T = sum (chi(A) u u^T - u u^T chi(A)^T) = 0. The linear part is arbitrary.
+        The quadratic part has the Hesse matrix X = sum_u sum_i A^i u u^T C_i(A)^T over three vectors u, where C_i are
+        Horner's polynomials of chi: A X - X A^T = sum_u (chi(A) u u^T - u u^T chi(A)^T) = 0. The linear part is
+        arbitrary.
         """
         if self.hessian_of_quadratic_part is not None:
             return self
@@ -602,7 +601,7 @@ class PaperObjects:
         return objects
 
     def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
-        """Return the objects of a quadratic system without special structure: f'', B and c are random."""
+        """Return a quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
         for j in range(n):
@@ -615,10 +614,10 @@ class PaperObjects:
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
 
     def arbitrary_system_over_the_algebra(self) -> SystemOver:
-        """A planar quadratic system over Q[A^T]: f = sum of M_a(x) M_b(x) e, M_c(x) e' and a constant, random vectors.
+        """Return a planar quadratic system over Q[A^T]: a sum of terms M_a(x) M_b(x) e and M_c(x) e', and a constant.
 
-        M_a(x) = sum_k (a^T (A^T)^k x) C_k(A)^T with Horner's polynomials C_k of chi; since chi(A) = 0 it is linear over
-        Q[A^T], as every linear form with values there.
+        M_a(x) = sum_k (a^T (A^T)^k x) C_k(A)^T with Horner's polynomials C_k of chi and random vectors a, b, c, e, e'.
+        Since chi(A) = 0, M_a is linear over Q[A^T]; every Q[A^T]-valued linear form has this form.
         """
         n, K = self.n, self.K
 
@@ -638,7 +637,7 @@ class PaperObjects:
         return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
     def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
-        """A cubic H with terms of all degrees and a skew J (`standard` or not), both without further structure."""
+        """Return objects with a random H with terms of all degrees up to 3, and a skew J, random unless `standard`."""
         n, K = self.n, self.K
         tensor: dict[tuple[int, ...], Any] = {}
         for i, j in itertools.combinations_with_replacement(range(n), 2):
@@ -659,10 +658,10 @@ class PaperObjects:
         )
 
     def symplectic_normal_form(self) -> tuple[Any, Any]:
-        """S and the companion matrix W of chi with A S = S diag(W, W^T) and S^T J S = J.
+        """Return S and the companion matrix W of chi, for which A S = S diag(W, W^T) and S^T J S = J.
 
-        For the form u^T J w the matrix A is self-adjoint, so that e, A e, ..., A^{m-1} e span an isotropic space; the
-        dual basis is taken in the space spanned by h, A h, ..., which is isotropic as well.
+        A is self-adjoint for the form u^T J w. Hence e, A e, ..., A^{m-1} e span an isotropic space, and so do h, A h,
+        ..., from whose span the dual basis is taken.
         """
         m, K = self.m, self.K
         e, h = self.vector("e"), self.vector("h")
@@ -701,10 +700,11 @@ class PaperObjects:
         rows = []
         for a, b, c in itertools.combinations_with_replacement(range(n), 3):
             row = [K.zero] * (n * len(pairs))
-            # The Hesse matrix of x_a x_b x_c has x_l in the places (j, k) and (k, j), {j, k, l} = {a, b, c}.
+            # The Hesse matrix of x_a x_b x_c contains x_l in the entries (j, k) and (k, j), where {j, k, l} = {a, b,
+            # c}.
             for j, k, l in set(itertools.permutations((a, b, c))):
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
-                for i in range(n):  # entry (i, k) of A nabla^2 H gains A_ij, entry (k, i) of nabla^2 H A^T as well
+                for i in range(n):  # add A_ij to entry (i, k) of A nabla^2 H and to entry (k, i) of nabla^2 H A^T
                     if i != k:
                         column = l * len(pairs) + pairs[min(i, k), max(i, k)]
                         row[column] = row[column] + self.A[i, j] * (factor if i < k else -factor)

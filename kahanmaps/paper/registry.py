@@ -1,10 +1,10 @@
-"""The registry of the paper's claims: one short function each, with its place in the paper; and their evaluation.
+"""The registry of the paper's claims, each a short function with its place in the paper, and their evaluation.
 
 A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f, B_i, x, eps, ...) and yields pairs
-(left, right) which the paper says are equal. It does not depend on the kind of numbers: the same function is evaluated
-at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra Q[t]/chi, over
-complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the file of its
-section, with a title and a formula as its docstring.
+(left, right) which the paper says are equal. It does not depend on the kind of numbers: it is evaluated at random
+points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra Q[t]/chi, over complex
+balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the file of its section,
+with a title and a formula as its docstring.
 
 Formulas are printed for every m for which the statement makes sense. If the paper states a formula for m = 3 only, the
 general formula reduces to it.
@@ -41,16 +41,16 @@ SECTIONS: dict[int, tuple[str, str]] = {
     10: ("Beyond the paper", "further_claims"),
     11: ("The question of the conclusions", "conclusions"),
 }
-SECTION_NAMES = {"beyond": 10, "conclusions": 11}  # of those that are not numbered in the paper
+SECTION_NAMES = {"beyond": 10, "conclusions": 11}  # numbers of sections that are not numbered in the paper
 
 
 class ClaimKind(StrEnum):
-    """The assertion of a claim about its pairs."""
+    """The assertion of a claim about the two sides of its pairs."""
 
-    EQUAL = "equal"  # both sides are equal, everywhere
-    DIFFERENT = "different"  # the sides of every pair differ somewhere: one point where all do is a proof
-    # The rank on the left is the one on the right at some point. One point over Q or GF(p) shows that it is not smaller
-    # in general, since ranks do not grow modulo p; that it is not larger needs a reason (`at_most`).
+    EQUAL = "equal"  # both sides are equal at all points
+    DIFFERENT = "different"  # each pair differs at some point: one point for all pairs is a proof
+    # The maximal rank of the left side is the right side. One point over Q or GF(p) shows that it is not smaller, since
+    # ranks do not grow modulo p; that it is not larger needs a reason (`at_most`).
     ATTAINED = "attained"
     EXISTS = "exists"  # both sides are equal for some choice of the free vectors: one point over Q is a proof
 
@@ -59,8 +59,8 @@ class ClaimKind(StrEnum):
 class Claim:
     """One statement or display of the paper.
 
-    `place` names it in the paper ("Lemma 3", "(28)"), `label` is its label in the LaTeX source. `breaks` lists the
-    controls: inputs that violate one hypothesis, for which the same function must be refuted.
+    `place` is the number of the statement in the paper ("Lemma 3", "(28)"), `label` its label in the LaTeX source.
+    `breaks` lists the controls: inputs that violate one hypothesis, for which the claim must be refuted.
     """
 
     key: str
@@ -71,25 +71,25 @@ class Claim:
     function: ClaimFunction
     breaks: tuple[str, ...]
     kind: ClaimKind = ClaimKind.EQUAL
-    at_most: str = ""  # for a rank that is attained: why it cannot be larger
+    at_most: str = ""  # for a claim that a rank is attained: why the rank cannot be larger
     least_m: int = 1
     only_m: int | None = None
     in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing
-    distinct_roots: bool = False  # makes sense only where chi has no repeated root, as all that uses the roots
+    distinct_roots: bool = False  # needs distinct roots, as all claims that contain the roots
     # A claim about a product of planar systems follows from the same claim about one block (blockwise) or about any
-    # two blocks (pairwise); docs/mathematics.md says why, and which claims are of that kind.
+    # two blocks (pairwise); docs/mathematics.md gives the reason, and lists these claims.
     blockwise: bool = False
     pairwise: bool = False
-    symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
-    theorem: str = ""  # the theorem that proves it for all data without expansion; its hypotheses hold by construction
+    symplectic: bool = True  # invariant under symplectic changes of coordinates and extensions of the field
+    theorem: str = ""  # a theorem that proves it without expansion; its hypotheses hold by construction
     formal: Callable[[], Pairs] | None = None  # identities of formal_proofs.py that prove it in every dimension
-    certified: str = ""  # the names of the claims of `certificate` that it is about, {} for 0, ..., m - 1
-    statement: str = ""  # of a claim that is tested for several variations: the statement, and the variation
+    certified: str = ""  # the names of its claims in `certificate`, with {} for 0, ..., m - 1
+    statement: str = ""  # for a claim tested for several variations: the statement, and the variation
     variation: str = ""
-    misprint: str = ""  # if not empty: why the formula, which is as printed, is wrong
+    misprint: str = ""  # if not empty: why the formula, quoted as printed, is wrong
 
     def makes_sense(self, m: int) -> bool:
-        """Whether the statement exists for this m."""
+        """Whether the statement makes sense for this m."""
         return m >= self.least_m and (self.only_m is None or m == self.only_m)
 
     def blocks_for_proof(self, m: int) -> int:
@@ -112,10 +112,10 @@ _claims: dict[str, Claim] = {}
 
 
 def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
-    """Register a function as a claim; the section is that of its file.
+    """Register a function as a claim; its file determines the section.
 
-    The first line of its docstring is the title, the second one the formula. `breaks` are names of controls, separated
-    by blanks; a claim with a reason `at_most` says that a rank is attained. Other keywords are fields of `Claim`.
+    The first line of the docstring is the title, the second line the formula. `breaks` are names of controls, separated
+    by blanks. A claim with a reason `at_most` asserts that a rank is attained. Other keywords are fields of `Claim`.
     """
 
     def register(function: ClaimFunction) -> ClaimFunction:
@@ -142,12 +142,12 @@ def claims() -> tuple[Claim, ...]:
 
 # ---- evaluating a claim ----------------------------------------------------------------------------------------
 
-# The exceptions that a claim raises at points where it is not defined.
+# The exceptions that a claim raises at points at which it is undefined.
 UNDEFINED = (SingularStep, SingularMatrix, ZeroDivisionError)
 
 
 def entries(value: Any) -> list[Any]:
-    """The entries of a matrix, or the number itself."""
+    """Return the entries of a matrix, or [value] for a number."""
     return list(value.entries()) if hasattr(value, "entries") else [value]
 
 
@@ -161,7 +161,7 @@ def same(K: Field, left: Any, right: Any) -> bool:
 
 @dataclass(frozen=True)
 class ClaimOutcome:
-    """The outcome of a claim for given objects: the number of pairs, and the first pair that contradicts it."""
+    """The outcome of a claim for given objects: the number of pairs, and the first pair that contradicts the claim."""
 
     objects: PaperObjects
     pairs: int
@@ -173,7 +173,7 @@ class ClaimOutcome:
 
 
 def evaluate(claim: Claim, o: PaperObjects) -> ClaimOutcome:
-    """Evaluate a claim. May raise SingularStep and similar errors where something is not defined."""
+    """Evaluate a claim. Raises one of `UNDEFINED` (SingularStep, ...) if the claim is undefined for the objects."""
     pairs = 0
     with o.K.working():
         for left, right in claim.function(o):
@@ -188,15 +188,15 @@ def outcomes(
     points: Iterable[PaperObjects | None],
     change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
 ) -> Iterator[ClaimOutcome]:
-    """Yield the outcomes of a claim at those of the points, after a change, at which it is defined."""
+    """Yield the outcomes of a claim at the changed points, omitting points at which it is undefined."""
     for objects in points:
         if objects is not None:
-            with suppress(*UNDEFINED, LookupError):  # the last one where the roots of chi are needed and not there
+            with suppress(*UNDEFINED, LookupError):  # LookupError: the roots of chi are needed but not in K
                 yield evaluate(claim, change(objects))
 
 
 def witness_of(outcome: ClaimOutcome) -> Witness | None:
-    """The point at which a claim failed, with both sides; for matrices, the first entry in which they differ."""
+    """Return the point at which a claim failed, with both sides or, for matrices, the first entry that differs."""
     if outcome.failure is None:
         return None
     o = outcome.objects

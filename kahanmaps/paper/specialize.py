@@ -1,10 +1,10 @@
-"""The objects of the paper over several fields: for a given member, and for the member with indeterminate data.
+"""Constructors of the paper's objects over several fields, for a given member and for the generic member.
 
-* `MemberObjects`: a member at a point, over QQ or GF(p); where the library has its own code for a letter (the chain,
-  the associated systems, the integrals, Pi), the claims test that code.
+* `MemberObjects`: a member at a point, over QQ or GF(p). If the library has its own code for an object (the chain, the
+  associated systems, the integrals, Pi), the claims test this code.
 * `normal_form_objects`: the normal form with indeterminate roots, coefficients, x and eps. Over the splitting field of
   chi every member with distinct roots is symplectically similar to a specialization of it (docs/mathematics.md).
-* `random_objects`: all data at random over GF(p), transformed by a random symplectic matrix.
+* `random_objects`: random data over GF(p), transformed by a random symplectic matrix.
 * `etale_objects`: a member's own normal form, one planar system over Q[t]/chi.
 * `bound_objects`, `universal_bound_objects`: bounds for degrees and coefficients instead of numbers.
 """
@@ -35,22 +35,22 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
 
-_SHEARS = 5  # symmetric, upper and lower in turn: products of this number give every symplectic matrix
-# If there are more sign vectors, a sample is taken: all single flips, and random ones.
+_SHEARS = 5  # symmetric shears, alternately upper and lower: products of 5 give every symplectic matrix
+# If there are more sign vectors, a sample is tested: those with one sign -1, and random ones.
 MAX_SIGN_VECTORS = 32
 
 
 class MemberObjects(PaperObjects):
-    """A given member at a point: values for which the library has its own code are computed by that code.
+    """A given member at a point: if the library has its own code for a value, this code computes it.
 
-    Within derivatives (dual numbers) and in variations they are computed as for other objects.
+    Over dual numbers (for derivatives) and in variations, values are computed as for other objects.
     """
 
     member: FamilyMember
 
     @classmethod
     def at(cls, member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, **more: Any) -> MemberObjects:
-        """Return the objects of a member over K; `roots` are those of chi, None if they are not in K."""
+        """Return the objects of a member over K; `roots` are the roots of chi, None if they are not in K."""
         base, chi = member.hamiltonians[0].system.over(K), chi_of(member.A)
         known_chi = tuple(K.convert(chi[k]) for k in range(member.m + 1))
         objects = cls(**_given(member, K), roots=roots, base=base, known_chi=known_chi, **more)
@@ -71,14 +71,14 @@ class MemberObjects(PaperObjects):
         return self.member.hamiltonians[i].system.over(self.K)
 
     def lagrange(self, i: int) -> list[Any]:
-        """The coefficients of B_i from the library, where the roots of chi are rational."""
+        """Return the coefficients of B_i, from the library if the roots of chi are rational."""
         if self._is_split:
             signs = tuple(-1 if j == i else 1 for j in self.each)
             return [self.K.convert(c) for c in self._associate(signs).coefficients]
         return super().lagrange(i)
 
     def B_signs(self, signs: Sequence[int]) -> Any:
-        """B_s from the library, where the roots of chi are rational."""
+        """Return B_s, from the library if the roots of chi are rational."""
         if self._is_split:
             return self.K.convert_matrix(self._associate(tuple(signs)).B)
         return super().B_signs(signs)
@@ -107,13 +107,13 @@ class MemberObjects(PaperObjects):
 
 
 def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
-    """Return the roots of chi in the order of the signs, None unless they are rational and distinct."""
+    """Return the roots of chi in the order of the signs; None unless they are rational and distinct."""
     roots = [factor.root for factor in member.factors if factor.root is not None and factor.multiplicity == 1]
     return tuple(roots) if len(roots) == len(member.factors) else None
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
-    """Return None for all sign vectors, or a sample: the single flips and random ones."""
+    """Return a sample of sign vectors (all vectors with one sign -1, and random ones); None stands for all vectors."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
     flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
@@ -153,7 +153,7 @@ def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[P
 def point_over(
     member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
-    """Return the objects of a member at a random point over QQ or GF(p); eps is random unless it is given."""
+    """Return the objects of a member at a random point over QQ or GF(p); `eps` None means a random eps."""
     value = K.zero if eps is None else K.convert(eps)
     value = _not_zero(K, rng) if value == 0 else value
     signs, draw = sign_sample(member.m, rng), random_draw(K, member.dim, rng)
@@ -180,8 +180,8 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
             shear[position], inverse_shear[position] = value, -value
         S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, inverse_shear) * S_inverse
     A, third = _normal_form(K, roots, cubics)
-    # x = S z: A becomes S^{-T} A S^T, and each index of the third derivatives is multiplied by S^{-1}: the last one,
-    # which comes first then, three times.
+    # x = S z: A becomes S^{-T} A S^T, and S^{-1} acts on each of the three indices of the third derivatives: on the
+    # last index, which then becomes the first, three times.
     for _ in range(3):
         third = K.matrix(n * n, n, (third * S_inverse).transpose().entries())
     eps = _not_zero(K, rng)
@@ -196,11 +196,11 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
 
 
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
-    """The normal form with indeterminate roots, planar cubics and eps; `vectors` are further letters.
+    """Return the normal form with indeterminate roots, planar cubics and eps; `vectors` names further vectors.
 
-    Each block may still be changed by a matrix of determinant 1. This matrix moves the point to (u, v) = (1, 0) and
-    makes the coefficient of u^2 v in h vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as
-    associated, since this is one block of a larger system.
+    A change of determinant 1 of each block moves the point to (u, v) = (1, 0) and makes the coefficient of u^2 v in h
+    vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated, since the system stands for
+    one block of a larger system.
     """
     n = 2 * m
     lower = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
@@ -224,7 +224,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
             return K.column([K.one] * m + [K.zero] * m)
         return K.column([by_name[letter] for letter in letters[name]])
 
-    # Blocks may be permuted, and signs enter block by block: their number, on the first blocks, represents all.
+    # Blocks may be permuted, and signs act block by block: vectors with -1 on the first blocks represent all.
     signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
     objects = PaperObjects(
         K=K,
@@ -249,7 +249,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
 def member_functions(
     member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int
 ) -> MemberObjects:
-    """Return the objects of a member with indeterminate x (and eps, unless it is given) over the rational functions."""
+    """Return the objects of a member over rational functions: x is indeterminate, and so is eps if `eps` is None."""
     n = member.dim
     letters = _letters(vectors, n)
     names = ["eps", *(name for letter in letters.values() for name in letter)]
@@ -267,7 +267,7 @@ def member_functions(
 
 
 def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
-    """A member's normal form at a random exact point: one planar system over Q[t]/chi, for all roots of chi at once."""
+    """Return a member's normal form at a random exact point: one planar system over Q[t]/chi, for all roots at once."""
     form = normal_form(member)
     K = EtaleAlgebra(form.chi)
     root = K.generator
@@ -280,7 +280,7 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
 
 
 def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
-    """Return balls of this precision that enclose the complex roots of chi."""
+    """Return complex balls of `bits` bits that enclose the roots of chi."""
     K = CC(bits)
     chi = chi_of(member.A)
     with K.working():
@@ -308,12 +308,13 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
 
 
 def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperObjects:
-    """Return degree bounds for a member: x and all vectors are variables, and eps unless it is given."""
+    """Return objects of degree bounds for a member: x and all vectors are variables, and so is eps if `eps` is None."""
     K = BoundField()
     n = member.dim
     chi = chi_of(member.A)
     if rational_roots(member) is None:
-        # d root is an algebraic integer, d the common denominator of chi; Cauchy bounds the root in every embedding.
+        # If d is the common denominator of chi, d times a root is an algebraic integer; Cauchy's bound bounds all its
+        # conjugates.
         denominator = chi.denom()
         largest = denominator * (2 + max(abs(chi[k]) for k in range(member.m)))
         root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(denominator)
@@ -332,10 +333,10 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
 
 
 def universal_bound_objects(m: int, order: int) -> PaperObjects:
-    """Return degree bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
+    """Return objects of degree bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m
-    # Shears with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
+    # The shears have entries of degree 1, so entries of S and S^{-1} have degree 5: each is a sum of m^4 monomials.
     S = K.polynomial(_SHEARS, (_SHEARS - 1) * math.log2(m) + _SHEARS)
     root, cubic = K.variable(), K.variable()
     A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
@@ -360,14 +361,13 @@ def _not_zero(K: Field, rng: random.Random) -> Any:
 
 
 def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
-    """Return names for the entries of vectors of indeterminates."""
     return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 
 def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
-    """The data of a member over K: A, the third derivatives of H and, where chi has repeated roots, the B.
+    """Return the data of a member over K: A, the third derivatives of H and, if chi has repeated roots, the matrices B.
 
-    The B have one sign for each irreducible factor of chi, on the part that belongs to its power.
+    These B have one sign for each irreducible factor of chi, on the kernel of the power of this factor.
     """
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]
@@ -379,7 +379,7 @@ def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
-    """A = diag(roots, roots), and the third derivatives of the sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
+    """Return diag(roots, roots) and the third derivatives of a sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
     m = len(roots)
     n = 2 * m
     A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])
@@ -394,5 +394,5 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
 
 
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
-    """Return two associated systems with the maximal number of factors B_i: their bounds hold for all pairs."""
+    """Return sign vectors of two systems with the maximal number of factors B_i: bounds for this pair hold for all."""
     return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))

@@ -1,7 +1,7 @@
-"""Variations of the hypotheses of the paper: other H, other J, other steps, other A.
+"""Variations of the hypotheses of the paper: other H, J, A or time steps.
 
-A variation takes the paper's objects and returns others, like a control; but it is not known in advance whether a
-statement fails. With `varied=False` the objects stay those of the paper, which is the control for statements that fail.
+Like a control, a variation takes the paper's objects and returns changed objects; but statements may hold or fail for
+them. With `varied=False` the objects are not changed, which is the control for statements that fail.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from kahanmaps.paper.objects import PaperObjects
 
 @dataclass(frozen=True)
 class Variation:
-    """A variation: its title, the least m for which it exists, and the theorem for claims that are not expanded."""
+    """A variation: its title, the least m for which it exists, and the theorem that proves claims without expansion."""
 
     title: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -24,31 +24,31 @@ class Variation:
 
 
 def other_structure(o: PaperObjects) -> PaperObjects:
-    """Any constant skew J with A^T J = J A, singular or not: a polynomial in A^T times the standard one."""
+    """J is a random skew matrix with A^T J = J A, singular or not: a polynomial in A^T times the standard J."""
     weights = o.vector("weights")
     factor = o.polynomial_in_A([weights[k, 0] for k in range(o.m)]).transpose()
     return o.changed(J=factor * o.J, base=None, draw=o.vector)
 
 
 def any_structure(o: PaperObjects) -> PaperObjects:
-    """Any constant skew J, with A^T J = J A or not."""
+    """J is a random constant skew matrix; A^T J = J A need not hold."""
     J = o.columns([o.vector(f"J {j}") for j in range(o.n)])
     return o.changed(J=J - J.transpose(), base=None, draw=o.vector)
 
 
 def different_steps(o: PaperObjects) -> PaperObjects:
-    """The maps of the associated g = B^T f at 2 eps, which are those of 2 g at eps."""
+    """The maps of the associated g = B^T f are taken at 2 eps: they are the maps of 2 g at eps."""
     return o.changed(associate_matrices=tuple(B * o.number(2) for B in o.associates()), draw=o.vector)
 
 
 def jordan_block(o: PaperObjects) -> PaperObjects:
-    """A with a double lambda_1, not diagonalizable: chi is the minimal polynomial; H is random in its space."""
+    """A has a double root and is not diagonalizable: chi is its minimal polynomial. H is random in the space of A."""
     roots = (o.lam[0], o.lam[0], *o.lam[2:])
     chi = tuple(o.changed(roots=roots).chi_of_roots)
     S, _ = o.symplectic_normal_form()
     A = -(S * o.doubled(o.companion(chi)) * o.J * S.transpose() * o.J)
     p = o.changed(A=A, known_chi=chi, base=None, draw=o.vector)
-    # The third derivatives of a sum of l(M_a(x)^3), l the functional that pairs t^k with C_k: it is of the space.
+    # Third derivatives of a sum of l(M_a(x)^3) in the space of A; t^k and C_k are dual bases for the functional l.
     terms = []
     for name in ("d1", "d2", "d3"):
         powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
@@ -59,7 +59,7 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
 
 
 def derogatory(o: PaperObjects) -> PaperObjects:
-    """A diagonalizable with lambda_1 = lambda_2; H is any cubic on the eigenspace of this root."""
+    """A is diagonalizable with lambda_1 = lambda_2; H is an arbitrary cubic on the eigenspace of this root."""
     E = o.projector(0) + o.projector(1)
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
     third = o.sum([o.third, *(o.tensor(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3")))])
@@ -68,7 +68,7 @@ def derogatory(o: PaperObjects) -> PaperObjects:
 
 
 def _signs(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
-    """B = I - 2 E with the projector E of A to its third root, which is simple, if there is one."""
+    """Return (B,), where B = I - 2 E and E is the projector of A for the simple third root; () if m < 3."""
     if o.m < 3:
         return ()
     E, simple = o.I, roots[2]

@@ -2,12 +2,13 @@
 
 The methods of verification:
 
-* *random points*: the claim is evaluated for the member over GF(p), p a random prime of 63 bits, at random x, eps and
-  other arguments; if the claim contains the roots of chi, p is a prime modulo which chi splits. A failure refutes the
-  claim. Otherwise the claim is `supported`, with an error bound that is computed by evaluating the claim over bounds.
+* *random points*: the claim is evaluated for the member over GF(p), where p is a random prime of 63 bits, at random x,
+  eps and other arguments; if the claim contains the roots of chi, chi splits modulo p. A failure refutes the claim.
+  Without a failure it is `supported`, with an error bound computed by evaluating it over degree bounds.
 * *normal form*: the claim is evaluated over rational functions, for the normal form with indeterminate roots,
-  coefficients, x and eps. This proves it for every member with distinct roots: over the splitting field of chi such a
-  member is symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
+  coefficients, x and eps. This proves the claim for every member with distinct roots: over the splitting field of chi
+  such a member is symplectically similar to a specialization (docs/mathematics.md); the hypotheses on a member are
+  verified exactly.
 * *formal proof*: the facts (5)-(12) about every quadratic system follow from identities of multilinear expressions,
   which are compared without coordinates (formal_proofs.py).
 * *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
@@ -68,12 +69,12 @@ from kahanmaps.paper.registry import (
 from kahanmaps.version import __version__
 
 MAX_M = 8
-# Products of terms in a proof: enough for every claim up to m = 6; at m = 8 a few that sum over all roots exceed it.
+# Maximal number of products of terms in a proof: enough for all claims up to m = 6; at m = 8 a few claims exceed it.
 PROOF_BUDGET = 50_000_000
-_MAX_INDETERMINATES = 64  # of a proof for one member
+_MAX_INDETERMINATES = 64  # in a proof for one member
 _MAX_UNDEFINED = 40
-_POINTS = 4  # for statements that something differs, or has full rank
-_LARGE = 5  # from this m on, controls are evaluated over GF(p) first
+_POINTS = 4  # number of points for statements that objects differ or have full rank
+_LARGE = 5  # for m >= 5, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
@@ -93,7 +94,7 @@ class VerifyOptions:
     order: int = 3
     ball_bits: int | None = None
     controls: bool = False
-    beyond: bool = False  # the statements of section 10 about variations, and no others
+    beyond: bool = False  # only the statements of section 10 about variations
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 20:
@@ -173,7 +174,7 @@ def verify(
         if member.m > MAX_M:
             raise InputError(f"found a member with m = {member.m}, expected m <= {MAX_M}")
         if -1 in member.signs:
-            member = FamilyMember(member.A, member.chosen.K)  # f is the system that the file stands for
+            member = FamilyMember(member.A, member.chosen.K)  # f_0 is now the system of the file
         context = {
             **settings.context([file]),
             "m": member.m,
@@ -190,7 +191,7 @@ def verify(
 class Verifier:
     """Verifies claims: at random points over GF(p), by a proof, at exact points, and with controls.
 
-    It is for a given member or (None) for the generic member; `m` is half the dimension.
+    `member` is a given member, or None for the generic member; `m` is half the dimension.
     """
 
     def __init__(
@@ -207,7 +208,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return one finding for each claim; with controls one for each claim and control, and a final one for all."""
+        """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
         sections = self.options.sections
         made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected = [c for c in made if sections is None or c.section in sections]
@@ -222,7 +223,7 @@ class Verifier:
                     without.append(claim.key)
             else:
                 findings.append(self.verify_claim(claim))
-            for objects in self._points.values():  # or they would remember the values of all claims
+            for objects in self._points.values():  # otherwise the objects would cache the values of all claims
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
@@ -236,8 +237,8 @@ class Verifier:
         return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        """Return the random point of this number over GF(p), with the roots of chi if needed; None without roots."""
-        # In general, and where chi splits over Q, one pool of points serves all claims.
+        """Return the random point with this number over GF(p); None if the roots of chi are needed and not found."""
+        # For the generic member, and if chi splits over Q, all claims use the same points.
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
         if key not in self._points:
@@ -255,7 +256,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if needs_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # One prime in m! splits at worst, so that this fails with probability e^-40.
+                        # At least one prime in m! splits chi, so that this fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
@@ -274,13 +275,13 @@ class Verifier:
         return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
-        """The objects with degree bounds in place of numbers."""
+        """Return the objects with degree bounds in place of numbers."""
         if self.member is None:
             return specialize.universal_bound_objects(self.m, self.options.order)
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, roots: bool) -> int:
-        """A bound for the degree of the field of the coefficients."""
+        """Return a bound for the degree of the field that contains all numbers."""
         if self.member is None or not roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
@@ -354,15 +355,15 @@ class Verifier:
         if proof is not None:
             if decision.verdict is Certainty.SUPPORTED:
                 return self._finding(claim, Certainty.PROVED, proof, (decision.evidence, *also))
-            if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
+            if decision.evidence.data.get("points") == 0:  # no prime was found for a point, or none large enough
                 return self._finding(claim, Certainty.PROVED, proof, also)
         return replace(finding, also=(*finding.also, *also))
 
     def _verify_existence(self, claim: Claim) -> Finding:
-        """Decide a claim that two objects differ, or that a rank is attained: one point is a proof."""
+        """Verify a claim that two objects differ, or that a rank is attained: one point is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_MAX_UNDEFINED):
-            # Large matrices over Q are expensive; where the other side has a proof, a point over GF(p) suffices.
+            # Large matrices over Q are expensive; a point over GF(p) suffices if `at_most` is given.
             modular = bool(claim.at_most) and self.m > 3
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
@@ -370,7 +371,7 @@ class Verifier:
                 return self._finding(claim, Certainty.UNDECIDED, Evidence("random points over GF(p)", text))
             try:
                 outcome = evaluate(claim, objects)
-            except LookupError:  # the roots of chi are needed, and this field does not have them
+            except LookupError:  # the roots of chi are needed but not in this field
                 roots = True
                 continue
             except UNDEFINED:
@@ -382,7 +383,7 @@ class Verifier:
                 text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {where}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
-                # Modulo p a rank may be smaller and an equation hold that does not hold over Q, but not conversely.
+                # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
                 return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
@@ -400,7 +401,7 @@ class Verifier:
         return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
     def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
-        """Return a proof, or None."""
+        """Return a proof of a claim; None if there is none within the budget."""
         if claim.formal is not None:
             return formal_proof(claim)
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
@@ -446,7 +447,7 @@ class Verifier:
                 if not evaluate(claim, objects).holds:
                     raise Contradiction(f"{claim.place}: {claim.title}: fails over Q[t]/chi, but not over GF(p)")
                 yield Evidence("exact over Q[t]/chi", f"{text}, for all roots at once", {"points": 1})
-            except UNDEFINED:  # the map is not defined at this point, which gives no evidence
+            except UNDEFINED:  # the map is undefined at this point, so there is no evidence
                 pass
         if self.options.ball_bits is not None:
             bits = self.options.ball_bits
@@ -485,7 +486,7 @@ class Verifier:
         return notes
 
     def controls(self, claim: Claim) -> list[Finding]:
-        """Return a finding for each control of a claim, on input that violates a hypothesis; each should be refuted."""
+        """Return a finding for each control of a claim: on its input the claim should be refuted."""
         if claim.misprint:
             return [self.verify_claim(claim)]
         controls = []
@@ -503,15 +504,15 @@ class Verifier:
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
             controls.append(replace(finding, control=True, place=place, certified={}))
-        # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
+        # In low dimension some hypotheses always hold (for m = 1 every A is scalar): their controls are skipped.
         return [finding for finding in controls if finding.is_as_expected] or controls
 
     def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
-        """The outcome of a claim on the input of a control, at a point at which it fails; else the last outcome.
+        """Return an outcome that refutes the claim on the input of a control; the last outcome if none refutes it.
 
         One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
-        object exists or that it has a certain rank is refuted if several consecutive points do not show it. Over Q
-        ranks and steps of the maps of controls, in which nothing cancels, take minutes from m = 5 on.
+        object exists or that it has a certain rank counts as refuted if several points do not show it. For m >= 5 ranks
+        and map steps of controls over Q take minutes, since nothing cancels.
         """
         at_one = claim.kind is ClaimKind.EQUAL
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
@@ -557,7 +558,7 @@ class Verifier:
 
 
 class ClaimAtPoints:
-    """A claim at the points of a verifier, in the form that `decide` requires."""
+    """A claim at the points of a verifier, in the form required by `decide`."""
 
     name = "claim"
     undefined_reason = "a denominator seems to vanish identically"
@@ -573,7 +574,7 @@ class ClaimAtPoints:
 
     @property
     def where(self) -> str:
-        """The assumption about the primes."""
+        """The assumption on the random primes."""
         if self.conjugates == 1:
             return ""
         return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
@@ -606,12 +607,12 @@ class ClaimAtPoints:
                 yield Trial(objects.K.characteristic)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence other than the bounds."""
+        """Return the data of the evidence, except the bounds."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
 
 
 def formal_proof(claim: Claim) -> Evidence | None:
-    """Prove a claim about every system by identities of multilinear expressions, which are compared here.
+    """Prove a claim about every system by comparing the two sides of identities of multilinear expressions.
 
     Raises Contradiction if the two sides of an identity differ.
     """
@@ -634,7 +635,7 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     """
     claim = next(claim_ for claim_ in claims() if claim_.key == key)
     bounds = specialize.universal_bound_objects(blocks, order)
-    for _ in claim.function(bounds):  # which notes the letters that are used
+    for _ in claim.function(bounds):  # the evaluation records the objects that are used
         pass
     vectors = sorted(bounds.used - {"roots"})
     try:

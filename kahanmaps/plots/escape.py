@@ -1,4 +1,4 @@
-"""Escape times and basins: the steps at which, and directions in which, orbits of a plane of points leave a ball."""
+"""Escape times and basins: when and in which direction the orbits of the points of a plane leave a ball."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_CELLS, MAX_STEPS = 2000, 1_000_000
-STAYS, ENDS = -1, -2  # instead of a direction: |x| <= radius up to the last step; a pole or an overflow before
+STAYS, ENDS = -1, -2  # instead of a direction: the orbit stays in the ball; it ends at a pole or by overflow
 
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """Arrays (rows, columns) over a window: the first step at which max |x_i| > radius, and the direction.
+    """Arrays (rows, columns) over a window: the first step at which max |x_i| > radius, and the direction of escape.
 
-    The step is -1 for orbits that stay inside up to the last one. The direction is 2 i for the coordinate x_i as the
-    largest one, 2 i + 1 for -x_i, `STAYS`, or `ENDS` for an orbit that ended at a pole without being seen outside.
+    The step is -1 for an orbit that stays inside up to the last step. The direction is 2 i if x_i is the largest of the
+    numbers x_0, -x_0, x_1, ..., and 2 i + 1 if -x_i is; it is `STAYS` for an orbit that stays inside, `ENDS` for one
+    that ended at a pole before any point was outside.
     """
 
     variables: tuple[str, ...]
@@ -55,8 +56,8 @@ def survey_escape(
 ) -> Escape:
     """Follow the float orbits of the centers of `cells` x `cells` cells of a window.
 
-    `at` are the other coordinates (default 0). Kahan maps have poles, past which orbits return: an orbit that leaves
-    the ball need not go to infinity.
+    `at` are the coordinates outside the plane (default 0). Orbits of Kahan maps may pass near poles and return: an
+    orbit that leaves the ball need not go to infinity.
 
     >>> from kahanmaps.maps.kahan import as_map
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -95,7 +96,7 @@ def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time
     style, (x, y) = style or Style(), result.window
     names = [side + label_of(name) for name in result.variables for side in ("+", "\N{MINUS SIGN}")]
     kinds, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)
-    kinds = kinds[np.argsort(-counts, kind="stable")][: len(COLORS)]  # of more directions the rare ones are white, too
+    kinds = kinds[np.argsort(-counts, kind="stable")][: len(COLORS)]  # the rarest directions are white, too
     labels = ["ends at a pole" if kind == ENDS else names[int(kind)] for kind in kinds]
     with drawing(style):
         from matplotlib.colors import ListedColormap, LogNorm

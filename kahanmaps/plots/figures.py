@@ -1,6 +1,6 @@
 """Figures of matplotlib without pyplot: no windows, no global state, the same bytes for the same picture.
 
-A drawing function is `draw_...(values, style) -> Figure`; it makes its figure by `new_figure` inside `drawing(style)`:
+A plotting function has the form `plot_...(result, style) -> Figure`; it calls `new_figure` inside `drawing(style)`:
 
     with drawing(style):
         figure = new_figure(style, aspect=0.75)
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("pdf", "svg", "png")
-# More points are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
+# More points are stored as an image of `dpi` dots per inch: a million points as vectors take 15 MB and ten seconds.
 MAX_VECTOR_POINTS = 20_000
-LETTER_WIDTH = 0.5  # mean width of a letter, in units of its height
-_MAX_DIGITS = 40  # of a number in a label
-_MAX_FORMULA = 60  # characters of an expression that is typeset
-_BAND_COLOR, _BAND_SHARE = "#e8e8e8", 0.09  # of the band for zeros on a logarithmic axis; part of the height
+LETTER_WIDTH = 0.5  # mean width of a letter, in units of the font size
+_MAX_DIGITS = 40  # maximal number of characters of a number in a label
+_MAX_FORMULA = 60  # maximal number of characters of a typeset expression
+_BAND_COLOR, _BAND_SHARE = "#e8e8e8", 0.09  # band for zeros on a log axis, fraction of the height
 _MAX_TICKS = 6
-_HANDLE_WIDTH = 5.0  # of a line or mark in a legend with the space around it, in heights of a letter
+_HANDLE_WIDTH = 5.0  # width of a line or mark in a legend with the space around it, in font sizes
 _ON_ONE_LINE = replace(
     LATEX,
     enclosed="({})".format,
     fraction=lambda numerator, denominator: f"{_in_brackets(numerator)} / {_in_brackets(denominator)}",
 )
-# The keys of the metadata for version, command and system; without dates, so that equal pictures are equal files.
+# The keys of the metadata for version, command and system; no dates, so that equal figures give equal files.
 _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
     "pdf": (("Creator", "Subject", "Keywords"), {"CreationDate": None}),
     "svg": (("Creator", "Description", "Source"), {"Date": None}),
@@ -58,18 +58,18 @@ _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
 
 
 def require_matplotlib() -> None:
-    """Raise InputError that says how to install matplotlib where it is missing."""
+    """Raise InputError with instructions for installing matplotlib if it is missing."""
     try:
-        import matplotlib.figure  # noqa: F401 (whether it is there)
+        import matplotlib.figure  # noqa: F401 (only to test whether it is installed)
     except ModuleNotFoundError as error:
         raise InputError(f"pictures need matplotlib ({error}): pip install 'kahanmaps[plot]'") from error
 
 
 @contextmanager
 def drawing(style: Style) -> Iterator[None]:
-    """Use the defaults of matplotlib and of the style within the context; restore the user's settings afterwards.
+    """Use matplotlib's defaults and the settings of the style within the context; then restore the user's settings.
 
-    Raises InputError where matplotlib is missing.
+    Raises InputError if matplotlib is missing.
     """
     require_matplotlib()
     import matplotlib as mpl
@@ -83,7 +83,7 @@ def drawing(style: Style) -> Iterator[None]:
 
 
 def new_figure(style: Style, aspect: float = 0.75) -> Figure:
-    """Return an empty figure in the size of the style; `aspect` is height over width where the style has no height."""
+    """Return an empty figure in the size of the style; if the style has no height, `aspect` is height over width."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=style.inches(aspect), layout="compressed")
@@ -92,8 +92,8 @@ def new_figure(style: Style, aspect: float = 0.75) -> Figure:
 def label_of(text: str) -> str:
     r"""Return a name, an expression or an equation as a label, typeset in matplotlib's mathtext where possible.
 
-    The final digits of a name become its index. After an underscore comes the index of a letter (p_a), or a symbol
-    after a word (modified_H). Text that is long or cannot be parsed as a formula is returned as plain text.
+    The final digits of a name become its index. An underscore separates a letter from its index (p_a) or a word from a
+    symbol (modified_H). Text that is long or cannot be parsed as a formula is returned as plain text.
 
     >>> label_of("x1"), label_of("eps"), label_of("p_a"), label_of("modified_H"), label_of("p_a$")
     ('$x_1$', '$\\varepsilon$', '$p_{a}$', 'modified $H$', 'p_a\\$')
@@ -126,7 +126,7 @@ def label_of(text: str) -> str:
 
 
 def _is_word(text: str) -> bool:
-    """Return whether letters form a word, as in modified_H: not a symbol such as x, al, or a Greek letter by name."""
+    """Whether letters form a word, as in modified_H, and not a symbol such as x, al, or the name of a Greek letter."""
     return len(text) > 2 and text.isalpha() and latex_name(text) == text
 
 
@@ -141,7 +141,7 @@ def _label_of_expression(text: str) -> str:
     if function is None:
         return plain(text)
     latex = _ON_ONE_LINE.rational(function)
-    # matplotlib reads less than TeX, and stacked fractions in a line of text are too small to read.
+    # mathtext supports only a part of TeX, and stacked fractions in a line of text are too small to read.
     return plain(text) if "mathrm" in latex else f"${latex}$"
 
 
@@ -150,14 +150,14 @@ def _in_brackets(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Escape dollar signs in a text, so that none starts a formula."""
+    """Escape the dollar signs in a text, so that no part of it is typeset as a formula."""
     return text.replace("$", r"\$")
 
 
 def wrapped(text: str, width: float, size: float, max_lines: int = 3) -> str:
     """Break plain text into at most `max_lines` lines of about `width` points for letters of `size` points.
 
-    A line that is too long ends in dots.
+    Longer text is cut, and ends in dots.
 
     >>> wrapped("relative error of a_very_very_long_name", width=80, size=8)
     'relative error of\\na_very_very_long_...'
@@ -170,7 +170,7 @@ def wrapped(text: str, width: float, size: float, max_lines: int = 3) -> str:
 
 
 def label_number(value: Any) -> str:
-    """Return an exact number as text for a label, with dots in place of the middle of a long one.
+    """Return an exact number as text for a label; in a long number dots replace the middle digits.
 
     >>> from flint import fmpq
     >>> label_number(fmpq(3, 10)), len(label_number(fmpq(10) ** 99))
@@ -181,14 +181,14 @@ def label_number(value: Any) -> str:
 
 
 def write_title(figure: Figure, text: str, style: Style) -> None:
-    """Put a title above all panels, broken into lines that fit the figure."""
+    """Put a title above all panels, broken into lines that fit into the width of the figure."""
     size = style.font_size + 1
     with drawing(style):
         figure.suptitle(plain(wrapped(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
 
 
 def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:
-    """Return the number of columns of these labels that fit into the width of the style, at most `max_columns`.
+    """Return the number of columns of labels that fit into the width of the style, at most `max_columns`.
 
     >>> legend_columns(["RK4", "implicit midpoint"], Style(width=8.6)), legend_columns(["x" * 50] * 2, Style(width=8.6))
     (2, 1)
@@ -198,7 +198,7 @@ def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) ->
 
 
 def shortened_name(name: str, suffix: str, style: Style) -> str:
-    """Cut a name so that name and suffix fit into one line of a legend in the width of the style.
+    """Cut a name so that the name and a suffix fit into one legend line of the width of the style.
 
     >>> shortened_name("f", ": linear growth", Style())
     'f'
@@ -215,7 +215,7 @@ def letter_count(label: str) -> int:
 
 
 def _letters_across(style: Style) -> float:
-    """The width of a picture in heights of a letter of its legend."""
+    """The width of a picture in units of the font size of its legend."""
     return style.width / CENTIMETRES_PER_INCH * 72 / style.small
 
 
@@ -240,15 +240,15 @@ def legend_above(
 
 
 def legend_height(labels: Sequence[str], style: Style, title: bool = False, max_columns: int = 4) -> float:
-    """Return the height of a legend over the width of the figure."""
+    """Return the height of a legend divided by the width of the figure."""
     lines = -(-len(labels) // legend_columns(labels, style, max_columns)) + title
     return 1.45 * lines * style.font_size / (style.width / CENTIMETRES_PER_INCH * 72)
 
 
 def draw_points(axes: Axes, *coordinates: Any, total: int | None = None, **keywords: Any) -> Any:
-    """Draw points as dots, smaller ones where there are many, and as an image above MAX_VECTOR_POINTS.
+    """Draw points as dots: many points as small dots, more than MAX_VECTOR_POINTS as an image.
 
-    `total` is the number of points in the picture where they are drawn in several calls; `keywords` go to `plot`.
+    `total` is the number of points in the whole picture if several calls draw it; `keywords` are passed to `plot`.
     """
     count = len(coordinates[0]) if total is None else total
     return axes.plot(
@@ -263,7 +263,7 @@ def write_beside(
 ) -> None:
     """Write a text beside a point, `offset` points away, with `halo` points of white around its letters.
 
-    `keywords` go to `annotate`.
+    `keywords` are passed to `annotate`.
     """
     if halo:
         from matplotlib.patheffects import withStroke
@@ -273,9 +273,9 @@ def write_beside(
 
 
 def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
-    """Make the vertical axis logarithmic for values from `least` to `largest`; return the height of zeros.
+    """Make the vertical axis logarithmic from `least` to `largest`; return the value at which zeros are drawn.
 
-    Exact zeros are drawn in a gray band at the bottom that is marked 0. Without zeros there is no band; returns None.
+    Exact zeros are drawn in a gray band at the bottom that is labelled 0. Without zeros it returns None.
     """
     axes.set_yscale("log")
     low, high = math.log10(least), math.log10(largest)
@@ -292,7 +292,7 @@ def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: boo
     axes.axhspan(10**bottom, 10**low, color=_BAND_COLOR, linewidth=0, zorder=0)
     powers = range(math.ceil(low), math.floor(high) + 1)
     stride = max(1, -(-len(powers) // _MAX_TICKS))
-    # Ticks of powers stop above the band, where the scale means nothing.
+    # Ticks at powers are drawn only above the band: inside it the scale has no meaning.
     axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::stride]]))
     axes.yaxis.set_minor_locator(NullLocator())
     write_beside(
@@ -307,7 +307,7 @@ def dot_size(count: int) -> float:
 
 
 def format_of(path: str, requested: str | None) -> str:
-    """Return the format requested, or else that of the path's extension: pdf, svg or png. Raises InputError."""
+    """Return the requested format (pdf, svg or png), by default the extension of the path. Raises InputError."""
     extension = requested or Path(path).suffix.removeprefix(".").lower()
     if extension not in FORMATS:
         given = f"the extension .{extension}" if extension else "no extension"
@@ -316,10 +316,10 @@ def format_of(path: str, requested: str | None) -> str:
 
 
 def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", system: str = "") -> bytes:
-    """Return the figure as the bytes of a PDF, SVG or PNG file, with the command and the system (TOML) in its metadata.
+    """Return the bytes of a PDF, SVG or PNG file of the figure, with the command and the system (TOML) as metadata.
 
-    Equal figures give equal bytes with one version of matplotlib: there are no dates and no random ids. Raises
-    InputError for a picture of too many pixels.
+    Equal figures give equal bytes with the same version of matplotlib: there are no dates and no random ids. Raises
+    InputError if the picture has too many pixels.
     """
     style.require_pixels(*figure.get_size_inches())
     keys, no_dates = _METADATA[kind]
@@ -338,8 +338,8 @@ def write_picture(figure: Figure, path: str, kind: str, style: Style) -> None:
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:
     """Return the figure as an <svg> element for a page.
 
-    `name` is a prefix that makes its ids unique on the page, `alt` its text alternative. It takes the available width,
-    at most that of the style.
+    `name` is a prefix that makes the ids unique on the page; `alt` is the alternative text. The element takes the
+    available width, at most the width of the style.
     """
     text = picture_bytes(figure, "svg", style).decode()
     text = text[text.index("<svg") :]

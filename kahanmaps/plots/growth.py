@@ -1,6 +1,6 @@
 """Pictures of the growth of complexity: degrees of iterates, and heights of exact orbits.
 
-Both are results of the library, or are read from the output of `degrees --json` and `heights --json`.
+The data are results of the library, or are read from the output of `degrees --json` and `heights --json`.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ if TYPE_CHECKING:
 
 SCALES = ("linear", "log", "loglog")
 _MAX_SYSTEMS = len(COLORS)
-_MAX_FORMULA = 24  # letters
-_MARKS = 30  # of one orbit
-_ASPECT = 0.62  # of the axes
+_MAX_FORMULA = 24  # maximal number of letters of d_n in a legend
+_MARKS = 30  # maximal number of marks for one orbit
+_ASPECT = 0.62  # height over width of the axes
 
 
 def plot_degrees(
     growths: Mapping[str, DegreeGrowth], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Plot the degrees d_n of the iterates against n, for one or more systems by their names.
+    """Plot the degrees d_n of the iterates against n; `growths` maps the names of systems to their degree growth.
 
-    Marks are the measured degrees. A solid line is the recurrence that they satisfy; a dotted line joins degrees
-    without a checked recurrence, whose growth in the legend is an estimate. `scale` is "linear", "log" (exponential
-    growth is a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" if some growth
-    is or looks exponential, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises InputError
-    for no system or more than 7, and for a scale of another name.
+    Marks are the measured degrees. A solid line shows degrees that satisfy a checked recurrence. A dotted line joins
+    degrees without one; then the growth in the legend is an estimate. `scale` is "linear", "log" (exponential growth is
+    a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" if some growth is or
+    looks exponential, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises InputError
+    unless there are 1 to 7 systems, and for an unknown scale.
 
     >>> from kahanmaps.laboratory.growth.degrees import degree_growth
     >>> from kahanmaps.documents.catalog import load
@@ -88,7 +88,7 @@ def plot_degrees(
             line: dict[str, Any] = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
             steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
             heights = np.array([float(growth.degrees[n] or zero) for n in steps])
-            # On a logarithmic scale no line leads to a degree 0, which lies in its band.
+            # On a logarithmic scale a degree 0 lies in the band below, and no line leads to it.
             is_gap = np.array([scale != "linear" and not growth.degrees[n] for n in steps])
             n, d = steps, np.where(is_gap, np.nan, heights)
             recurrence = growth.recurrence
@@ -98,14 +98,14 @@ def plot_degrees(
                 and ";" not in recurrence.closed_form
                 and recurrence.preperiod == 0
             ):
-                # One polynomial: a smooth curve, else straight lines from point to point.
+                # d_n is one polynomial in n: draw a smooth curve instead of straight lines from point to point.
                 few = range(recurrence.power + 1)
                 law = np.polynomial.Polynomial.fit(list(few), [recurrence.predict(n) for n in few], recurrence.power)
                 n = np.linspace(steps[0], steps[-1], 200)
                 d = law(n)
             axes.plot(n, d, zorder=2, **line, **look)
             axes.plot(steps, heights, marker=MARKS[k], markersize=4, linestyle="none", clip_on=False, **look)
-            # The legend shows both: a line with a mark.
+            # An empty plot for the legend entry, a line with a mark.
             axes.plot([], [], marker=MARKS[k], markersize=4, label=label, **line, **look)
         axes.set_xlabel("iterate $n$")
         axes.set_ylabel("degree $d_n$")
@@ -117,7 +117,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """Return the text after the name in the legend: d_n, the dynamical degree or the growth; estimates are marked."""
+    """Return the legend text after the name: d_n, the dynamical degree or the growth; it says what is an estimate."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -148,11 +148,11 @@ def plot_heights(
 ) -> Figure:
     """Plot the heights of exact orbits against the step, with the fitted growth, in a color for each eps.
 
-    Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2, c n (each with its lower
-    terms) or a factor in each step; orbits whose growth is bounded, logarithmic or undecided have none. `scale` is
-    "linear", "log" or "loglog" (from step 1 on); by default "log" where some growth is exponential, "loglog" where it
-    is quadratic or linear and there are 8 steps or more, else "linear". Raises InputError where there is no orbit, for
-    more than 7 values of eps, and for a scale of another name.
+    Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2 or c n with terms of lower
+    degree, or an exponential; orbits with bounded, logarithmic or undecided growth have no line. `scale` is "linear",
+    "log" or "loglog" (from step 1 on); by default "log" if some growth is exponential, "loglog" if some growth is
+    quadratic or linear and there are 8 steps or more, else "linear". Raises InputError if there is no orbit, for more
+    than 7 values of eps, and for an unknown scale.
     """
     curves = height_curves(survey) if isinstance(survey, HeightSurvey) else tuple(survey)
     if not curves:
@@ -176,13 +176,13 @@ def plot_heights(
             some, from_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
             size = 3.2 if len(some) <= 3 and max(len(curve.steps) for curve in some) <= 80 else 2
             line: dict[str, Any] = {"color": COLORS[k], "linestyle": LINES[k], "linewidth": 0.7}
-            # Hollow marks, through which the line of the fit is seen.
+            # Hollow marks, so that the line of the fit remains visible.
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in some:
                 rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
                 if (
                     len(rows) > _MARKS
-                ):  # as many marks as can be distinguished along the axis, with the first and the last
+                ):  # _MARKS marks, evenly spaced along the axis, including the first and the last step
                     steps = curve.steps[rows].astype(np.float64)
                     spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
                     rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
@@ -192,7 +192,7 @@ def plot_heights(
                     last = curve.steps[-1]
                     n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
                     axes.plot(n, fit(n), zorder=1.5, **line)
-            # The legend: eps, the time step, and what kinds of growth were found.
+            # The legend: eps, the time step, and the kinds of growth.
             label = rf"$\varepsilon = {label_number(eps)}$ (time step {label_number(2 * eps)})"
             label = label if some[0].has_eps else "heights"
             several = list(dict.fromkeys(curve.kind for curve in some))
@@ -227,7 +227,7 @@ def _scale(requested: str | None, default: str) -> str:
 
 
 def _step_axis(axes: Axes, scale: str, longest: int) -> None:
-    """The horizontal axis: whole numbers, or their logarithms from 1 on."""
+    """Format the horizontal axis: integer steps, on a logarithmic scale from 1 on."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     if longest <= 1:
@@ -244,15 +244,15 @@ def _step_axis(axes: Axes, scale: str, longest: int) -> None:
 
 
 _MAX_ORBITS, _MAX_TERMS = 2000, 10_000
-_LARGEST = 10**15  # degrees, steps and bits: what no orbit has
+_LARGEST = 10**15  # bound for degrees, steps and bits: larger numbers in a record are refused
 _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError)
 
 
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
-    """The name of the system, and the degrees, in the JSON object that `kahanmaps degrees --json` writes.
+    """Return the name of the system and its degrees from the JSON object that `kahanmaps degrees --json` writes.
 
-    The recurrence is searched for again; records of older versions have no patterns of singularities.
-    Raises InputError for anything else.
+    The recurrence is computed again. Records of older versions contain no singularity patterns.
+    Raises InputError for other objects.
 
     >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}
     >>> name, growth = degrees_of_record({**record, "ended": "terms", "message": "8 terms", "seed": 0, "lines": []})
@@ -299,10 +299,10 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
 
 @dataclass(frozen=True, eq=False)
 class HeightCurve:
-    """Heights in bits of one orbit at some steps, the kind of growth that was decided, and its numbers.
+    """Heights in bits of one orbit at some steps, the kind of growth of the orbit, and the fitted numbers.
 
-    `eps` is exact, half the time step; `constant` is c in c n^2 or c n, `ratio` the factor of one step for exponential
-    growth; `status` is how the orbit ended, in the words of OrbitEnd.
+    `eps` is half the time step (exact); `constant` is c in c n^2 or c n, `ratio` the factor of one step for exponential
+    growth; `status` says how the orbit ended, as in OrbitEnd.
     """
 
     eps: fmpq
@@ -339,9 +339,9 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
 
 
 def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, ...]:
-    """The orbits in the JSON object that `kahanmaps heights --json` writes: heights at steps 0, 1, 2, 4, 8, ...
+    """Return the orbits in the JSON object that `kahanmaps heights --json` writes: heights at steps 0, 1, 2, 4, 8, ...
 
-    Raises InputError for anything else.
+    Raises InputError for other objects.
     """
     orbits = record.get("orbits") if isinstance(record, Mapping) and record.get("command") == "heights" else None
     if not isinstance(orbits, list) or not 1 <= len(orbits) <= _MAX_ORBITS:
@@ -376,10 +376,10 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """Return the fitted law as a function of the step, NaN where it is not positive; None if no law was fitted.
+    """Return the fitted law as a function of the step; its non-positive values become NaN. None if no law was fitted.
 
-    For c n^2 and c n, c is that of the library, and the terms of lower degree fit the heights best in the sense of
-    least squares. The exponential goes through the last height.
+    For c n^2 and c n, c is `curve.constant`, and the terms of lower degree are a least-squares fit to the heights. The
+    exponential goes through the last height.
     """
     n, c = curve.steps.astype(np.float64), curve.constant
     if curve.kind is Growth.EXPONENTIAL and curve.ratio is not None:

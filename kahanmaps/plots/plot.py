@@ -1,4 +1,4 @@
-"""Pictures of results in one call each, as axes: what `km.plot` offers."""
+"""The functions of `km.plot`: each draws a picture of a result and returns its axes."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 
 class Plot(AttributeHints):
-    """The pictures, as axes; `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other results.
+    """Pictures of results, as axes: `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other types.
 
     `km.plot(value)` draws a result, an orbit, or the portrait of a system.
     """
 
     def __reduce__(self) -> str:
-        return "plot"  # there is one, `km.plot`
+        return "plot"  # the only instance is `km.plot`
 
     def __call__(self, value: Any, *arguments: Any, **options: Any) -> Axes:
-        """Draw the result of a function listed below, an orbit, or else the portrait of a system."""
+        """Draw the result of one of the functions below, an orbit, or the portrait of a system."""
         kinds: dict[type, Any] = {
             DegreeGrowth: self.degrees,
             HeightSurvey: self.heights,
@@ -72,14 +72,14 @@ class Plot(AttributeHints):
         return _axes(plot_scan(result, Style()))
 
     def compare(self, result: Comparison, *, show: str = "drift", scale: str = "loglog") -> Axes:
-        """Plot the result of `km.compare`: its "drift", the "error" against the time step, or the "work"."""
+        """Plot a result of `km.compare`: the "drift", or the "error" against the time step or the "work"."""
         from kahanmaps.plots.comparison.plot_compare import plot_comparison
 
         _require(result, Comparison, "a result: km.plot.compare(km.compare(...))")
         return _axes(plot_comparison(result, show=show, scale=scale))
 
     def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
-        """Draw the square x, Phi_f x, Phi_g x with its fourth corners, of two systems or of a member of the family."""
+        """Draw x, Phi_f x, Phi_g x, and Phi_g Phi_f x with Phi_f Phi_g x, for two systems or a member of the family."""
         from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, plot_squares, squares
 
         file = as_file(system)
@@ -87,7 +87,7 @@ class Plot(AttributeHints):
         return _axes(plot_squares([squares(pair, x0, eps, n) for pair in pairs], Style()))
 
     def invariant_curves(self, system: SystemLike, *, x0: Any, eps: Any, n: int = 1000) -> Axes:
-        """Draw the invariant curves of a member of the family, plane by plane, through one initial point or several."""
+        """Draw the invariant curves through one or several initial points in each plane of a member of the family."""
         from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
         from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 
@@ -104,7 +104,7 @@ class Plot(AttributeHints):
         points: int = 200,
         against: str | None = None,
     ) -> Axes:
-        """Plot rotation numbers along the segment between two initial points, against the position or an integral."""
+        """Plot rotation numbers along the segment from `first` to `last`, against the position or an integral."""
         from kahanmaps.plots.rotation import plot_rotation
 
         file = as_file(system)
@@ -128,7 +128,7 @@ class Plot(AttributeHints):
             system: a map with at least 3 variables, or a system, which stands for its Kahan map.
             plane: the hyperplane, a linear equation in the variables such as "x1 = 1/2".
             x0: one initial point or many.
-            eps: an exact number, half the time step where there is one.
+            eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
             axes: two variables or expressions; by default those along which the crossings spread most.
             direction: "up" for crossings to larger values, "down" or "both".
@@ -161,10 +161,10 @@ class Plot(AttributeHints):
 
         Args:
             system: a map, or a system, which stands for its Kahan map.
-            eps: an exact number, half the time step where there is one.
-            window: the intervals of the first two coordinates of the initial points; the others are 0.
+            eps: half the time step (exact); None for a map without eps.
+            window: the intervals of the first two coordinates of the initial points; all other coordinates are 0.
             n: the number of steps.
-            show: "time", or "basin" for the direction.
+            show: "time" for the steps, or "basin" for the directions.
             cells: the number of initial points along each axis.
             radius: a point is outside of the ball if max |x_i| exceeds this number.
         """
@@ -179,7 +179,7 @@ class Plot(AttributeHints):
         return _axes(plot_escape(survey, show=show))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
-        """Plot the points of a result of `km.orbit` in two coordinates."""
+        """Plot the points of an orbit, a result of `km.orbit`, in the coordinates with indices `x` and `y`."""
         _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(trajectory)[:, None]
         return _drawn(
@@ -233,7 +233,7 @@ def plot_orbits(
     Args:
         system: a map, or a system, which stands for its Kahan map.
         starts, x0: one initial point or many; by default sixteen around a fixed point, as for `plot portrait`.
-        eps: an exact number, half the time step where there is one.
+        eps: half the time step (exact); None for a map without eps.
         steps, n: the number of steps of each orbit, by default 1000.
         axes: the indices of the two coordinates, counted from 0.
     """

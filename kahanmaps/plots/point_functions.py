@@ -19,14 +19,14 @@ from kahanmaps.maps.floats.float_orbit import FLOATS
 from kahanmaps.plots.figures import label_of, plain
 
 ZERO = fmpq(0)
-_SHORT = 60  # characters of a formula that fits along an axis
+_SHORT = 60  # maximal number of characters of a formula along an axis
 
 
 @dataclass(frozen=True, eq=False)
 class PointFunction:
     """A rational function of the variables and eps (in this order), in doubles.
 
-    `name` is its name in output; `eps`, half the time step (exact), is inserted.
+    `name` is the name of the function in output; half the time step `eps` (exact) is substituted.
 
     >>> radius = point_function("x^2 + y^2", ["x", "y"])
     >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))
@@ -36,10 +36,10 @@ class PointFunction:
     name: str
     function: RationalFunction
     eps: fmpq = ZERO
-    of_arrays: ClassVar[bool] = True  # for ensembles
+    of_arrays: ClassVar[bool] = True  # ensembles evaluate it at arrays of points
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """The values at points (..., dim) as an array (...), with NaN at poles and for values that are not finite."""
+        """Return the values at points (..., dim) as an array (...), with NaN at poles and for values that overflow."""
         variable = self.variable
         if variable is not None:
             return np.array(points[..., variable], dtype=np.float64)
@@ -49,7 +49,7 @@ class PointFunction:
         return np.where(np.isfinite(values), values, np.nan)
 
     def at(self, point: Sequence[fmpq]) -> fmpq | None:
-        """The exact value at a rational point, None at a pole."""
+        """Return the exact value at a rational point; None at a pole."""
         value: fmpq | None = self.function.value(QQ, [*point, self.eps])
         return value
 
@@ -70,7 +70,7 @@ class PointFunction:
 
     @property
     def label(self) -> str:
-        """The name for a picture, typeset if it is a short formula."""
+        """The name for a picture; a short formula is typeset."""
         if is_name(self.name) or not self.function.denominator.is_one():
             return label_of(self.name)
         formula = latex_polynomial(self.function.numerator)
@@ -80,7 +80,7 @@ class PointFunction:
         coordinates = [*np.moveaxis(points, -1, 0), to_float(self.eps)]
         value = np.asarray(evaluate(polynomial, FLOATS, coordinates), dtype=np.float64)
         filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
-        filled[np.isnan(points).any(axis=-1)] = np.nan  # constants too: where there is no point there is no value
+        filled[np.isnan(points).any(axis=-1)] = np.nan  # constant functions, too, have no value at missing points
         return filled
 
 
@@ -94,7 +94,7 @@ def point_function(
     """Return the function given by `text`: one of `named`, or an expression in the variables, eps and the parameters.
 
     `named` are rational functions of the variables and eps, in this order. Without `eps` (exact, half the time step),
-    expressions with eps are refused. Raises InputError for text that cannot be read.
+    expressions that contain eps are refused. Raises InputError for invalid text.
 
     >>> point_function("(x - eps)/y", ["x", "y"], fmpq(1, 2))(np.array([2.5, 4.0]))
     array(0.5)

@@ -1,4 +1,4 @@
-"""Rotation numbers along a line of initial points, as a picture."""
+"""Pictures of the rotation numbers along a segment of initial points."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.62
-_SPACING = 0.05  # of marked resonances, relative to the height of the axes
-_LEAST, _MAX_DENOMINATOR = 3, 1000  # of them
+_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
+_LEAST, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
 _MAX_POINTS = 10_000
 
 
@@ -42,15 +42,15 @@ def plot_rotation(
 
     Args:
         file: the system or map.
-        eps: half the time step, exact; None for a map without eps.
-        first, last: the ends of the segment, exact.
-        points: the number of initial points; those without a rotation number are left out.
+        eps: half the time step (exact); None for a map without eps.
+        first, last: the end points of the segment (exact).
+        points: the number of initial points; points without a rotation number are omitted.
         against: the declared integral whose value is the horizontal coordinate; None for the position on the segment.
 
-    A system with a normal form has a rotation number for each real root of chi, unless the level is singular; for other
-    maps it is that of the curve of genus 1 or 0 that contains the orbit, if one is found. Solid lines belong to the
-    map, dashed lines to an iterate of it, such as the second one where the map exchanges two real components, dotted
-    lines to the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
+    A system with a normal form has a rotation number for each real root of chi, unless the level curve is singular. For
+    other maps the orbit needs a curve of genus 1 or 0 that contains it. Solid lines belong to the map. Dashed lines
+    belong to an iterate, e.g. the second if the map exchanges two real components. Dotted lines belong to the flow at
+    the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
 
     Raises InputError if no point has a rotation number, for fewer than 2 or more than 10,000 points, and for an
     unknown integral.
@@ -74,7 +74,7 @@ def plot_rotation(
                 rotations = rotation_numbers(normal_form, map_over.eps, start)
             elif (curve := orbit_curve(map_over, start, file.map, list(integrals.values()))).rotation is not None:
                 rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
-        except (PrecisionLost, UnknownCurve, InputError):  # an orbit that is finite, ends, or has no known curve
+        except (PrecisionLost, UnknownCurve, InputError):  # the orbit is finite, ends, or lies on no known curve
             continue
         for root, rotation in rotations.items() if at is not None else ():
             if len(rotation.numbers) == 1:
@@ -103,7 +103,7 @@ def plot_rotation(
         axes = figure.subplots()
         for k, values in enumerate(rows.values()):
             table = np.array(values)
-            # No line leads across a level that was left out, or to one with another number of components.
+            # No line crosses an omitted level, or joins levels with different numbers of components.
             breaks = 1 + np.flatnonzero((np.diff(table[:, 4]) > 1) | (np.diff(table[:, 3]) != 0))
             for part in np.split(table, breaks):
                 line = LINES[min(int(part[0, 3]) - 1, 1)]
@@ -130,7 +130,7 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return fractions p/q between two numbers with the smallest q, up to twice the first or until there are three."""
+    """Return fractions p/q between two numbers, spaced, by increasing q: three, or all up to twice the least q."""
     marked: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(marked) >= _LEAST and q > 2 * marked[0].denominator:

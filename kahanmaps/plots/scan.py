@@ -35,19 +35,19 @@ if TYPE_CHECKING:
 
 _ASPECT = 0.8
 _MANY = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
-_CONDITION_SIZE = 0.8  # of the letters of conditions, in units of that of other text
-_PLACES, _DOTS = 12, 300  # parts of a curve: at whose ends its condition may be written, and to find what it crosses
-_INNER = 0.85  # of the width and height of the picture, the axes
+_CONDITION_SIZE = 0.8  # font size of conditions, relative to the font size of other text
+_PLACES, _DOTS = 12, 300  # parts of a curve: for the positions of its condition, and to find labels that it crosses
+_INNER = 0.85  # the axes as a fraction of the width and height of the picture
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
 def plot_scan(
     scan: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
-    """Draw curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
+    """Draw the special curves and points of the plane of two parameters, with conditions and a color for each growth.
 
-    `window` is (low, high) of each parameter; by default it contains most of the points with rational parameters. With
-    `modulo`, a prime modulo which all members were tried, all special members modulo this prime are drawn instead.
+    `window` is (low, high) for each parameter; by default it contains most of the points with rational parameters. With
+    `modulo`, a prime for which the scan tried all members, all special members modulo this prime are drawn instead.
     Raises InputError for a scan over another number of parameters, and for another prime.
 
     >>> from kahanmaps.documents.catalog import load
@@ -59,7 +59,7 @@ def plot_scan(
     if len(scan.over) != 2:
         raise InputError(f"found a scan over {', '.join(scan.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
-    kinds: dict[str, list[Component]] = {}  # by the growth of their blocks, the slowest first
+    kinds: dict[str, list[Component]] = {}  # growth -> components with this growth, the slowest growth first
     for _, some in scan.classes:
         growth = growth_on(some)
         kinds.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(some)
@@ -68,7 +68,7 @@ def plot_scan(
         if modulo not in known:
             tried = ", ".join(map(str, known)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
-        # The special members, each with the growth of a component with its degrees that contains it.
+        # The special members, each with the growth of a component that contains the member and has its degrees.
         unassigned = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
         special = []
         for kind, some in kinds.items():
@@ -104,11 +104,11 @@ def plot_scan(
         for (
             text,
             pieces,
-        ) in curves:  # on the longest piece, preferably off its middle, where other curves rarely cross it
+        ) in curves:  # the label is on the longest piece, preferably off its middle, where curves rarely cross
             longest = max(pieces, key=len)
             ends = _resampled(longest, _PLACES + 1)
             parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
-            nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[parts])  # which is on the curve
+            nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[parts])  # vertices of the curve
             labels.append((text, [tuple(map(float, point)) for point in nearest]))
         every_piece = [piece for _, pieces in curves for piece in pieces]
         drawn.append(_Kind(kind, points[kind], every_piece, labels if kind != _MANY else []))
@@ -117,7 +117,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _Kind:
-    """The objects of one color: points, pieces of curves, and conditions with the places where they are written."""
+    """The objects of one color: points, pieces of curves, and conditions with possible label positions."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -159,10 +159,10 @@ def _draw(scan: Scan, style: Style, kinds: list[_Kind], window: Window, beside_n
 
 
 def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
-    """Write conditions next to their curves, then next to points, if there is room; labels may cover points.
+    """Write conditions next to their curves, then next to points, if they fit; labels may cover points.
 
-    Points with the fastest growth that is not exponential come first. Of the places where a label fits, it takes the
-    one that the fewest curves cross.
+    Points with the fastest growth that is not exponential are labelled first. Among the positions at which a label
+    fits, the position crossed by the fewest curves is chosen.
     """
     em = _CONDITION_SIZE * style.font_size
     across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))
@@ -208,7 +208,6 @@ def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
 
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
-    """Return `count` points along a curve, at equal distances."""
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)

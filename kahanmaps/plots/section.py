@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UP, DOWN, BOTH = "up", "down", "both"
-_NODES = 6  # of the interpolation: three points on either side of the hyperplane
+_NODES = 6  # interpolation nodes: three points on either side of the hyperplane
 _NEWTON = 12
-_TRUSTED = 0.1  # of a step: by so much at most may interpolation by four points and by six differ
+_TRUSTED = 0.1  # largest difference of interpolation with four and with six nodes, in steps
 _ASPECT = 0.75
 
 
@@ -35,8 +35,8 @@ _ASPECT = 0.75
 class Section:
     """The crossings of orbits with a hyperplane.
 
-    `crossings` contains for each orbit its points on the hyperplane (count, dim), in the order of the orbit; `skipped`
-    counts crossings that were left out, since the steps are too long there for an interpolation.
+    `crossings` contains for each orbit its crossings (count, dim) in the order of the orbit. `skipped` counts crossings
+    that were omitted, since the steps near them are too long for an interpolation.
     """
 
     crossings: tuple[FloatArray, ...]
@@ -48,7 +48,7 @@ class Section:
         return np.concatenate(self.crossings)
 
     def widest_axes(self, hyperplane: PointFunction) -> tuple[int, ...]:
-        """Return two variables along which the crossings spread most, without one that is constant on it."""
+        """Return two variables along which the crossings spread most, none of them constant on the hyperplane."""
         powers = [sum(column) for column in zip(*hyperplane.function.numerator.monoms(), strict=True)]
         dim = self.points.shape[1]
         free = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
@@ -56,7 +56,7 @@ class Section:
 
 
 def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return F - C for a text F=C. Raises InputError unless it is affine in the variables and does not contain eps."""
+    """Return F - C for a text F=C. Raises InputError unless F - C is affine in the variables and free of eps."""
     left, _, right = text.partition("=")
     function = requested_axis(file, eps, left if right.strip() in ("", "0") else f"{left} - ({right})")
     polynomial = function.function.numerator
@@ -71,7 +71,7 @@ def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunctio
 def curves_on(
     file: SystemFile, eps: fmpq | None, hyperplane: PointFunction, axes: Sequence[PointFunction]
 ) -> list[PointFunction]:
-    """Return the integrals of a file that depend, on a hyperplane, only on the two variables along the axes."""
+    """Return the integrals of a file whose restrictions to a hyperplane depend only on the variables along the axes."""
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
@@ -91,12 +91,13 @@ def section_of(
 
     Args:
         ensemble: the orbits.
-        hyperplane: an affine function of the variables that is 0 on it.
+        hyperplane: an affine function of the variables that is 0 on the hyperplane.
         steps: the number of steps of each orbit.
         direction: "up" for crossings to positive values, "down" to negative ones, or "both".
         progress: called with the current step.
 
-    Six consecutive points are interpolated by polynomials in the step. Raises InputError for another direction.
+    Crossings are interpolated by polynomials in the step through six consecutive points. Raises InputError for another
+    direction.
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
@@ -114,13 +115,13 @@ def section_of(
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
-    """Return the interpolated zeros of an affine function along an orbit, and how many were left out.
+    """Return the interpolated zeros of an affine function along an orbit, and the number of omitted zeros.
 
     Args:
         points: the points of the orbit (count, dim). values: the values of the function (count,).
         direction: "up", "down" or "both".
 
-    A zero needs three points on either side.
+    A zero is interpolated only if the orbit has three points on either side of it.
 
     >>> t = 0.3 * np.arange(12)
     >>> circle = np.stack([np.cos(t), np.sin(t)], axis=1)
@@ -138,15 +139,15 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     nearby, heights = points[window], values[window]
 
     def zero(nodes: slice) -> FloatArray:
-        """The crossings by interpolation at a subset of the six nodes."""
+        """Return the crossings by interpolation at a subset of the six nodes."""
         places = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
-        polynomials = np.linalg.inv(np.vander(places, increasing=True))  # coefficients from values
+        polynomials = np.linalg.inv(np.vander(places, increasing=True))  # maps values at the nodes to coefficients
         along = heights[:, nodes] @ polynomials.T
         powers = np.arange(len(places))
         low, high = np.zeros(len(along)), np.ones(len(along))
         t = np.clip(values[before] / (values[before] - values[before + 1]), 0, 1)
         rising = values[before] < values[before + 1]
-        for _ in range(_NEWTON):  # Newton's method, kept between bounds with a change of sign
+        for _ in range(_NEWTON):  # Newton's method, restricted to an interval with a change of sign
             value = (along * t[:, None] ** powers).sum(axis=1)
             slope = (along[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
             is_below = (value < 0) == rising
@@ -160,7 +161,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
         fine, coarse = zero(slice(None)), zero(slice(1, _NODES - 1))
         steps = np.linalg.norm(points[before + 1] - points[before], axis=1)
         trusted = np.linalg.norm(fine - coarse, axis=1) <= _TRUSTED * steps
-        # A function that moves away from 0 on both sides has a pole between them.
+        # A function that moves away from 0 on both sides of a change of sign has a pole there.
         middle = _NODES // 2
         approach, departure = np.diff(np.abs(heights), axis=1)[:, [middle - 2, middle]].T
         trusted &= (approach < 0) | (departure > 0)
@@ -168,7 +169,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
 
 
 def restricted_to(function: PointFunction, hyperplane: PointFunction, plane: Sequence[int]) -> PointFunction | None:
-    """Return a function on a hyperplane in terms of two variables; None if it depends on others as well."""
+    """Return the restriction of a function to a hyperplane in two variables; None if it depends on other variables."""
     affine = hyperplane.function.numerator
     names = function.function.names
     context = affine.context()
@@ -195,12 +196,12 @@ def plot_section(
     window: Window | None = None,
     equal: bool = False,
 ) -> Figure:
-    """Plot the crossings along two axes, each orbit in its own color, and level curves of integrals.
+    """Plot the crossings along two axes with a color for each orbit, and level curves of integrals.
 
     Args:
         section: the crossings.
         axes: two functions of the point.
-        style: sizes.
+        style: sizes and fonts of the picture.
         curves: integrals as functions of the variables along the axes, as `restricted_to` returns them; their levels
             through the first crossing of each orbit are drawn.
         window: the part of the plane; None for all crossings.

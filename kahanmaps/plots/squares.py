@@ -1,8 +1,8 @@
-"""The test whether two maps commute at one point: the lattice Phi_f^i Phi_g^j x in both orders of the maps, exactly.
+"""Test whether two maps commute at one point: compute Phi_f^i Phi_g^j x and Phi_g^j Phi_f^i x exactly.
 
 The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). In the
-picture arrows of f start from points reached by g first, arrows of g from points reached by f first. A ring marks the
-end of an arrow of g, a dot that of an arrow of f. If the maps commute, every ring contains its dot.
+picture arrows of f start from points Phi_g^j x and their images under f, arrows of g from points Phi_f^i x and their
+images under g. An arrow of g ends in a ring, an arrow of f in a dot. If the maps commute, every ring contains a dot.
 """
 
 from __future__ import annotations
@@ -35,17 +35,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_STEPS = 12
-MAX_BITS = 300_000  # of numerator and denominator of one coordinate: a step then takes seconds
+MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: a step then takes seconds
 
 Point = tuple[fmpq, ...]
-Lattice = tuple[
-    tuple[Point | None, ...], ...
-]  # [i][j], None after an indeterminacy point or where numbers are too long
+Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None after an indeterminacy point or if numbers are too long
 
 
 @dataclass(frozen=True)
 class MapPair:
-    """Two maps to be compared; systems stand for their Kahan maps, the second one scaled if it has another time step.
+    """Two maps to be compared; a system stands for its Kahan map, and is scaled if its time step differs.
 
     `names` are short texts, and `note` says how variables are matched if they differ.
     """
@@ -58,9 +56,9 @@ class MapPair:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """The two lattices of a point: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
+    """Two lattices for a point x: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
 
-    `stopped` is a sentence on why points are missing, empty if none are.
+    `stopped` is a sentence that says why points are missing, empty if none are missing.
     """
 
     pair: MapPair
@@ -75,14 +73,14 @@ class Squares:
 
     @property
     def compared(self) -> list[tuple[Point, Point]]:
-        """The pairs of points reached by the two orders, where both exist."""
+        """The pairs of corresponding points of the two lattices, if both exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
         pairs = (pair for row, other in rows for pair in zip(row[1:], other[1:], strict=True))
         return [(p, q) for p, q in pairs if p is not None and q is not None]
 
     @property
     def closes(self) -> bool | None:
-        """Whether the two orders lead to exactly the same points; None if there are no points to compare."""
+        """Whether the two orders of the maps give exactly the same points; None if there are no points to compare."""
         pairs = self.compared
         return all(p == q for p, q in pairs) if pairs else None
 
@@ -94,7 +92,7 @@ class Squares:
 
     @property
     def verdict(self) -> str:
-        """The result as text: closes exactly, the gap, or that nothing could be compared."""
+        """The result as text: closes exactly, the size of the gap, or that nothing could be compared."""
         if self.closes is None:
             return "no fourth corner"
         return "closes exactly" if self.closes else f"gap {self.gap:.3g}"
@@ -147,9 +145,9 @@ def squares(
 def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
     """Return the pairs of maps to be plotted for a member: two associated systems, and a control.
 
-    The first system is the member itself, the second has the opposite sign at the last factor of chi. The control is
-    J grad H_0 with J grad H_1, and f with 2 f if m = 1. Raises InputError if the system is not a member of the family,
-    declared or recognised, in its own coordinates.
+    The first system is the member itself, the second is the associated system with the opposite sign at the last factor
+    of chi. The control is the pair J grad H_0, J grad H_1 or, if m = 1, the pair f, 2 f. Raises InputError if the
+    system is not a member of the family, declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
@@ -173,7 +171,7 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
-    """Return the pair of two systems of equal dimension; with `eps2` the second one is scaled by eps2/eps."""
+    """Return the pair of two systems of equal dimension; with `eps2` the second system is scaled by eps2/eps."""
     g: QuadraticSystem | MapFamily
     g, note = matched(file, other)
     if eps2 is not None:
@@ -188,7 +186,7 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
 
 _F, _G, _GAP = COLORS[1], COLORS[5], COLORS[0]
 _LARGEST = 1e150  # squares of larger numbers would overflow
-_SEEN = 0.06  # of the width of a panel: a smaller gap is magnified
+_SEEN = 0.06  # fraction of the width of a panel: a smaller gap is magnified
 
 
 def plot_squares(
@@ -197,9 +195,9 @@ def plot_squares(
     axes: tuple[int, int] | None = None,
     captions: Sequence[str] = (),
 ) -> Figure:
-    """Plot one panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
+    """Plot one panel for each pair of maps in the coordinates `axes`, by default those in which the squares are widest.
 
-    `captions` replace the names of the maps above the panels. Raises InputError for invalid numbers of variables, and
+    `captions` replace the names of the maps above the panels. Raises InputError for invalid indices of variables, and
     for an initial point too large to be plotted.
     """
     dim = squares_of_pairs[0].pair.f.dim
@@ -250,16 +248,16 @@ def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
 
 
 def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, letter: float, style: Style) -> None:
-    """Draw one panel; `letter` is the font size in units of its side."""
+    """Draw one panel; `letter` is the font size in units of the side of the panel."""
     g_last, f_last = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
     all_points = np.concatenate([g_last.reshape(-1, 2), f_last.reshape(-1, 2)])
     all_points = all_points[np.isfinite(all_points).all(axis=1)]
-    # Margins on each side, in units of the range of the points: the names of corners need space, more in small panels.
+    # Margins on each side, in units of the range of the points: space for the names of corners, more in small panels.
     if squares.steps > 1:
         window = np.array(window_of(all_points, g_last[0, 0][None]))
         needed = np.array([[1.3 * letter], [1.7 * letter]])
         margins = np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed)))
-    else:  # five points, all of which are shown
+    else:  # one step: all five points are shown
         window = np.array([all_points.min(axis=0), all_points.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
         needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
@@ -302,7 +300,7 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
 
 
 def _draw_lattices(axes: Axes, g_last: Floats, f_last: Floats) -> None:
-    """Draw arrows, rings at the ends of steps of g, dots at those of f, and dotted lines across the gaps."""
+    """Draw arrows with rings at the ends of arrows of g and dots at the ends of arrows of f; gaps are dotted lines."""
     from matplotlib.patches import FancyArrowPatch
 
     steps = len(g_last) - 1
@@ -326,10 +324,10 @@ def _draw_lattices(axes: Axes, g_last: Floats, f_last: Floats) -> None:
 
 
 def _magnify(axes: Axes, g_last: Floats, f_last: Floats, all_points: Floats, window: Floats, style: Style) -> None:
-    """Draw the last two corners magnified until they are distinguishable, in the emptiest corner of the panel."""
+    """Draw the last two corners, magnified so that they are distinguishable, in the emptiest corner of the panel."""
     lengths = np.diff(window, axis=1)[:, 0]
     inside = (all_points - window[:, 0]) / lengths
-    if len(g_last) == 2:  # the name of the last corner is there as well
+    if len(g_last) == 2:  # the panel also contains the name of the last corner
         corner = (g_last[-1, -1] - window[:, 0]) / lengths
         inwards, down = -np.sign(corner - 0.5)
         name = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
@@ -351,15 +349,15 @@ def _magnify(axes: Axes, g_last: Floats, f_last: Floats, all_points: Floats, win
 
 
 def _in_two_digits(number: float) -> str:
-    """Format a positive number for a formula: 6.1, 180, or with a power of ten."""
+    """Format a positive number with two digits for a formula: 6.1, 180, or with a power of ten."""
     digits, power = f"{number:.1e}".split("e")
     return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
 
 
 def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
-    """Write a text beside a point, away from the middle of all points; a long one above or below, shifted inside.
+    """Write a text beside a point, away from the middle of all points; a long text above or below, shifted inside.
 
-    `side` is the alignment of a long name that has another one beside it.
+    `side` is the alignment of a long name beside which another long name is written.
     """
     if not np.isfinite(point).all():
         return
@@ -384,7 +382,7 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
 
 
 def _table(lattice: Lattice) -> Floats:
-    """Return the points as floating-point numbers, nan for missing points and those that are too large."""
+    """Return the points as floating-point numbers; nan for missing points and for points that are too large."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _LARGEST, table, np.nan)

@@ -1,7 +1,7 @@
 """The style of pictures: sizes as a journal states them, colors that color-blind readers can distinguish.
 
-The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up to
-four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown in the
+The colors are those of Okabe and Ito, in an order in which successive colors differ in lightness, so that a gray copy
+of up to four curves is readable. Curves also differ in line style, and points in their marks. Values are shown in the
 color map cividis, whose lightness grows evenly for all readers.
 """
 
@@ -18,7 +18,7 @@ COLORS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#CC
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 COLOR_MAP = "cividis"
-_MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
+_MAX_PIXELS = 1 << 28  # drawing takes a gigabyte
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Style:
             ("{} dots per inch", self.dpi, 30, 2400),
         ):
             if value is not None and not low <= value <= high:
-                # An integer may be beyond the range of floating-point numbers.
+                # An integer may exceed the range of floating-point numbers.
                 given = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
                 raise InputError(f"found {what.format(given)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))
@@ -71,16 +71,16 @@ class Style:
 
     @property
     def small(self) -> float:
-        """The size of numbers at axes and of legends, in points."""
+        """The font size of numbers at axes and of legends, in points."""
         return max(3.0, self.font_size - 1)
 
     @property
     def smallest(self) -> float:
-        """The size of notes and of labels in pictures: font_size - 2, but at least 6, the smallest legible size."""
+        """The font size of notes and labels in pictures: font_size - 2, but at least 6 (the smallest legible size)."""
         return min(self.font_size, max(6.0, self.font_size - 2))
 
     def settings(self) -> dict[str, Any]:
-        """The settings of matplotlib for this style beyond those of pictures.mplstyle."""
+        """Return the settings of matplotlib for this style that pictures.mplstyle does not contain."""
         sizes = {"axes.titlesize": self.font_size, "axes.labelsize": self.font_size, "font.size": self.font_size}
         small = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), self.small)
         return {**sizes, **small, "image.cmap": COLOR_MAP, "savefig.dpi": self.dpi}

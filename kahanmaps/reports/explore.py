@@ -1,7 +1,7 @@
-"""Pages with sliders for eps and the initial point: the browser draws the orbit beside the exact verdict.
+"""Pages with sliders for eps and the initial point: the browser draws the orbit next to the exact verdict.
 
 The browser computes in floating point with the polynomials M and r of the map (M x~ = r); explore.js solves the linear
-system of each step. Proofs are made before and printed as text.
+system of each step. Proofs are computed beforehand and printed as text.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from kahanmaps.reports.pictures import DEFAULT_EPS
 
 _LARGEST_EPS = 0.5
 _DEFAULT_STEPS, _MAX_STEPS = 800, 5000
-_MAX_TERMS = 2000  # of all polynomials: the browser evaluates them at every step
+_MAX_TERMS = 2000  # terms of all polynomials, which the browser evaluates at every step
 _MAX_VARIABLES = 12
 
 
 def explore_sections(analysis: Analysis) -> list[Section]:
-    """Return the sections of a page with the verdict and the integrals of `analyze`, and an orbit that sliders change.
+    """Return the sections of a page with the verdict and the integrals of `analyze` and an orbit controlled by sliders.
 
     Raises InputError if the map has too many variables or terms for a browser.
     """
@@ -58,7 +58,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
             for integral in integrals
         ],
         "functions": data["functions"],
-        # in a script element < could begin a tag, in text of JSON it can be written otherwise
+        # in a script < could begin a tag; in JSON it can be escaped
         "data": Html(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
     }
     return [Section("explore", "An orbit", explore=explore), system_section(analysis.file)]
@@ -88,7 +88,7 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
             plotted.append(
                 {"name": name, "text": text, "word": certainty, "numerator": sides[0], "denominator": sides[1]}
             )
-    if file.is_quadratic:  # an initial point with a bounded orbit, in the middle of those of a portrait
+    if file.is_quadratic:  # the middle one of the initial points of a portrait, whose orbits are bounded
         starts = automatic_starts(file.system, DEFAULT_EPS if analysis.eps is None else analysis.eps)
         start, reach = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
     else:
@@ -106,7 +106,7 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
 
 
 def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, fmpq]) -> list[list[Any]]:
-    """Return the terms as lists of a coefficient and the powers of the names; symbols are replaced by values."""
+    """Return terms as lists [coefficient, exponents of the names]; symbols are replaced by their `values`."""
     own_names = names_of(polynomial)
     terms = []
     for powers, coefficient in polynomial.terms():

@@ -1,8 +1,8 @@
-"""HTML pages: a title, a lead, sections with stable ids, and how to reproduce the page.
+"""HTML pages: a title, a lead, sections with stable ids, and instructions to reproduce the page.
 
-A page is a single file made from page.html, a template of Jinja2. It needs no network and no JavaScript (except that of
-explore.py), and equal input gives equal bytes. The template escapes text; `Html` is not escaped. Formulas are converted
-from LaTeX to MathML.
+A page is a single file made from page.html, a template of Jinja2. It needs no network, and JavaScript only for
+explore.py; equal input gives equal bytes. The template escapes text; `Html` is not escaped. Formulas are converted from
+LaTeX to MathML.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, printable
 from kahanmaps.version import __version__
 
-CHARACTERS = 6_000  # of one formula, about; and of one line of text
-_MAX_SYSTEM = 200_000  # characters of a system file
+CHARACTERS = 6_000  # approximate limit for one formula, and limit for one line of text
+_MAX_SYSTEM = 200_000  # maximal number of characters of a printed system file
 _MAX_EQUATIONS = 40
-# Commands of LaTeX with their arguments, and words.
+# LaTeX commands with their arguments, and words.
 _WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
-# Commands of text, for names with such characters, which latex2mathml would print as they stand.
+# Text commands in names with special characters; latex2mathml would print these commands literally.
 _TEXT_COMMANDS = {
     r"\textbackslash{}": r"\backslash ",
     r"\textasciicircum{}": r"\wedge ",
@@ -54,12 +54,12 @@ class Section:
 
     id: str
     title: str
-    conclusion: tuple[str, str] | None = None  # in large letters: a verdict and a sentence
+    conclusion: tuple[str, str] | None = None  # a verdict and a sentence, printed in large letters
     paragraphs: Sequence[str] = ()
-    items: Sequence[str] = ()  # of a list
+    items: Sequence[str] = ()  # the items of a list
     statements: Sequence[tuple[str, str]] = ()  # pairs of a status and a sentence
     pieces: Sequence[str] = ()
-    folded: Sequence[tuple[str, str]] = ()  # pairs of a summary and the content that a click unfolds
+    folded: Sequence[tuple[str, str]] = ()  # pairs of a summary and its content, which a click unfolds
     claims: Sequence[Mapping[str, Any]] = ()
     explore: Mapping[str, Any] | None = None  # the interactive orbit of explore.py
 
@@ -77,9 +77,9 @@ def page(
     file: SystemFile | None = None,
     script: str = "",
 ) -> str:
-    """Return a page without its empty sections. `script` is the only program that browsers may run.
+    """Return a page; empty sections are omitted. `script` is the only JavaScript that browsers may run.
 
-    `command`, `seed` (None if nothing is random) and `file` say how to reproduce the page.
+    `command`, `seed` (None if nothing is random) and `file` are printed in the instructions to reproduce the page.
     """
     remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]
@@ -104,7 +104,7 @@ def page(
 
 @cache
 def font_face() -> str:
-    """Return the embedded font of formulas as a rule of a stylesheet.
+    """Return a CSS rule that embeds the font for formulas.
 
     Browsers need a font with a MATH table to place exponents and primes.
     """
@@ -115,9 +115,9 @@ def font_face() -> str:
 
 @cache
 def page_template() -> Any:
-    """Return the template of all pages. Raises InputError where the extra [report] is not installed."""
+    """Return the template of all pages. Raises InputError if the extra [report] is not installed."""
     try:
-        import latex2mathml.converter  # noqa: F401 (whether it is there)
+        import latex2mathml.converter  # noqa: F401 (only to test whether it is installed)
         from jinja2 import Environment
     except ImportError as error:
         needed = "a report needs Jinja2 and latex2mathml"
@@ -132,13 +132,13 @@ def page_template() -> Any:
 
 @cache
 def mathml(latex: str) -> str:
-    r"""Return a formula as MathML with its LaTeX as `alttext`, or as code where it cannot be converted.
+    r"""Convert LaTeX to MathML with the LaTeX as `alttext`, or to code if it cannot be converted.
 
     latex2mathml raises few errors, so its output is parsed and searched for unknown commands.
     """
     from latex2mathml.converter import convert
 
-    # A name of several letters would look like a product: set it upright, with space around it.
+    # A name of several letters would look like a product: set it upright, with spaces around it.
     prepared = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
     prepared = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", prepared)
     for command, other in _TEXT_COMMANDS.items():
@@ -146,17 +146,17 @@ def mathml(latex: str) -> str:
     try:
         text = convert(prepared)
         is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
-    except Exception:  # one of latex2mathml's own, KeyError, IndexError or ParseError
+    except Exception:  # an exception of latex2mathml, KeyError, IndexError or ParseError
         is_known = False
     if not is_known:
         return f"<code>{markup.escape(latex)}</code>"
-    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign after = is a prefix, not an operator between terms
+    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign after = is a prefix, not a binary operator
     text = text.replace(sign, sign.replace("><mo>&#x02212", '><mo form="prefix">&#x02212'))
     return re.sub("^<math[^>]*>", lambda _: f'<math alttext="{markup.escape(latex)}">', text)
 
 
 def text(words: object) -> Html:
-    """Return text as HTML, shortened where it is too long for a page."""
+    """Return text as HTML, shortened if it is too long for a page."""
     return Html(markup.escape(markup.shortened(words, CHARACTERS)))
 
 

@@ -1,4 +1,4 @@
-"""The pictures of a page as inline SVG, or a sentence that says why there is none."""
+"""The pictures of a page as inline SVG, or sentences that say why pictures are missing."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
     from kahanmaps.documents.files import SystemFile
 
-DEFAULT_EPS = fmpq(1, 20)  # of pictures on a page for every eps
+DEFAULT_EPS = fmpq(1, 20)  # eps of pictures on a page about every eps
 _STYLE = Style(width=14, font_size=11, dpi=150)  # letters are legible on a phone
-_MAX_ELEMENTS = 1_500  # points: as elements of the page they would be a hundred bytes each
+_MAX_ELEMENTS = 1_500  # maximal number of points drawn as SVG elements, which take a hundred bytes each
 _STEPS = 600
 _INITIAL_POINTS = 16
 _CURVES = 3
@@ -58,8 +58,8 @@ class Pictures:
     ) -> str:
         """Return a <figure> with the picture made by `drawing`; `name` is its id, `alt` its text alternative.
 
-        `drawing` may append `remarks`, which are printed below the caption. Returns an empty text if no pictures are
-        requested, and the reason if the picture cannot be drawn.
+        `drawing` may append to `remarks`, which are printed below the caption. Returns an empty text if no pictures are
+        requested, and a sentence with the reason if the picture cannot be drawn.
         """
         if not self._requested:
             return ""
@@ -83,9 +83,9 @@ class Pictures:
         return f'<figure id="{name}">\n{svg}\n<figcaption>{caption_html}</figcaption>\n</figure>'
 
     def portrait(self, file: SystemFile, eps: Any) -> str:
-        """Draw sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
+        """Draw sixteen orbits in the plane of the first two variables; in dimension 1, against the step number.
 
-        The initial points lie around the fixed points of a vector field, or are random if there is no vector field.
+        The initial points lie around an equilibrium of the vector field; without a vector field they are random.
         """
         eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
@@ -118,7 +118,7 @@ class Pictures:
         return self.draw("portrait", caption, f"Portrait of orbits in {axis_names}, {sentence}", drawing, remarks)
 
     def invariant_curves(self, file: SystemFile, eps: Any) -> str:
-        """Draw three orbits of a member of the family on their invariant cubics, plane by plane."""
+        """Draw three orbits of a member of the family on their invariant cubics, with a panel for each plane."""
         eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
 

@@ -1,4 +1,4 @@
-"""Results as one HTML page: formulas, verdicts, pictures, and the command that reproduces them."""
+"""HTML pages of results: formulas, verdicts, pictures, and the command that reproduces them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _LIMITS = checks.DisplayLimits(
     CHARACTERS, CHARACTERS, CHARACTERS, 100
-)  # long enough for complete witnesses, so that a reader can check them
+)  # long enough for complete witnesses, which a reader can check
 _PARSED = 4_000  # maximal length of a relation that is typeset as a formula
 _PAPER = "petrera-suris-2016"
 _EXPLAINED = (
@@ -82,7 +82,7 @@ def report_html(
     >>> text[:15], text.count("</details>")
     ('<!DOCTYPE html>', 3)
     """
-    page_template()  # raises the error for a missing package before pictures are drawn
+    page_template()  # raises InputError for a missing package before pictures are drawn
     page_pictures = Pictures(pictures and not explore)
     script, seed = "", None
     if isinstance(results, Analysis):
@@ -132,7 +132,7 @@ def report(
     pictures: bool = True,
     explore: bool = False,
 ) -> str:
-    """Return the HTML page about a system or about results, and write it to `path` if that is given.
+    """Return the HTML page about a system or about results, and write it to `path` if a path is given.
 
     Args:
         system: a system, which is analyzed with `eps` (or `time_step`, `h`), `effort` and `seed` as by `analyze`, or
@@ -153,12 +153,12 @@ def report(
 
 
 def write_report(path: str | Path, results: Any, **options: Any) -> None:
-    """Write the page of `report_html` atomically to a file; the options are those of `report_html`."""
+    """Write the page of `report_html` atomically to a file; `options` are options of `report_html`."""
     write_atomically(Path(path), report_html(results, **options).encode())
 
 
 def _title(file: SystemFile) -> str:
-    """Return the title in the catalogue, or else the label: the name, or short equations of an inline system."""
+    """Return the title from the catalogue or, for other files, the label (the name, or short equations)."""
     return str(file.catalog.get("title", "")) or file.label
 
 
@@ -181,13 +181,12 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
         title = name[0].upper() + name[1:]
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
-    is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates of the system
+    is_member = isinstance(file.normal_form, SystemNormalForm)  # a member in the coordinates of the system
     picture = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
     return [*sections, Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
 
 
 def _catalogue(file: SystemFile) -> Section:
-    """Return the section with facts and claims of the catalogue or the file; empty if there are none."""
     claims = [
         formula(function, name or "I", CHARACTERS)
         for name, function in {**file.integrals, **file.integrals_in_iterates}.items()
@@ -217,7 +216,7 @@ def _catalogue(file: SystemFile) -> Section:
 def _pictures_and_tables(
     analysis: Analysis, name: str, pictures: Pictures
 ) -> tuple[list[Html], list[tuple[str, Html]]]:
-    """Return the pictures and folded tables below the statements of a section."""
+    """Return the pictures and folded tables that follow the statements of a section."""
     figures: list[str] = []
     folded: list[tuple[str, Html]] = []
     if name == "singularities":
@@ -245,7 +244,7 @@ def _pictures_and_tables(
 
 
 def formulas_of(analysis: Analysis) -> dict[str, Html]:
-    """Return HTML for statements that are formulas, by their text in `analysis.sections`."""
+    """Return a dict from statements in `analysis.sections` that are formulas to their HTML."""
     html_by_text: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
@@ -268,7 +267,7 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
         and analysis.degrees.recurrence.closed_form
     ):
         closed = analysis.degrees.recurrence.closed_form
-        with suppress(KahanmapsError):  # raised unless it is a polynomial in n
+        with suppress(KahanmapsError):  # raised unless the closed form is a polynomial in n
             html_by_text[f"d_n = {closed}"] = typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
     if analysis.hamiltonian is not None and analysis.hamiltonian.hamiltonian is not None:
         hamiltonian = analysis.hamiltonian.hamiltonian
@@ -283,7 +282,7 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
 
 
 def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
-    """Return P = 0 as a formula with terms in the order of its text; empty if it cannot be parsed or is too long."""
+    """Return P = 0 as HTML with terms in the order of the relation's text; empty if it is unparsable or too long."""
     if len(relation.text) > _PARSED:
         return ""
     text = ""
@@ -299,7 +298,7 @@ def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
     return typeset(f"{text} = 0")
 
 
-# -- the page of claims: those of the paper by section, or those of the checks of one system
+# -- the page of claims: the paper's claims by section, or the claims of checks of one system
 
 
 def _claims_sections(
@@ -339,7 +338,7 @@ def _claims_sections(
 def _claim(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
     """Return the data of a line that unfolds to its evidence; it is open if the claim is refuted unexpectedly.
 
-    `ids` counts the keys on the page: the controls of a claim, one for each hypothesis, have the key of the claim.
+    `ids` counts the keys on the page, to make ids unique: a claim and its controls have the same key.
     """
     name = ""
     if key := finding.place.get("key"):

@@ -1,1 +1,1 @@
-"""One file a command; each is imported only when its command runs or its help is shown."""
+"""One file for each command; it is imported only when the command runs or its help is shown."""

@@ -99,7 +99,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
 
 class _Report:
-    """Prints the report, each section as soon as it is final; `is_silent` is for another output format."""
+    """Prints each section of the report as soon as it is final; `is_silent` (other output formats) turns it off."""
 
     def __init__(self, is_silent: bool) -> None:
         self.result: lib.Analysis | None = None

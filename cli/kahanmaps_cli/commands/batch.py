@@ -31,8 +31,8 @@ from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_TASKS_SHOWN = 3  # of each experiment in a dry run
-_VALUE_WIDTH = 300  # of what `batch show` prints on a terminal
+_TASKS_SHOWN = 3  # tasks of each experiment that a dry run prints
+_VALUE_WIDTH = 300  # maximal length of a value that `batch show` prints on a terminal
 _NEEDS = {
     None: "none",
     "system": '"family", a name of the catalogue, a file, or a list of these',
@@ -142,12 +142,12 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 
 
 def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
-    """Read the spec and print the tasks that a run would start."""
+    """Print the tasks that a run of the spec would start."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     missing = None
-    if os.path.exists(db):  # opened read-only
+    if os.path.exists(db):  # a dry run opens it read-only
         with lib.Store.open(db, readonly=True) as store:
             done = {row.task.key for row in store.rows() if row.record is not None}
         missing = len({task.key for experiment in chosen for task in experiment.tasks()} - done)
@@ -232,12 +232,12 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 batch, is_announced = lib.Batch(jobs, executor), False
                 with interruptible(batch.interrupt):
                     for records in batch:
-                        if batch.was_interrupted and not is_announced:  # not in the handler: a line may be half written
+                        if batch.was_interrupted and not is_announced:  # the handler may interrupt a line
                             is_announced = True
                             if executor.in_flight:
                                 running = _tasks(executor.in_flight)
                                 progress.print(f"finishing {running} in flight (Ctrl-C again ends at once)")
-                        if records:  # stored before the next job is submitted
+                        if records:  # store them before the next job is submitted
                             store.add(records)
                         progress.add(records, executor.in_flight)
                         for record in records if options["as_jsonl"] else ():
@@ -283,13 +283,13 @@ def _tasks(number: int) -> str:
 
 
 class BatchProgress(Progress):
-    """Progress of a batch by its records; `todo` of them are expected."""
+    """Progress of a batch; `todo` is the expected number of records."""
 
     def __init__(self, todo: int, quiet: bool) -> None:
         super().__init__(quiet)
         self.todo = todo
         self.outcomes: Counter[str] = Counter()
-        self.why_lost = ""  # message of the last lost task
+        self.why_lost = ""  # message of the task that was lost last
         self._begin = time.monotonic()
 
     @property
@@ -299,7 +299,7 @@ class BatchProgress(Progress):
 
     @property
     def lost(self) -> int:
-        """The number of tasks given up without a result."""
+        """The number of lost tasks, which have no result."""
         return self.outcomes["lost"]
 
     @property
@@ -308,7 +308,7 @@ class BatchProgress(Progress):
         return time.monotonic() - self._begin
 
     def add(self, records: Sequence[lib.Record], in_flight: int) -> None:
-        """Count new records, perhaps none, and show how many tasks are running."""
+        """Count new records (there may be none), and show the number of running tasks."""
         for record in records:
             self.outcomes[str(record.outcome)] += 1
             if record.outcome == "lost":
@@ -350,7 +350,6 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
 
 def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
-    """Return the progress of the experiments for JSON."""
     experiments = store.status()
     _require_experiments(only, [experiment.name for experiment in experiments])
     return {
@@ -373,7 +372,6 @@ def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
 
 
 def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
-    """Raise InputError for an unknown experiment."""
     for name in only:
         if name not in known:
             hint = suggestion(name, known)
@@ -383,7 +381,6 @@ def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
 
 
 def _print_status(data: Mapping[str, Any]) -> None:
-    """Print a line for each experiment."""
     rows = data["experiments"]
     kinds = ["ok", *(kind for kind in lib.STORED_OUTCOMES[1:] if any(row["outcomes"].get(kind) for row in rows))]
     verdicts = [verdict for verdict in lib.VERDICTS if any(row["verdicts"].get(verdict) for row in rows)]
@@ -488,7 +485,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
             lib.write_parquet(rows, str(output), stable=stable)
             return
         stream: Any = sys.stdout
-        if output not in (None, "-"):  # written atomically
+        if output not in (None, "-"):  # a file is written atomically
             stream = codecs.getwriter("utf-8")(stack.enter_context(lib.atomic_write(str(output))))
         if form == "csv":
             lib.write_csv(rows, stream, stable=stable)
@@ -548,7 +545,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
-    for source in sources:  # check all before an empty target is created
+    for source in sources:  # check all sources before an empty target is created
         lib.Store.open(source, readonly=True).close()
     with lib.Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]

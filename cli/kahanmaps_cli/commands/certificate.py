@@ -14,7 +14,7 @@ from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
 
-_CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certificate, which --help does not load
+_CHECKERS = ("rocq", "gp", "sympy")  # as in kahanmaps.certificates.certificate, which is not imported for --help
 
 
 @click.command("certificate")

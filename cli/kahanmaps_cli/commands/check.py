@@ -41,7 +41,7 @@ def command(name: str) -> click.Command:
                     file, second = second, file
                 if options["arithmetic"] == "float":
                     measured = _measured_commutator(file, second, start, eps2, options)
-                    options |= {"start": None, "steps": None}  # which are those of the float orbit
+                    options |= {"start": None, "steps": None}  # `start` and `steps` concern only the float orbit
                 settings = opt.settings_from(options, progress, options["start"] and start)
                 report = check(file, second, settings, eps2)
             else:
@@ -95,7 +95,6 @@ def command(name: str) -> click.Command:
 def _measured_commutator(
     file: lib.SystemFile, second: lib.SystemFile | None, start: Any, eps2: Any, options: dict[str, Any]
 ) -> lib.Commutator:
-    """Measure the commutator of two maps along a float orbit."""
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     if second is None or start is None or eps is None:
         raise click.UsageError("--arithmetic float needs OTHER, --start X and --eps E (or --time-step H)")
@@ -107,9 +106,9 @@ def _measured_commutator(
 
 
 class _PairCommand(click.Command):
-    """A command with an argument and an inline system: the one that is typed first is f, the other g.
+    """A command with an argument SYSTEM and an inline system: f is the system that is typed first, g the other one.
 
-    click processes arguments after all options, so this order must be determined here.
+    click processes arguments after all options, so this class determines the order.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -122,9 +121,10 @@ class _PairCommand(click.Command):
 
 
 def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
-    """Return the claims with their names, without the word "known".
+    """Return the claims as pairs of a name and a text, without the word "known".
 
-    An integral of the file keeps its name; claims without a name are called I1, I2, ..., skipping names in use.
+    An integral of the file has its name in the file. Other claims without a name are called I1, I2, ..., skipping names
+    in use.
     """
     of_file = {**file.integrals, **file.integrals_in_iterates}
     claims = [(name or text if text in of_file else name, text) for name, text in claims]

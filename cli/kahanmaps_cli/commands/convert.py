@@ -60,7 +60,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
-    # The command that reproduces the file, without its -o option.
+    # The command that reproduces the file, without the option -o.
     command_words = ["kahanmaps", "convert", *([system] if system is not None else [])]
     command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
     command_words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
@@ -73,7 +73,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
 
 
 def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
-    """Write a text to a file, with a line on standard error that names its kind, or to standard output."""
+    """Write a text to standard output, or to a file with a line on standard error; `what` is the kind of text."""
     if output is None or output == "-":
         click.echo(text, nl=False)
         return

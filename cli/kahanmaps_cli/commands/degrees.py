@@ -14,10 +14,10 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-_SHOWN = 8  # degrees in a line of a table
+_SHOWN = 8  # maximal number of degrees in a line of a table
 
 
-# Shared with the command that draws the degrees.
+# These options are shared with `plot degrees`.
 degree_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     opt.effort_options,
@@ -110,13 +110,13 @@ def command(system: str | None, **options: Any) -> int:
 def measure(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
-    """Measure the degrees that the options request."""
+    """Return the degree growth that the options request."""
     arguments = opt.given(options, "effort", "max_degree", "seed", max_terms="terms")
     return lib.degree_growth(file.map, eps, **arguments, steps=options.get("steps"), progress=progress)
 
 
 def is_done(growth: lib.DegreeGrowth, terms: int | None) -> bool:
-    """Whether the request is fulfilled: `terms` degrees, or a recurrence if `terms` is None."""
+    """Whether the request is fulfilled: `terms` degrees are measured or, if `terms` is None, a recurrence is found."""
     if growth.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and (growth.proof is not None or growth.recurrence is not None)

@@ -20,9 +20,9 @@ from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # more would take years
 FAILURES_SHOWN = 20
-_MIN_COMPILED_WORK = 5_000_000  # with less work numpy finishes before the code is loaded and compiled
-_SAMPLES = 100  # of the integrals, unless --every is given
-_MAX_VALUES = 200_000  # of the integrals
+_MIN_COMPILED_WORK = 5_000_000  # for less work numpy is faster than loading and compiling code
+_SAMPLES = 100  # steps at which integrals are evaluated, unless --every is given
+_MAX_VALUES = 200_000  # maximal number of values of integrals
 
 
 @click.command("ensemble")
@@ -72,7 +72,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     eps_value = lib.rational(1) if eps is None else eps
     named = [pair for pair in options["integrals"] if pair != ("", "known")]
     claims: dict[str, Any] = lib.functions_along(file, named, in_floats=True)
-    integrals: dict[str, Any] = {  # backward too: the inverse has the same integrals
+    integrals: dict[str, Any] = {  # also for --backward: the inverse map has the same integrals
         name: lib.PointFunction(name, claimed.function, eps_value) for name, claimed in claims.items()
     }
     if len(named) < len(options["integrals"]):
@@ -100,7 +100,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         print_stderr(f"method {method}: {why}; kernel {ensemble.kernel}")
-    # Integrals are sampled also if only the first and the last point are written.
+    # Integrals are evaluated also if only the first and the last point are written.
     record_interval = every or max(1, steps)
     interval = record_interval
     if integrals and not every:
@@ -172,7 +172,6 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
-    """Raise UsageError for options that contradict each other or are out of range."""
     steps, every, output = options["steps"], options["every"], options["output"]
     if require_one_kind_of_starts({**options, "system": system}) is None:
         raise click.UsageError("missing initial points: give --start X, --starts FILE, --grid, --line or --random N")

@@ -381,7 +381,7 @@ def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tup
 
 def _write(file: lib.SystemFile, output: str | None) -> None:
     text = file.to_toml()
-    lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError if the file could not be read
+    lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError for an invalid file
     if output is None:
         click.echo(text, nl=False)
         return

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-# Shared with `plot heights`.
+# These options are shared with `plot heights`.
 height_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     click.option(

@@ -63,7 +63,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if as_json:
 
         def number(value: Any) -> float | None:
-            return float(value) if isfinite(value) else None  # JSON knows no NaN
+            return float(value) if isfinite(value) else None  # JSON has no NaN
 
         lists = {"per_time": result.mean, "per_step": result.per_step, "spread": result.spread}
         lists["change_from_half"] = result.change
@@ -85,7 +85,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, double precision")
         print_stdout(f"orbits\t{result.orbits - result.ended} of {result.orbits}")
-        if result.stopped and not result.steps:  # means over no steps would be nan
+        if result.stopped and not result.steps:  # there are no means over zero steps
             print_stdout(f"steps\tnone counted: stopped in the transient, after {result.transient} of its steps")
         else:
             print_stdout(f"steps\t{result.steps} after {result.transient}")

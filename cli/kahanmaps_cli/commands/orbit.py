@@ -111,13 +111,13 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         else:
             start = start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
 
-    def stop() -> None:  # while the method is being chosen there are no points to keep
+    def stop() -> None:  # while the method is being chosen, no points exist that could be kept
         raise KeyboardInterrupt
 
     with interruptible(stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = {}
-        if options["integrals"]:  # loads the checks
+        if options["integrals"]:  # this imports the checks
             functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         trajectory = lib.orbit(
             map_,
@@ -137,12 +137,12 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     is_table = on_terminal and form == "text"
     target: Any = sys.stdout if output is None else output
     if is_table:
-        from kahanmaps_cli.screen.orbit_table import OrbitTable  # loads the library
+        from kahanmaps_cli.screen.orbit_table import OrbitTable  # this import loads the library
 
         target = OrbitTable(target, file.variables, list(functions))
     last_step = trajectory.header()["steps"]
     time_left = TimeLeft(last_step)
-    is_unread = False  # the reader of a pipe (such as head) has closed it
+    is_unread = False  # whether the reader of the pipe (such as head) has closed it
 
     def on_step(step: int) -> None:
         nonlocal is_unread
@@ -154,19 +154,18 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     with (
         interruptible(trajectory.interrupt),
         Progress(quiet or on_terminal) as progress,
-    ):  # on a terminal the points show the progress
+    ):  # on a terminal the printed points already show the progress
         end = trajectory.write(target, form, file.name, on_step)
     if verbose and not quiet and trajectory.why != reason:
         print_stderr(trajectory.why)
     if output is not None and not quiet:
         print_stderr(f"{output}: {end.text}")
-    elif end.status not in _STATUS and not (quiet or is_unread or is_table):  # the table ends with this text
+    elif end.status not in _STATUS and not (quiet or is_unread or is_table):  # a table already ends with this text
         print_stderr(end.text)
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
 def _require_consistent(options: dict[str, Any]) -> None:
-    """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):
         raise click.UsageError("give either --steps N or --at N1,N2,...")
@@ -181,7 +180,7 @@ def _require_consistent(options: dict[str, Any]) -> None:
 
 
 def _form(options: dict[str, Any], output: str | None) -> str:
-    """Return the requested format, by default that of the suffix of the file."""
+    """Return the requested format, by default the format given by the suffix of the output file."""
     form: str | None = options["form"]
     if options["as_json"]:
         if form not in (None, "json"):

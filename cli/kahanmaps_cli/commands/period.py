@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _WALK = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
-_LONG_PRIME, _MAX_PRIME = 90, 192  # bits; between them the computation takes seconds to minutes
+_LONG_PRIME, _MAX_PRIME = 90, 192  # bits; for primes between these sizes the computation takes seconds to minutes
 
 
 @click.command("period")
@@ -73,7 +73,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(f"{no_period}: {normal_form.reason}. {_WALK}")
     eps = requested_eps(options["eps"], options["time_step"])
-    # Check eps, prime and initial point as for orbits, with the same messages.
+    # Check eps, prime and initial point as `orbit` does, with the same messages.
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
     if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(
@@ -88,7 +88,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     result = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = result.text.splitlines()[0], _STATUS.get(result.status, 3)
     if as_json:
-        # Numbers are text: periods exceed what readers of JSON hold exactly.
+        # Numbers are written as text: many JSON readers cannot represent long periods exactly.
         planes = [
             {
                 **lib.attributes(plane, "name", "status", "meets_pole", "reason"),
@@ -122,7 +122,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
-    """Print the levels with a period, and those in the planes of a system if one is given."""
+    """Print the level curves with a period, and if a system is given, the level curves in its planes."""
     levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {
         **envelope("period levels"),
@@ -165,6 +165,6 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         for square in plane["squares"]:
             real = "" if square[0] != "-" else ", no real level"
             print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
-        if plane["disc"] == "0":  # 1 is no root of any psi_N
+        if plane["disc"] == "0":  # no psi_N has the root 1
             print_stdout("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

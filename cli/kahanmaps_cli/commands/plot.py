@@ -21,7 +21,7 @@ from kahanmaps_cli.pictures import (
 
 
 class PlotCommands(SuggestingGroup):
-    """The group, with the replacements of removed commands."""
+    """The group `plot`, which names replacements of removed subcommands."""
 
     removed: ClassVar = {
         "batch": "kahanmaps batch export writes tables for pandas and matplotlib",

@@ -86,7 +86,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     is_named, is_drawn = _require_consistent(system, options)
     require_every_eps(options)
-    lib.page_template()  # raises the error for a missing package before the work
+    lib.page_template()  # raises InputError for a missing package before the computation
     page_options = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:
         if options["source"] == "analyze":
@@ -138,7 +138,7 @@ def command(system: str | None, **options: Any) -> int:
 
 
 def _certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
-    """Write the certificate of all claims, if one is requested; return its path relative to the page, or nothing."""
+    """Write the certificate of all claims if requested; return its path relative to the page, "" if not requested."""
     path, page = options["certificate"], options["output"]
     if write_certificate(options, file.name, lambda checker: lib.certificate(file, checker, everything=True)):
         return ""
@@ -146,7 +146,7 @@ def _certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:
-    """Return whether a system is named and whether a random member is requested; refuse contradicting options."""
+    """Return whether a system is named, and whether a random member is requested; refuse contradictory options."""
     context = click.get_current_context()
     names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
     given = [

@@ -83,14 +83,13 @@ def _summary(file: Any) -> dict[str, Any]:
 
 
 def _structured_facts(file: Any) -> dict[str, Any]:
-    """Return the facts that programs can use, by key; None for a fact that the file does not state."""
+    """Return a dict of the structured facts; the value is None for a fact that the file does not state."""
     return {key: file.document.get("catalog", {}).get(key) for key in lib.FACT_KEYS}
 
 
 def _latex(file: Any) -> str:
-    """Return the system or map as displayed LaTeX formulas."""
     names = [lib.latex_name(name) for name in file.variables]
-    if isinstance(file.map, lib.KahanFamily):  # eps occurs in its coefficients if the discretization is an adjusted one
+    if isinstance(file.map, lib.KahanFamily):  # an adjusted discretization has eps in its coefficients
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
         rows = [

@@ -190,7 +190,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
             print_stdout(_LEGEND[method])
-    # Further evidence, in addition to the one that gave the verdict.
+    # Further evidence, in addition to the evidence for the verdict.
     also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(e.data["error_bound"])[3:]) for e in also if "error_bound" in e.data]
     if bounds:

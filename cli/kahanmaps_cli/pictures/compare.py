@@ -11,7 +11,7 @@ from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.runs.comparison import comparison_options, early_messages, requested_comparison
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_START = 160  # characters
+_MAX_START = 160  # characters of a printed initial point
 
 
 @picture(
@@ -52,7 +52,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     is_drift = options["show"] == "drift"
     more = {"orders": not is_drift, "linear_bins": options["scale"] == "semilog"}
     if not is_drift and not options["integrals"]:
-        more["integrals"] = ()  # none, so that none are searched for
+        more["integrals"] = ()  # no integrals, so that no search is started
     result = requested_comparison(options, progress, **more)
     figure = lib.plot_comparison(result, options["style"], show=options["show"], scale=options["scale"])
     start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START]

@@ -18,7 +18,7 @@ from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
 _MAX_BYTES = 64_000_000
-# Statuses of OrbitEnd that count as early: a digit limit or a return are normal ends.
+# Statuses of OrbitEnd that count as early ends; a digit limit and a periodic orbit are normal ends.
 _EARLY = ("singular",)
 
 _scale_option = click.option(
@@ -60,7 +60,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     growths: dict[str, lib.DegreeGrowth] = {}
 
     def add(name: str, growth: lib.DegreeGrowth) -> None:
-        """Add a result; the second one of the same name is called name (2)."""
+        """Add a result; a second result of the same name is called name (2)."""
         names = chain([name], (f"{name} ({k})" for k in count(2)))
         growths[next(free for free in names if free not in growths)] = growth
 

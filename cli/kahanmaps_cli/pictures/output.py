@@ -36,7 +36,7 @@ def _read_size(text: str) -> tuple[float, float | None]:
 
 
 class PictureCommand(click.Command):
-    """A command that keeps its arguments for the metadata of the picture."""
+    """A command that stores its arguments, as metadata for the picture."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         ctx.meta[_ARGUMENTS] = list(args)
@@ -72,7 +72,7 @@ picture_options: Callable[[F], F] = stack(
 
 @dataclass(frozen=True)
 class Drawing:
-    """The result of a plot command: the figure, or None where there was nothing to draw.
+    """The result of a plot command: the figure, or None if there is nothing to draw.
 
     `file` is the system for the metadata, `messages` are printed on standard error, `status` is the exit status.
     """
@@ -87,7 +87,7 @@ Draw = Callable[[dict[str, Any], SearchProgress], Drawing]
 
 
 def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
-    """Make the decorated function the command `kahanmaps plot NAME` with these options and those of all pictures.
+    """Make the decorated function the command `kahanmaps plot NAME`, with `options` and the common picture options.
 
     The function gets the values of the options, with the requested `Style` as "style", and returns a `Drawing`.
     """
@@ -95,7 +95,7 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
     def decorate(draw: Draw) -> click.Command:
         def command(**options: Any) -> int:
             """Draw the picture, print messages, and write it to its file or to standard output."""
-            # Refuse invalid sizes and formats before anything is computed.
+            # Refuse invalid sizes and formats before the computation.
             lib.require_matplotlib()
             given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
             if options["size"] is not None:
@@ -136,12 +136,12 @@ def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
 
 
 def window_from(options: dict[str, Any], axes: int) -> lib.Window | None:
-    """Return the window requested by --window for this number of axes, or None."""
+    """Return the window requested by --window for `axes` axes; None without --window."""
     return None if options["window"] is None else lib.require_window(lib.to_floats(options["window"]).tolist(), axes)
 
 
 def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> tuple[int, int] | None:
-    """Return the indices of the two variables in the value X,Y of an option, or None."""
+    """Return the indices of the two variables in the value X,Y of an option; None if the option is not given."""
     if text is None:
         return None
     names = [name.strip() for name in text.split(",")]
@@ -155,7 +155,7 @@ def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> 
 
 
 def command_line() -> str:
-    """Return the running PictureCommand as it would be typed in a shell."""
+    """Return the current PictureCommand as it would be typed in a shell."""
     context = click.get_current_context()
     words = context.command_path.split()[1:]  # the first word is the name of the program file
     return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])

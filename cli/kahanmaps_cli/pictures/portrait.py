@@ -16,7 +16,7 @@ from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kin
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
-# With one variable the orbit is drawn over the step, and only its beginning is of interest.
+# Orbits in one variable are drawn against the step number, and only their beginning is of interest.
 _STEPS, _STEPS_ON_A_LINE = 1000, 100
 
 
@@ -89,7 +89,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     _require_consistent(options)
     file = opt.load_system(options["system"], options)
     eps = opt.eps_of(file, options)
-    file.map.at(lib.rational(1) if eps is None else eps)  # raises the same errors for a bad eps as other commands
+    file.map.at(lib.rational(1) if eps is None else eps)  # raises the same errors for an invalid eps as other commands
     notes: list[str] = []
     field = lib.field_of(file)
     starts = initial_points(file, field, eps, options)
@@ -113,7 +113,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
             notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
     euler = None
     if options["euler"]:
-        # Without a quadratic field `file.system` raises the error.
+        # `file.system` raises InputError if there is no quadratic vector field.
         by_euler = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
         euler = lib.walked(lib.MethodEnsemble(*by_euler, kernel="numpy"), steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
@@ -124,7 +124,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
     if field is not None:
         flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], shown.window)
-        if options["levels"] or options["euler"]:  # arrows would be invisible among gray lines
+        if options["levels"] or options["euler"]:  # arrows would be invisible between gray lines
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
             flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, orbits, options["backward"]))
@@ -161,7 +161,6 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
 
 
 def _require_consistent(options: dict[str, Any]) -> None:
-    """Refuse contradicting options."""
     require_one_kind_of_starts(options)
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:
@@ -190,7 +189,7 @@ def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps:
 def _requested_axes(
     file: lib.SystemFile, eps: Any, options: dict[str, Any]
 ) -> tuple[lib.PointFunction | str, ...] | None:
-    """Return the requested axes, or the only possible ones; None where they are to be chosen by the points."""
+    """Return the requested axes, or the only possible axes; None if the points determine the axes."""
     text, count = options["axes"], 3 if options["space"] else 2
     if text is not None:
         pieces = [piece.strip() for piece in text.split(",")]

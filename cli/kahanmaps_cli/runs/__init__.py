@@ -1,1 +1,1 @@
-"""The work of the longer commands between reading their options and printing."""
+"""The work of longer commands between the parsing of options and the printing of results."""

@@ -1,4 +1,4 @@
-"""The option --certificate of checks and searches: what they prove, as a script for another program."""
+"""The option --certificate of checks and searches, which writes their proofs as a script for another program."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ certificate_option = click.option(
 
 
 def require_every_eps(options: dict[str, Any]) -> None:
-    """Refuse --certificate with --eps, before anything is computed."""
+    """Refuse --certificate with --eps before the computation."""
     if options["certificate"] is not None and any(options.get(name) is not None for name in ("eps", "time_step")):
         raise click.UsageError("a certificate is about every eps: give --certificate or --eps, not both")
 
 
 def write_certificate(options: dict[str, Any], name: str, write: Callable[[str], Any], status: int = 0) -> int:
-    """Write the certificate if one is requested; return the exit status, 3 instead of 0 if there is none."""
+    """Write the certificate if requested; return `status`, or 3 instead of 0 if a requested certificate is missing."""
     path = options["certificate"]
     if path is None:
         return status

@@ -35,10 +35,10 @@ comparison_options: Callable[[opt.F], opt.F] = opt.stack(
 
 
 def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **more: Any) -> lib.Comparison:
-    """Run the comparison that the options of `comparison_options` ask for."""
+    """Run the comparison that is requested by the options of `comparison_options`."""
     kind = require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
-    _ = file.real_approximation.system  # a map of another kind is refused first
+    _ = file.real_approximation.system  # first refuse a map without a quadratic system
     starts = None if kind is None else options["start"] or requested_starts(file, options)
     return lib.compare(
         file,

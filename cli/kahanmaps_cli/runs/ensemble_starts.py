@@ -1,7 +1,7 @@
 """Initial points of many orbits: given, from a .npy file, from text with a point per line, on a grid, or random.
 
-Text files have integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line
-with the names of the variables assigns the columns.
+Text files contain integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line
+with names of variables assigns the columns to them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MAGIC = b"\x93NUMPY"
 
 
 def require_one_kind_of_starts(options: Mapping[str, Any], *, random_by_default: bool = False) -> str | None:
-    """Return the option that gives the initial points, None without one. Raises UsageError for several."""
+    """Return the option that gives the initial points; None if there is none. Raises UsageError for several."""
     kinds = [name for name in ("start", "starts", "grid", "line", "count") if options.get(name) not in (None, ())]
     flags = ["--random" if name == "count" else f"--{name}" for name in kinds]
     if len(kinds) > 1:
@@ -38,7 +38,7 @@ def require_one_kind_of_starts(options: Mapping[str, Any], *, random_by_default:
 
 
 def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
-    """Return the requested initial points, otherwise `count` random ones."""
+    """Return the requested initial points, by default `count` random points."""
     dim = file.dim
     if options["start"]:
         for x in options["start"]:
@@ -69,7 +69,7 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
 
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
-    """Return the part of a record from which the initial points can be reproduced."""
+    """Return the entries of a record that determine the initial points."""
     if options["start"]:
         points = [list(map(lib.format_number, x)) for x in options["start"]]
         return {"initial_points": {"points": points}, "seed": None}
@@ -89,7 +89,7 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
     if path == "-":
         data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
     else:
-        # Reading a pipe or a device may never end. But /dev/fd/63 is the shell's <(...).
+        # Reading a pipe or a device may never end; but /dev/fd/63, which a shell passes for <(...), is allowed.
         mode = os.stat(path).st_mode
         is_of_shell = stat.S_ISFIFO(mode) and path.startswith(("/dev/fd/", "/dev/stdin"))
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
@@ -117,7 +117,7 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
         raise InputError(f"{where}: found more than {MAX_NPY_BYTES} bytes, expected fewer")
     try:
         rows = np.load(io.BytesIO(data), allow_pickle=False)
-    except Exception as error:  # the header is parsed as Python, with any error that this may raise
+    except Exception as error:  # numpy parses the header as Python, which may raise any error
         message = [*str(error).splitlines(), type(error).__name__][0]
         raise InputError(f"{where}: found a .npy file that cannot be read: {message[:200]}") from None
     dtype, shape, dim = rows.dtype, rows.shape, len(variables)
@@ -142,7 +142,7 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
 
 
 def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArray:
-    """Read points from text, one per line; a first line of names assigns the columns."""
+    """Read points from text, one per line; names in the first line assign the columns to variables."""
     import numpy as np
 
     rows: list[list[float]] = []

@@ -41,7 +41,7 @@ scan_options: Callable[[F], F] = opt.stack(
 
 
 def names_of(options: dict[str, Any]) -> list[str]:
-    """Return the parameters of --over."""
+    """Return the parameters given by --over."""
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
     repeated = next((name for name in names if names.count(name) > 1), None)
     if repeated is not None:
@@ -50,7 +50,7 @@ def names_of(options: dict[str, Any]) -> list[str]:
 
 
 def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, SearchProgress]:
-    """Run the scan of a command line; return it and its progress, which has the work."""
+    """Run the scan of a command line; return the scan and its progress, which counts the work."""
     names = names_of(options)
     if opt.is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
@@ -70,8 +70,8 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
 
     def interrupt() -> None:
         if not has_begun.is_set():
-            # The first ten seconds may be compilation: there is no partial result, and an exception raised within a
-            # callback of the compiler would be lost.
+            # During the first ten seconds code may be compiled: there is no partial result then, and a callback of the
+            # compiler would swallow an exception.
             os.write(2, b"interrupted\n")
             os._exit(INTERRUPTED)
         interrupted.set()
@@ -103,7 +103,7 @@ def ending(result: lib.Scan, search: SearchProgress) -> int:
 
 
 def primes_of(text: str | None) -> list[int] | None:
-    """Return the numbers of --primes."""
+    """Return the primes given by --primes."""
     if text is None:
         return None
     pieces = [piece.strip() for piece in text.split(",")]

@@ -39,7 +39,7 @@ def require_one_form(options: dict[str, Any]) -> None:
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
-    """Return the names of --symbolic without eps, and the number eps or None."""
+    """Return the names given by --symbolic, except eps, and the number eps (None if it is symbolic)."""
     named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     if eps is not None and "eps" in named:
@@ -48,13 +48,13 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """Return the arguments of a search: symbols, eps, effort, seed and the options named."""
+    """Return the arguments of a search: symbols, eps, effort, seed, and the options called `names`."""
     symbols, eps = symbols_and_eps(options)
     return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "effort", "seed")}
 
 
 def scope(result: Any) -> str:
-    """Return the text that follows the name of the map: for which eps and symbols the formulas hold."""
+    """Return the text after the name of the map: the eps and symbols for which the formulas hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
     eps_text = lib.eps_suffix(result.eps, result.file.map)
@@ -62,7 +62,7 @@ def scope(result: Any) -> str:
 
 
 def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:
-    """Return the data needed to repeat a search, and its work, for JSON."""
+    """Return the data for JSON that are needed to repeat a search, and the work of the search."""
     return {
         **envelope(name),
         "system": result.file.name,
@@ -90,8 +90,8 @@ def print_search(
 ) -> None:
     """Print the result of a search as text, JSON, TOML or LaTeX, as requested.
 
-    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and its origin; `count` is the
-    line after them.
+    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and an origin; `count` is the
+    line printed after them.
     """
     if options["as_json"]:
         print_json(record(name, result, search))
@@ -115,7 +115,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search, which is complete or names what is undecided; return the exit status."""
+    """Print the result of a search, with what is undecided if it is incomplete; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

@@ -1,1 +1,1 @@
-"""Output for readers: tables, progress, colors and streams."""
+"""Output on a terminal or in a pipe: tables, progress, colors and streams."""

@@ -1,4 +1,4 @@
-"""Orbits on a terminal, with numbers shortened so that a row fits on a line."""
+"""Orbits on a terminal: numbers are shortened so that each row of the table fits on a line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from kahanmaps import internals as lib
 from kahanmaps.maps.orbits.writers import Writer, title
 from kahanmaps_cli.screen.terminal import columns, print_raw, print_stdout
 
-_MIN_WIDTH = 9  # of a column of shortened numbers
-_MIN_BALL_WIDTH = 22  # of a column of balls: three digits and the radius
+_MIN_WIDTH = 9  # minimal width of a column of shortened numbers
+_MIN_BALL_WIDTH = 22  # minimal width of a column of balls: three digits and the radius
 
 
 class OrbitTable(Writer):
@@ -23,7 +23,7 @@ class OrbitTable(Writer):
         self._width = columns()
         self._first = max(6, len(str(header["steps"])))
         self._cell = (self._width - self._first) // len(names) - 2
-        self._has_digits = False  # whether some counts of digits are shown without the word
+        self._has_digits = False  # whether some numbers of digits are shown without the word "digits"
         self._is_table = self._cell >= (_MIN_BALL_WIDTH if header["arithmetic"].startswith("ball") else _MIN_WIDTH)
         if self._is_table:
             print_raw("step".rjust(self._first) + self._row(names))
@@ -49,7 +49,7 @@ class OrbitTable(Writer):
 
 
 def _approximated(text: str) -> list[str]:
-    """Return decimal forms of a long exact number with the digits of numerator and denominator, longest first.
+    """Return decimal forms of a long exact number with the digit counts of numerator/denominator, longest first.
 
     >>> _approximated("-133567234372186342562607635605/125821231910581795318152718151")
     ['-1.06156 (30/30 digits)', '-1.06156 (30/30)', '-1.06 (30/30)', '-1.06 (30)']

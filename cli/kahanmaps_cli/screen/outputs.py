@@ -1,4 +1,4 @@
-"""Output files of commands: a file that is also an input, or cannot be written, is refused before anything is computed.
+"""Output files of commands: a file that cannot be written, or is also an input, is refused before the computation.
 
 An audit hook of Python reports every file that a command opens for reading. Files are compared by device and inode, not
 by name, so that links are recognized.
@@ -26,22 +26,22 @@ Identity = tuple[int, int]
 
 
 class _Files:
-    """The files that a command has read and those it is going to write, by device and inode."""
+    """The files that a command has read, and the files that it will write, by device and inode."""
 
     def __init__(self) -> None:
         self.read: set[Identity] = set()
         self.written: dict[Identity, str] = {}
-        with suppress(OSError, ValueError, AttributeError):  # standard input is closed, or there is none
+        with suppress(OSError, ValueError, AttributeError):  # standard input is closed or missing
             self.note(sys.stdin.fileno())
 
     def note(self, path: Any, is_written: bool = False) -> None:
-        """Record a file that is read or will be written; refuse one that is both."""
+        """Record a file that is read or will be written; refuse a file that is both."""
         try:
             status = os.stat(path)
         except (OSError, ValueError):
             return
         if not stat.S_ISREG(status.st_mode):
-            return  # a pipe or device: nothing can be overwritten
+            return  # a pipe or device cannot be overwritten
         identity = status.st_dev, status.st_ino
         if identity in (self.read if is_written else self.written):
             name = path if is_written else self.written[identity]
@@ -55,7 +55,7 @@ class _Files:
 
 
 class OutputFile(click.Path):
-    """A file to write to, `-` for standard output; with `grows` it is written in place, else replaced at the end."""
+    """A file to write to (`-`: standard output); with `grows` it is written in place, otherwise replaced at the end."""
 
     name = "file"
 
@@ -66,7 +66,7 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
-            # Check that the file can be written before anything is computed.
+            # Check before the computation that the file can be written.
             folder, target = lib.resolved(path).parent, Path(path)
             if not path or not folder.is_dir():
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
@@ -78,7 +78,7 @@ class OutputFile(click.Path):
 
 
 class OutputFolder(click.Path):
-    """A folder to write files to: announce each file by `will_write` before the first is written."""
+    """A folder to write files to: call `will_write` for each file before the first file is written."""
 
     def __init__(self) -> None:
         super().__init__(file_okay=False)
@@ -86,10 +86,10 @@ class OutputFolder(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = super().convert(value, param, ctx)
         if ctx is not None:
-            _recorded_files(ctx)  # from here on the files that the command reads are recorded
+            _recorded_files(ctx)  # from now on the files that the command reads are recorded
         if ctx is None or ctx.resilient_parsing:
             return path
-        # Check before anything is computed that files can be written there: create the folder, then remove it again.
+        # Check before the computation that files can be written to the folder: create it, then remove it again.
         folder = Path(os.fsdecode(path))
         missing = [directory for directory in (folder, *folder.parents) if not directory.exists()]
         try:
@@ -131,7 +131,7 @@ def _recorded_files(context: click.Context) -> _Files:
     return files
 
 
-@cache  # an audit hook cannot be removed
+@cache  # install it only once: an audit hook cannot be removed
 def _install_hook() -> None:
     def record(event: str, arguments: tuple[Any, ...]) -> None:
         """Record every file that the running command opens for reading, including databases of results."""

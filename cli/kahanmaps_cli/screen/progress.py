@@ -1,7 +1,7 @@
 """Messages and progress on standard error.
 
-Progress appears after the first second: one line redrawn on a terminal, a line every ten seconds elsewhere. A standard
-error that cannot be written to changes neither the work nor the exit status.
+Progress appears after the first second: on a terminal one line that is redrawn, otherwise a line every ten seconds. If
+standard error cannot be written to, the work and the exit status do not change.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import printable
 
-_MIN_STEP = 16  # of an estimate: the first steps are too fast to be timed
-_MIN_SECONDS = 0.01  # that can be timed reliably
-_CENTURIES = 22.0  # growth of the time, as a logarithm, beyond which no number is given
+_MIN_STEP = 16  # first step with an estimate: earlier steps are too fast to be timed
+_MIN_SECONDS = 0.01  # shorter times cannot be measured reliably
+_CENTURIES = 22.0  # logarithm of the growth of the time beyond which no number is printed
 
 
 def print_stderr(message: str) -> None:
@@ -41,16 +41,16 @@ def as_typed(words: Iterable[str]) -> str:
         if word.isprintable():
             typed.append(shlex.quote(word))
             continue
-        # Unprintable characters, such as bytes that are not UTF-8, in the shell's $'...' notation.
+        # Unprintable characters, such as bytes that are not UTF-8, are written in the shell's notation $'...'.
         codes = (chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
         typed.append(f"$'{''.join(codes)}'")
     return " ".join(typed)
 
 
 class Progress:
-    """Show progress inside a `with` block, whose end clears the line: call it with a sentence at any rate.
+    """Show progress inside a `with` block, whose end clears the line. It may be called with sentences at any rate.
 
-    On a terminal a thread updates the elapsed time after the last sentence, since a step may take minutes.
+    On a terminal a thread updates the elapsed time between two sentences, since a step may take minutes.
     """
 
     def __init__(self, quiet: bool = False) -> None:
@@ -59,7 +59,7 @@ class Progress:
         self._start = self._last = time.monotonic()
         self._shown = 0
         self._sentence = ""
-        self._drawing = RLock()  # a signal may come while it is held
+        self._drawing = RLock()  # reentrant: a signal handler may print while the lock is held
         self._ended = Event()
 
     def __call__(self, sentence: str) -> None:
@@ -76,7 +76,7 @@ class Progress:
             _write(text + "\n")
             return
         with self._drawing:
-            try:  # a line longer than the terminal could not be redrawn
+            try:  # cut the line: a line longer than the terminal cannot be redrawn
                 width = max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
             except (OSError, ValueError):
                 width = 80
@@ -112,20 +112,20 @@ class Progress:
 class SearchProgress(Progress):
     """Progress of a search with a time limit (--seconds), which also counts its units of work.
 
-    `options` are those of the command: "quiet" and, where it has them, "effort" and "seconds"; `since` is the time at
-    which the limit started to run (default: now). After the limit the search is abandoned, a message says what was
-    being done, and the exit status is 3. If a function turns TimeLimit into a partial result, the message is printed
-    as well, and `is_over` is true after the block.
+    `options` are the options of the command: "quiet" and, if the command has them, "effort" and "seconds"; `since` is
+    the time from which the limit is counted (default: now). When the limit expires, the search is abandoned, a message
+    names the current step, and the exit status is 3. If a function catches TimeLimit and returns a partial result, the
+    message is also printed, and `is_over` is true after the block.
     """
 
     def __init__(self, options: Mapping[str, Any], since: float | None = None) -> None:
         super().__init__(options["quiet"])
-        self.work: dict[str, Any] = {}  # effort and units, set at the end of the block
+        self.work: dict[str, Any] = {}  # effort and units of work, set at the end of the block
         self._was_over: bool | None = None  # set at the end of the block
         self._effort, self._seconds, self._since = options.get("effort"), options.get("seconds"), since
 
     def __call__(self, sentence: str) -> None:
-        if self.is_over:  # a caller that made a partial result may call other functions
+        if self.is_over:  # after a partial result the caller may call other functions
             raise lib.TimeLimit
         super().__call__(sentence)
 
@@ -138,7 +138,7 @@ class SearchProgress(Progress):
 
     @property
     def ending(self) -> str:
-        """Return the message that the search was stopped, and in which step."""
+        """Return the message that the search was stopped, which names the step."""
         return f"stopped after {self._seconds:g} s (--seconds){self._sentence and ': '}{self._sentence}"
 
     def __enter__(self) -> Self:
@@ -166,9 +166,9 @@ class SearchProgress(Progress):
 class TimeLeft:
     """Estimate the remaining time of steps that become more expensive.
 
-    The time of n steps is fitted by a power of n, from n/2 to n (quadratic growth of heights gives a power between 3
-    and 4), or by an exponential where each of the last three steps increased it by two fifths. The estimate is a lower
-    bound.
+    The time of n steps is fitted by a power of n between n/2 and n steps (quadratic growth of heights gives a power
+    between 3 and 4), or by an exponential if each of the last three steps increased it by two fifths. The estimate is a
+    lower bound.
 
     >>> clock = iter([0.0, 1.0, 8.0])
     >>> left = TimeLeft(64, lambda: next(clock))
@@ -187,14 +187,14 @@ class TimeLeft:
         self._recent: list[tuple[int, float]] = []
 
     def __call__(self, step: int) -> str:
-        """Return the estimate as text to append to a progress message; empty while it is too early."""
+        """Return the estimate as text to append to a progress message; empty if it is too early for an estimate."""
         spent = self._clock() - self._start
         self._recent = [*self._recent[-3:], (step, spent)]
         if step >= 2 * self._last[0] and step >= _MIN_STEP:
             self._before, self._last = self._last, (step, spent)
         if step >= self._steps:
             return ""
-        # The growth is the logarithm of how much longer all steps take than those up to this one.
+        # The growth is the logarithm of the time of all steps divided by the time of the steps up to this one.
         (first, began), *later = self._recent
         n, t = self._before
         if len(later) == 3 and began > _MIN_SECONDS and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):

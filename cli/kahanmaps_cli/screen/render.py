@@ -20,7 +20,7 @@ from kahanmaps_cli.screen.terminal import (
     styled,
 )
 
-# On a terminal long lists of claims are cut to this many.
+# Maximal number of claims in a list on a terminal.
 CLAIMS_SHOWN = 40
 
 
@@ -43,7 +43,7 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(
     report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
 ) -> int:
-    """Print a report, and the numbers measured in addition; return the exit status of the verdict."""
+    """Print a report and additional measured numbers; return the exit status of the verdict."""
     if as_json:
         name = click.get_current_context().info_name or ""
         beside = {} if measured is None else {"measured": measured.to_json()}
@@ -63,7 +63,7 @@ def print_report(
 
 
 def exit_status(report: lib.Report) -> int:
-    """Return 0 where all claims hold, 1 where one is refuted, 3 where undecided or the requested orbit ended early."""
+    """Return 0 if all claims hold, 1 if one is refuted, 3 if one is undecided or the requested orbit ended early."""
     if report.verdict is lib.Certainty.REFUTED:
         return 1
     if report.verdict is lib.Certainty.UNDECIDED or report.ended_early:
@@ -72,7 +72,7 @@ def exit_status(report: lib.Report) -> int:
 
 
 def verdict_style(finding: lib.Finding) -> str:
-    """Return the style of a verdict: red for an unexpected one, none for a control that is refuted as expected."""
+    """Return the style of a verdict: red for an unexpected verdict, none for a control that is refuted as expected."""
     if not finding.is_as_expected:
         return "bold red"
     return "" if finding.control else VERDICT_COLORS[str(finding.verdict)]
@@ -81,7 +81,7 @@ def verdict_style(finding: lib.Finding) -> str:
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
     from rich.table import Table
 
-    # Of many findings the first ones, and every one that is not proved.
+    # If there are many findings, print the first ones and all that are not proved.
     is_long = len(report.findings) > CLAIMS_SHOWN
     shown = [
         f
@@ -112,7 +112,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     if len(shown) < len(report.findings):
         print_stdout(f"{len(report.findings) - len(shown)} more claims, all proved (--json has all)")
     if not verbose:
-        # The short table lacks hypotheses, further evidence and witnesses.
+        # The short table omits hypotheses, further evidence and witnesses.
         hypotheses = list(dict.fromkeys(text for f in shown for text in f.evidence.data.get("hypotheses", ())))
         if hypotheses:
             more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
@@ -131,7 +131,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
 
 
 def json_number(value: Any) -> Any:
-    """Return a JSON number, the text inf, -inf or nan, or a complex number as a list of its two parts."""
+    """Return a JSON number, the text inf, -inf or nan, or for a complex number the list of its two parts."""
     number = complex(value)
     if isinstance(value, complex) or getattr(value, "dtype", None) == "complex128":
         return [lib.json_float(number.real), lib.json_float(number.imag)]

@@ -1,4 +1,4 @@
-"""Robust standard streams: closed streams are replaced, and a pipe without a reader is no error."""
+"""Robust standard streams: closed streams are replaced, and a pipe without a reader is not an error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class _Pipe(io.FileIO):
-    """A pipe whose writes are dropped once its reader (head, say) has closed it."""
+    """A pipe that drops everything written after its reader (e.g. head) has closed it."""
 
     is_read = True
 
@@ -35,16 +35,16 @@ class _NullOutput(io.FileIO):
 
 
 def prepare_standard_streams() -> None:
-    """Replace closed streams by the null device, and make the exit status independent of the reader of a pipe.
+    """Replace closed streams by the null device, and make the exit status independent of a pipe's reader.
 
-    If a stream were left closed (`>&-`), the next file opened would take its number. Characters that the encoding of a
-    stream lacks are written as escapes.
+    If a stream stayed closed (`>&-`), the next opened file would have its file descriptor. Characters that the encoding
+    of a stream cannot represent are written as escapes.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             raw = (_NullOutput if name == "stdout" else io.FileIO)(
                 os.devnull, mode
-            )  # open as long as the process lives
+            )  # stays open until the process ends
             buffer = io.BufferedReader(raw) if mode == "r" else io.BufferedWriter(raw)
             setattr(sys, name, io.TextIOWrapper(buffer, encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
@@ -62,19 +62,19 @@ def prepare_standard_streams() -> None:
 
 
 def is_read() -> bool:
-    """Whether standard output still has a reader, as known from the last time a buffer was written."""
+    """Whether standard output still had a reader when a buffer was last written."""
     raw = _raw_output()
     return not isinstance(raw, _Pipe) or raw.is_read
 
 
 def output_was_lost() -> bool:
-    """Whether something was printed to a standard output that was closed from the beginning; flush it first."""
+    """Whether something was printed although standard output was closed from the beginning; flush it first."""
     raw = _raw_output()
     return isinstance(raw, _NullOutput) and raw.has_lost
 
 
 def discard_unwritable_output() -> None:
-    """Discard what a stream still holds and cannot write: Python would fail on it again at exit, with status 120."""
+    """Discard buffered output that cannot be written: Python would try again at exit, and fail with status 120."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -84,5 +84,4 @@ def discard_unwritable_output() -> None:
 
 
 def _raw_output() -> Any:
-    """The raw stream below the buffers of standard output."""
     return getattr(getattr(sys.stdout, "buffer", None), "raw", None)

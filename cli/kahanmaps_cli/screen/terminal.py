@@ -1,7 +1,7 @@
 """Output on a terminal: colors, and lines broken at words with a hanging indent.
 
-A pipe gets unbroken lines with tabs. Colors go to a terminal, or as --color says, and carry no information that the
-text does not. Only named colors are used that are legible on light and on dark backgrounds: no yellow, blue or gray.
+In a pipe, lines are unbroken and contain tabs. Colors appear on a terminal, or as --color says; all information is also
+in the text. The colors are named ones that are legible on light and dark backgrounds: no yellow, blue or gray.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
-# On a terminal long numbers are shortened to this many characters.
+# Maximal number of characters of a number on a terminal.
 NUMBER_WIDTH = 40
 _LABEL_WIDTH = 12
 _WHEN = {"auto": None, "always": True, "never": False}
@@ -52,7 +52,7 @@ def is_colored() -> bool:
 
 
 def paint(text: str, style: str) -> str:
-    """Return the text in a style such as "bold green" where output is colored."""
+    """Return the text in a style such as "bold green" if the output is colored."""
     words = style.split()
     if not words or not is_colored():
         return text
@@ -61,7 +61,7 @@ def paint(text: str, style: str) -> str:
 
 
 def console() -> Console:
-    """Return a console of rich that reads no markup, and writes no escape sequences where output is not colored."""
+    """Return a rich console that ignores markup, and writes no escape sequences if output is not colored."""
     from rich.console import Console
 
     colored = is_colored()
@@ -81,7 +81,7 @@ def formula(text: str, width: int = 400) -> str:
 
 
 def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
-    """Print lines of cells separated by tabs; on a terminal the first cell is a label in front of the others.
+    """Print lines of cells separated by tabs; on a terminal the first cell is a label before the other cells.
 
     Verdicts are colored, and lines that start with # are headings. `hang` is the column after the label.
     """
@@ -103,7 +103,7 @@ def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
 
 
 def print_raw(text: str, end: str = "\n") -> None:
-    """Print text on standard output unbroken; control characters are escaped, since it may come from a file."""
+    """Print text on standard output without breaking lines; control characters, e.g. from a file, are escaped."""
     click.echo(printable(text) + end, nl=False)
 
 
@@ -115,16 +115,16 @@ def styled(text: str, style: str = "") -> Text:
 
 
 def print_entry(head: str, text: str, style: str = "") -> None:
-    """Print an entry of a list whose heads have equal lengths; on a terminal continuation lines are indented."""
+    """Print a list entry; all heads of the list have equal length. On a terminal continuation lines are indented."""
     head, text = printable(head), printable(text)
     lines = _filled(text, head, len(head)) if on_terminal() else head + text
     click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_colored())
 
 
 def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
-    """Print columns on a terminal and tabs elsewhere; the first `words` columns are texts, the others numbers.
+    """Print a table, with tabs unless on a terminal; the first `words` columns are text, the others numbers.
 
-    A terminal too narrow for the numbers gets tabs as well, since a broken number would look like two.
+    Tabs are also used if the terminal is too narrow for the numbers, since a broken number would look like two numbers.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     least = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
@@ -144,7 +144,7 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
 
 
 def _filled(text: str, first: str, hang: int) -> str:
-    """Break `first` and the text at blanks into lines of the terminal's width, with a hanging indent."""
+    """Break `first` and `text` at blanks into lines of the width of the terminal, with a hanging indent."""
     margins = {"initial_indent": first, "subsequent_indent": " " * hang}
     return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first  # type: ignore[arg-type]
 

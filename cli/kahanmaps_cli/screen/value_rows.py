@@ -25,7 +25,7 @@ Row = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Cell:
-    """The result for one combination of values: as a line, as JSON and in full, and why it is undecided."""
+    """The result for one combination of values: as a line, as JSON, in full, and the reason if it is undecided."""
 
     line: str
     record: Callable[[], dict[str, Any]]
@@ -36,7 +36,7 @@ class Cell:
 def table(
     system: str | None, options: dict[str, Any], compute: Callable[[lib.SystemFile, SearchProgress], Cell]
 ) -> int:
-    """Print a line, or with --json a record, for each combination of values; without ranges, the full result.
+    """Print a line (with --json a record) for each combination of values; without ranges, print the full result.
 
     An error at one combination is printed on standard error, and the table continues; if all combinations fail, the
     error is raised. --seconds limits the total time. Returns the exit status.
@@ -81,7 +81,7 @@ def table(
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
-    """Return the parameters of each combination, the last range varying fastest; None without a range."""
+    """Return the parameters of each combination (the last range varies fastest); None if there is no range."""
     if not any(lib.is_range(value) for _, value in parameters):
         return None
     if system == "-":

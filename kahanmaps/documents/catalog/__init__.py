@@ -1,7 +1,7 @@
-"""The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
+"""The catalogue of named systems: each is a TOML file in this folder with equations, known facts and sources.
 
-The folder maps contains maps other than Kahan's. `load` finds both, and also names with arguments such as lv(7,3),
-which documents/families.py generates.
+The folder maps contains maps other than Kahan's. `load` finds systems and maps by name, and also generates systems such
+as lv(7,3) (documents/families.py).
 
 >>> names()[:3]
 ('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
@@ -13,11 +13,11 @@ x3' = -3/2*x1*x2
 >>> top.catalog["title"]
 'Euler top'
 
-A file is data, in the format of every other system file; its name is that of the system. Each of its facts begins with
-its status: Proved (in the named source; without a source by the argument given or by tests/documents/test_catalog.py),
+The files have the format of all system files; the name of a file is the name of its system. Each fact begins with its
+status: Proved (in the named source; without a source, by the stated argument or by tests/documents/test_catalog.py),
 Refuted (at a point), Measured (a finite computation modulo a prime, which is no proof), Classical, or Origin (how the
 file was made). Degrees, growth, verdict and relations are also given as structured data, see
-`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py computes them again.
+`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py recomputes them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 class UnknownSystem(InputError, KeyError):
-    """No system of the catalogue has this name."""
+    """Raised if no system of the catalogue has the given name."""
 
 
 _ENDING = ".toml"
@@ -86,7 +86,7 @@ def text_of(name: str) -> bytes:
 
 
 def titles() -> dict[str, tuple[int, str]]:
-    """Return dimension and title of all systems and maps, by name, maps last, without parsing them.
+    """Return a dict from the names of all systems, then of all maps, to dimension and title, without parsing the files.
 
     >>> titles()["lorenz"]
     (3, 'Lorenz system')
@@ -139,7 +139,7 @@ class Catalogue(Mapping[str, "SystemFile"]):
 
 
 def catalogue() -> Catalogue:
-    """Return the named systems and maps, by name; `print` lists them with their dimensions and titles."""
+    """Return the mapping from names to systems and maps; `print` lists them with dimensions and titles."""
     return Catalogue()
 
 
@@ -173,7 +173,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
     kahanmaps.errors.SystemFileError: henon_heiles: 1 mistake
       parameters: unknown parameter 'd', this system has: c
     """
-    # Imported here, so that listing names loads no arithmetic.
+    # Imported here, so that listing names does not load FLINT.
     from kahanmaps.documents.files import parse_system, read_system
 
     parameters = {**(parameters or {}), **values}
@@ -188,7 +188,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
             name = hyphenated
         if generated is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
-        has_ending = "." in reference and "(" not in reference  # the ending of a file, or a mistyped one
+        has_ending = "." in reference and "(" not in reference  # a file extension, perhaps mistyped
         has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)
         if not (has_ending or has_separator or os.path.exists(reference)):
             raise _unknown(reference)
@@ -196,12 +196,12 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 
 
 def _unknown(name: str) -> InputError:
-    if not name or len(name) > 60 or not name.isprintable():  # not a name of a system
+    if not name or len(name) > 60 or not name.isprintable():  # this cannot be the name of a system
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())
     close = difflib.get_close_matches(normalized, known_names, 3)
-    # Or names that contain what was written, e.g. "volterra".
+    # Otherwise suggest names that contain the given text, e.g. "volterra".
     close += [other for other in known_names if len(normalized) > 2 and normalized in other and other not in close]
     close = close[:3]
     meant = f", did you mean {' or '.join(close)}?" if close else ":"

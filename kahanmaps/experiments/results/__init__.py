@@ -1,1 +1,1 @@
-"""Records of experiments: stored, merged, summed up, written for other programs."""
+"""Records of experiments: storage, merging, summaries, and export to other programs."""

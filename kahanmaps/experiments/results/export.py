@@ -1,18 +1,18 @@
-"""Export of results: JSON lines with all data, CSV and Parquet tables with one column for every entry.
+"""Export of results as JSON lines with all data, or as CSV and Parquet tables with one column for every entry.
 
-JSON lines are lossless. In a table dicts become several columns (heights.max), lists become JSON text, and both None
-and absent entries become empty cells. The columns of a table, in this order:
+JSON lines are lossless. In a table a dict becomes several columns (heights.max), a list becomes JSON text, and None or
+an absent entry becomes an empty cell. The columns of a table, in this order:
 
     experiment number key task      always
-    document m seed parameters.a    the entries of the spec of the system, those of a family without prefix
+    document m seed parameters.a    the entries of the system spec; entries of "family" without prefix
     eps steps                       options
     outcome verdict                 always; a missing task has no outcome
     dimension heights.max           entries of the result
     message                         always
     seconds peak_memory host finished   unless the export is stable
 
-If several entries have the same name, the first of these has it: the fixed columns, options, the system spec, the
-result. The others are called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
+If entries have the same name, one of them keeps it, in this order: fixed columns, options, system spec, result. The
+other entries are called option.seed, family.seed (system.document) or result.seed in all rows of the export.
 
 A stable export omits everything that depends on where, when and how the tasks were run, so that two exports of the same
 tasks have the same bytes.
@@ -38,21 +38,21 @@ from kahanmaps.version import __version__
 BEFORE = ("experiment", "number", "key", "task")
 BETWEEN = ("outcome", "verdict")
 AFTER = ("message",)
-OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # with stderr and versions: not in a stable export
+OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # a stable export omits these, and stderr and versions
 RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
 _MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
 _ROW_GROUP = 10_000
-_CHARACTERS = 50_000_000  # of one row group: long lists would otherwise add up to gigabytes
+_CHARACTERS = 50_000_000  # in one row group: a fixed number of rows with long lists may take gigabytes
 
 
-# The path of a value: "option", "system" or "result", and keys.
+# The path of a value in a row: "option", "system" or "result", followed by keys.
 Entry = tuple[str, ...]
 
 
 def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the values in nested dicts, each with its path of keys; lists are values.
+    """Yield the path of keys and the value of each entry in nested dicts; a list is a single value.
 
     >>> list(flatten({"a": 1, "b": {"c": [2, 3]}}))
     [(('a',), 1), (('b', 'c'), [2, 3])]
@@ -65,7 +65,7 @@ def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
-    """Yield the options, the entries of the system spec and the entries of the result of a row."""
+    """Yield paths and values of the entries of a row: its options, its system spec, its result."""
     result = row.record.result if row.record is not None else None
     for section, data in (("option", row.task.options), ("system", row.task.system), ("result", result)):
         yield from flatten(data or {}, (section,))
@@ -73,7 +73,7 @@ def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
 
 @lru_cache(10_000)  # thousands of rows have the same few entries
 def names_of(entry: Entry) -> tuple[str, str]:
-    """Return the name of an entry if no other entry has it, and its longer name otherwise.
+    """Return the short name of an entry, and the long name used if another entry has the same short name.
 
     >>> names_of(("system", "family", "m")), names_of(("result", "heights", "max"))
     (('m', 'family.m'), ('heights.max', 'result.heights.max'))
@@ -113,22 +113,22 @@ def is_number(value: Any) -> bool:
 
 
 def nearest(value: Any) -> float:
-    """Return the double nearest to an exact number, infinite where it overflows.
+    """Return the double nearest to an exact number; infinite if the number exceeds all doubles.
 
     >>> nearest("7/3"), nearest("0.1"), nearest(-(10**400))
     (2.3333333333333335, 0.1, -inf)
     """
     numerator, _, denominator = str(value).partition("/") if isinstance(value, str) else (value, "", "")
-    try:  # Python rounds quotients of integers correctly, and decimals
+    try:  # Python rounds decimals and quotients of integers correctly
         return int(numerator) / int(denominator) if denominator else float(numerator)
     except OverflowError:
         return inf if int(numerator) > 0 else -inf
 
 
 def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
-    """Write one JSON object per line: a header, a result for every row, and an end with their number.
+    """Write one JSON object per line: a header, a result for each row, and a last line with the number of results.
 
-    Unknown entries of a missing task are null. Dicts inside a line are sorted by their keys.
+    Entries that a task without a record lacks are null. Dicts inside a line are sorted by their keys.
     """
     from kahanmaps.maps.convention import CONVENTION  # loads FLINT: only when results are written
 
@@ -145,7 +145,7 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
 def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
     """Write a table with a header row. `rows` is called twice: first for the names of the columns, then for the values.
 
-    Open files with newline="", since otherwise "\\n" is translated on some systems.
+    Open files with newline="": without it some systems translate "\\n".
     """
     layout = _Layout(rows(), stable)
     stream.write(csv_line(map(cell, layout.names)))
@@ -155,12 +155,12 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
-    """Write the same table in the format Parquet, which needs pyarrow.
+    """Write the same table as `write_csv` in the format Parquet, which needs pyarrow.
 
-    `rows` is called twice, and the complete file replaces `path`. A column is int64, bool or float64 if all of its
-    values are, and text otherwise. In a column with floats, integers up to 2^53 are converted to floats, which is
-    exact. A column NAME of text whose values are all exact numbers such as 7/3 is followed by NAME.number with the
-    nearest doubles. The bytes of a stable export also depend on the version of pyarrow.
+    `rows` is called twice, and the complete file replaces `path`. A column has the type int64, bool or float64 if this
+    type represents all its values exactly (a float64 column may contain integers up to 2^53), and text otherwise. A
+    text column NAME whose values are all exact numbers such as 7/3 is followed by NAME.number with the nearest doubles.
+    The bytes of a stable export also depend on the version of pyarrow.
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
@@ -244,7 +244,7 @@ class _Layout:
 
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
-# Types of Parquet and the kinds of values that each represents exactly; a column has the first that fits.
+# Types of Parquet and the kinds of values that each type represents exactly; a column has the first type that fits.
 _HOLDS = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},
@@ -275,7 +275,7 @@ def _type(kinds: Set[str]) -> str:
 
 
 def known(row: Row) -> dict[str, Any]:
-    """Return the entries that every row has, in the order of JSON lines; those of a missing record are None."""
+    """Return the entries that every row has, in the order of JSON lines; entries of a missing record are None."""
     task, record = row.task, row.record
     of_record = ("verdict", "result", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished")
     return {

@@ -16,7 +16,7 @@ from hashlib import sha256
 from typing import Any, Protocol
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
-# Maps the digest of a system document to its canonical text.
+# Documents of systems: digest -> canonical text.
 Documents = Callable[[str], str]
 
 KEY_LENGTH = 32  # hexadecimal digits: 128 bits make collisions negligible
@@ -32,7 +32,7 @@ def canonical(data: Any) -> str:
 
 
 def digest(text: str) -> str:
-    """Return the hash that identifies a task or document with this text."""
+    """Return the hash that identifies the task or document with this canonical text."""
     return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
 
 
@@ -46,7 +46,8 @@ class Task:
     """A task: the name of its kind, the spec of its system, and the values of all options.
 
     `system` is {"family": {"m": 3, "seed": 7, ...}}, or {"document": DIGEST, "name": ..., "parameters": {...}}, or None
-    for tasks without a system. `options` are canonical: all that the kind of task knows, numbers as exact text.
+    for tasks without a system. `options` are canonical: a value for every option of the kind of task, with numbers as
+    exact text.
 
     >>> Task("orbit", {"family": {"m": 2}}, {"eps": "1/10"}).key
     'aaf89ac6cf9009846f5b9932af33dd31'
@@ -108,7 +109,7 @@ def option_words(values: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """Limits of a single task: `time` in seconds, `memory` in bytes in addition to an idle worker; None: no limit.
+    """Limits of one task: `time` in seconds, `memory` in bytes beyond the memory of an idle worker; None: no limit.
 
     Limits are not part of the task or its key: a task that exceeded its time limit may be run again with a larger one.
     """
@@ -126,9 +127,9 @@ class Job:
 
 
 class Outcome(StrEnum):
-    """The outcome of a task. All outcomes except `ok` are failures of the task; whether a claim holds is its verdict.
+    """The outcome of a task. All outcomes except `ok` are failures; a check that refutes its claim is `ok` too.
 
-    `lost` is not a result: at every attempt the worker was killed from outside. It is never stored, and the task
+    `lost` means that the worker was killed from outside in every attempt. This outcome is never stored: the task
     remains without a result.
     """
 
@@ -148,9 +149,9 @@ STORED_OUTCOMES = tuple(outcome for outcome in Outcome if outcome is not Outcome
 class Record:
     """The record of a task: its outcome, result, cost and environment.
 
-    `result` is plain data, None unless the outcome is ok; `verdict` is that of a check. `message` explains a failure,
-    and `stderr` is the end of the output of the worker. `seconds` and `peak_memory` (bytes, None: unknown) refer to
-    this task alone. `host`, `versions` and `finished` (UTC, ISO 8601) say where and when it was run.
+    `result` is plain data, None unless the outcome is ok; `verdict` is the verdict of a check. `message` explains a
+    failure, and `stderr` is the end of the output of the worker. `seconds` and `peak_memory` (bytes; None: unknown)
+    refer to this task alone. `host`, `versions` and `finished` (UTC, ISO 8601) say where and when it was run.
     """
 
     key: str
@@ -182,7 +183,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a plan: the experiment, the number in it (from 0), the task, and its record (None if missing)."""
+    """A row of a plan: the experiment, the number of the row (from 0), the task, and its record (None if missing)."""
 
     experiment: str
     number: int
@@ -191,7 +192,7 @@ class Row:
 
 
 class Executor(Protocol):
-    """Accepts jobs while it `is_free` and returns records from `wait`; errors inside a task become records."""
+    """Runs jobs: accepts them while it `is_free`; `wait` returns their records, also for tasks with an error."""
 
     @property
     def is_free(self) -> bool:
@@ -208,4 +209,4 @@ class Executor(Protocol):
         """Return the finished records as soon as there is one, or none after `timeout` seconds."""
 
     def close(self) -> None:
-        """End at once and kill all jobs in flight. May be called twice."""
+        """Kill all jobs in flight without waiting for them. May be called twice."""

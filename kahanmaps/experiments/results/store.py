@@ -1,16 +1,16 @@
-"""The database with the results of a batch: one SQLite file, written by one process and read by others concurrently.
+"""The database of the results of a batch: one SQLite file, which one process writes while others may read it.
 
-A store contains experiments with their plans (the tasks in order), the texts of tasks and of the documents that they
-need, and the latest result of every task. A task is stored once, even if it is planned several times, so that a changed
-batch reuses the results that it has in common with the old one.
+A store contains experiments with their plans (the tasks in order), the texts of tasks and of their system documents,
+and the latest result of every task. A task is stored once, even if it is planned several times, so that a changed batch
+reuses the results of the tasks that it shares with the old batch.
 
 Three rules ensure consistency:
 
 * every result reported as stored is on the disk: each method that writes is one transaction, and a kill at any time
-  leaves the state before or after it;
+  leaves the state before or after the transaction;
 * there is one writer: opening for writing takes a lock that the operating system releases when the process ends;
-* readers do not block the writer for long: they read in chunks, each fetched completely before its first row is
-  yielded; only counts are single queries, which take a second for a million tasks.
+* readers do not block the writer for long: they read in chunks, and fetch each chunk completely before they yield its
+  first row. Only counts are single queries; a count of a million tasks takes a second.
 
 The rollback journal of SQLite is used, never WAL: it is safe on all file systems, including network file systems.
 """
@@ -79,13 +79,13 @@ PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = 1;
 """
 PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
-RESULT_CHUNK = 50  # rows with their results, which may be megabytes
+RESULT_CHUNK = 50  # rows read with their results, each of which may take megabytes
 MAX_FOUND = 20
 CONFLICTS_SHOWN = 5
 
 _BUSY_SECONDS = 30.0
 _MIN_BYTES = 512  # the smallest page that SQLite has
-# In KiB. The index of a million keys, accessed at random during planning, has to fit into the cache; otherwise every
+# In KiB. Planning accesses the index of keys at random: unless the index of a million keys fits into the cache, every
 # key causes the write of a page.
 _CACHE = 128 << 10
 _OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
@@ -98,7 +98,7 @@ _SELECTED = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"))
 
 
 class StoreError(InputError):
-    """Raised for a database that cannot be used, or not in this way; the message says what to do."""
+    """Raised for a database that cannot be used at all or for the requested operation; the message says what to do."""
 
 
 class Unavailable(KahanmapsError, OSError):
@@ -107,9 +107,10 @@ class Unavailable(KahanmapsError, OSError):
 
 @dataclass(frozen=True)
 class StoredExperiment:
-    """An experiment as planned: `total` rows with `tasks` different tasks.
+    """A planned experiment: `total` rows with `tasks` different tasks.
 
-    `id` is its number in the database, `offset` the number of rows of the plans before its own.
+    `id` is the number of the experiment in the database. `offset` is the number of rows in the plans of earlier
+    experiments.
     """
 
     name: str
@@ -143,8 +144,8 @@ class ExperimentStatus:
 class Planned:
     """The result of planning. `total` counts rows of the plan, all other counts refer to different tasks.
 
-    `known` tasks were already in the store, `new_tasks` were not; `dropped` tasks were only in the plan that this one
-    replaces. `is_resumed` is true if the same definition had been planned before, and nothing was done.
+    `known` tasks were already in the store, `new_tasks` were not; `dropped` tasks were only in the plan that was
+    replaced. If `is_resumed`, the same definition had been planned before.
     """
 
     total: int
@@ -158,7 +159,8 @@ class Planned:
 class Merged:
     """The result of a merge: numbers of new tasks, of new results, and of failures `replaced` by results.
 
-    `conflicts` counts tasks with different results in the two databases; `conflicting` has the keys of the first few.
+    `conflicts` counts tasks with different results in the two databases; `conflicting` lists the first few of their
+    keys.
     """
 
     tasks: int
@@ -178,7 +180,7 @@ class StoredTask(NamedTuple):
 
 
 class Store(HtmlDisplay):
-    """A database of results. Open it with `Store.open`, and close it, preferably by `with`.
+    """A database of results. `Store.open` opens it; close it, preferably by `with`.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, Store.open(f"{folder}/results.db", create=True) as store:
@@ -188,7 +190,7 @@ class Store(HtmlDisplay):
     ['orbit']
     """
 
-    path: Path  # resolved: otherwise two names of one file would have two locks
+    path: Path  # resolved, since two names of one file must have the same lock
 
     def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
         self.name = os.fspath(path)  # as given, for messages
@@ -241,7 +243,7 @@ class Store(HtmlDisplay):
         exists = self.path.exists()
         if exists and not self.path.is_file():
             raise StoreError(f"{self.name} is a folder or a device, expected a file: check the name")
-        # SQLite would treat such a file as an empty database, and overwrite it.
+        # SQLite would treat a file shorter than a page as an empty database, and overwrite it.
         if exists and 0 < self.path.stat().st_size < _MIN_BYTES:
             raise StoreError(f"{self.name} is not an SQLite database: check the name")
         if not exists and not create:
@@ -250,7 +252,7 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
-            # After a killed writer even reading has to write (the journal). Without permission nobody else writes.
+            # After a kill of the writer, opening rolls back its journal, and so has to write even here.
             may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
             has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
             mode = "rw" if may_write or has_journal else "ro&immutable=1"
@@ -258,12 +260,12 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
         address = f"{self.path.as_uri()}?mode={mode}"
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
-        self._is_initialized(create)  # before locking: no lock file beside a file that is not ours
+        self._is_initialized(create)  # before locking, so that no lock file is created beside a foreign file
         if not self._is_readonly:
             self._take_lock()
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_initialized(create):  # again, under the lock: another process may have created it meanwhile
+            if not self._is_initialized(create):  # again: another process may have done it before the lock
                 with self._transaction():
                     for statement in SCHEMA.split(";"):  # executescript would commit
                         self._execute(statement)
@@ -273,8 +275,8 @@ class Store(HtmlDisplay):
             self._execute("PRAGMA query_only = ON")
 
     def _is_initialized(self, create: bool) -> bool:
-        """Return False for an empty file if `create`. Raises StoreError for a file that is not ours."""
-        # The schema first: pragmas succeed even for files that SQLite cannot read.
+        """Whether the file is one of our databases (False if empty and `create`). Raises StoreError otherwise."""
+        # Read the schema first: pragmas succeed even for files that SQLite cannot read.
         queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
         tables, application, version = [self._execute(sql).fetchone()[0] for sql in queries]
         if not (tables or application or version):
@@ -299,7 +301,8 @@ class Store(HtmlDisplay):
             descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # The previous writer may have removed the file after it was opened here: then its lock has no effect.
+                # The previous writer may have removed the file after it was opened here. A lock of a removed file has
+                # no effect.
                 with suppress(FileNotFoundError):
                     if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
                         self._lock = descriptor
@@ -321,7 +324,7 @@ class Store(HtmlDisplay):
         return self._connection
 
     def _fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
-        """Return all rows of a query: a statement read in part would keep its lock and block the writer."""
+        """Return all rows of a query at once: a statement with unread rows would keep its lock and block the writer."""
         with self._errors():
             rows = self._execute(sql, values).fetchall()
         if any(isinstance(value, bytes) for row in rows for value in row):
@@ -335,10 +338,10 @@ class Store(HtmlDisplay):
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        """Execute the statements in the block completely or not at all."""
+        """Execute all statements in the block, or none of them."""
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
-        with self._errors(), self._opened() as connection:  # which commits at the end, or rolls back
+        with self._errors(), self._opened() as connection:  # the connection commits at the end, or rolls back
             connection.execute("BEGIN IMMEDIATE")
             yield
 
@@ -347,7 +350,7 @@ class Store(HtmlDisplay):
         try:
             yield
         except sqlite3.Error as error:
-            # Errors of Python's module have no code: text that is not UTF-8.
+            # An error without a code comes from Python's module: the text is not UTF-8.
             code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
             kind = Unavailable if code in _OF_THE_MACHINE else StoreError
             if kind is Unavailable:
@@ -366,7 +369,7 @@ class Store(HtmlDisplay):
 
     @contextmanager
     def _reading(self, entry: str) -> Iterator[None]:
-        """Report errors of parsing in the block as damage of the file; `entry` says which of its entries is parsed."""
+        """Report parsing errors in the block as damage of the file; `entry` names the parsed entry."""
         try:
             yield
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -378,7 +381,7 @@ class Store(HtmlDisplay):
             return Task.from_text(text)
 
     def _record(self, key: str, row: Sequence[Any]) -> Record | None:
-        """Return the record in a row with the columns `_SELECTED`; None if the task has no result."""
+        """Return the record in a row of the columns `_SELECTED`; None if the task has no result."""
         if row[0] is None:
             return None
         cells = dict(zip((*_COLUMNS, "attempts"), row, strict=True))
@@ -397,7 +400,7 @@ class Store(HtmlDisplay):
     # Experiments and their plans
 
     def experiments(self, names: Sequence[str] | None = None) -> list[StoredExperiment]:
-        """Return the planned experiments in order, only those with these names if they are given."""
+        """Return the planned experiments in order; if `names` are given, only the experiments with these names."""
         rows = self._fetch(
             "SELECT name, definition, limits, total, tasks, id, "
             "(SELECT max(number) + 1 FROM plan WHERE experiment = e.id) FROM experiment AS e ORDER BY id"
@@ -431,9 +434,9 @@ class Store(HtmlDisplay):
     ) -> Planned:
         """Plan tasks in the given order; after a kill or an exception the previous plan is unchanged.
 
-        `definition` determines the tasks: if it equals the one planned before, `tasks` is not read, and only the limits
-        are updated. Otherwise this plan replaces the old one, and all results are kept. `documents` (digest to text) is
-        read after `tasks`, so that the iterator may fill it. `skipped` lists omitted systems with reasons.
+        `definition` determines the tasks. If it equals the stored definition, `tasks` is not read, and only the limits
+        are updated. Otherwise this plan replaces the stored plan; all results are kept. `documents` (digest to text) is
+        read after `tasks`, whose iterator may fill it. `skipped` lists omitted systems with reasons.
         """
         with self._transaction():
             sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"
@@ -508,10 +511,10 @@ class Store(HtmlDisplay):
         retry_failed: bool = False,
         shard: tuple[int, int] = (1, 1),
     ) -> Iterator[Job]:
-        """Yield the tasks without a result in plan order, each once; results may be added during the iteration.
+        """Yield each task without a result once, in plan order; results may be added during the iteration.
 
-        With `retry_failed` failed tasks are included, each once even if it fails again. `shard` (i, n) is the i-th of n
-        parts of the rows of the plans of these experiments; no task is in two parts.
+        With `retry_failed` failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
+        i-th of n disjoint parts of the tasks.
         """
         sql, chosen = self._pending(experiments, retry_failed, shard)
         sql = sql.format("t.key, t.text", "JOIN task AS t ON t.id = p.task")
@@ -531,13 +534,13 @@ class Store(HtmlDisplay):
     def _pending(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
-        """Return a query for the tasks without a result in a chunk of the plan, and its values for each experiment."""
+        """Return a query for the pending tasks in a chunk of the plan, and its values for each experiment."""
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
         chosen = self.experiments(experiments)
-        # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once, without
-        # storing what was yielded, and is in one shard.
+        # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once and is in
+        # one shard, and the yielded tasks need not be stored.
         among = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
         sql = f"""
             SELECT {{}} FROM plan AS p {{}}
@@ -554,7 +557,7 @@ class Store(HtmlDisplay):
     # Results
 
     def add(self, records: Sequence[Record]) -> None:
-        """Store these records, all or none. A record replaces the earlier one, but a failure never replaces a result.
+        """Store all records or none. A record replaces the earlier one, but a failure never replaces a success.
 
         Records with the outcome `lost` are ignored.
         """
@@ -578,7 +581,7 @@ class Store(HtmlDisplay):
                 self._put_result(task, before if is_kept else row, (attempts or 0) + 1)
 
     def _find_result(self, key: str) -> Sequence[Any] | None:
-        """Return the id of a task, the columns of its result (None if missing) and attempts; None if unknown."""
+        """Return the id, the columns of the result (None if missing) and the attempts of a task; None if unknown."""
         sql = f"SELECT t.id, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
         row: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
         return row
@@ -589,8 +592,8 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """Yield the tasks with their records in plan order; with `missing` also those without a record."""
-        chosen = self.experiments(experiments)  # now, not when the first row is read
+        """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
+        chosen = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
@@ -606,8 +609,8 @@ class Store(HtmlDisplay):
     def merge(self, other: str | os.PathLike[str]) -> Merged:
         """Add the experiments and results of another database, all or nothing; merging again changes nothing.
 
-        New experiments are added with their plans. Of two results of a task the successful one is kept, and that of
-        this database if both or neither are. Two experiments of the same name must have the same definition.
+        New experiments are added with their plans. Of two results of a task a success replaces a failure; otherwise the
+        result of this database is kept. Two experiments of the same name must have the same definition.
         """
         new = results = replaced = conflicts = 0
         conflicting: list[str] = []
@@ -629,7 +632,7 @@ class Store(HtmlDisplay):
                     planned = self._replace_plan(experiment.name, experiment.definition, experiment.limits, tasks)
                     self._put_skipped(experiment.name, source._skipped(experiment))
                     new += planned.new_tasks
-            for (name,) in source._fetch("SELECT digest FROM document"):  # one by one: each may be long
+            for (name,) in source._fetch("SELECT digest FROM document"):  # one at a time: each document may be long
                 self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, source.document(name)))
             sql = f"""
                 SELECT r.task, t.key, t.text, {_SELECTED} FROM result AS r JOIN task AS t ON t.id = r.task
@@ -687,7 +690,7 @@ class Store(HtmlDisplay):
         return self._fetch(sql, (experiment.id,))
 
     def unplanned(self) -> int:
-        """Return the number of results whose task is in no plan."""
+        """Return the number of results whose task belongs to no plan."""
         sql = """
             SELECT count(*) FROM result AS r INDEXED BY result_summary
             WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""

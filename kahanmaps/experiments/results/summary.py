@@ -1,8 +1,8 @@
 """Summaries of results: groups of tasks with counts and quantiles of numbers.
 
-Groups are exact: "1/3" is not 0.333. Numbers are summarized as the nearest doubles. Quantiles are order statistics by
-nearest rank, so that they are values of the data: the p-quantile of n values is the ceil(p n)-th smallest, and the
-median of an even number of values is the lower of the two in the middle.
+Values that define groups are compared exactly: "1/3" and 0.333 define two groups. Numbers are summarized as the nearest
+doubles. A quantile is a value of the data (nearest rank): the p-quantile of n values is the ceil(p n)-th smallest
+value, and the median of an even number of values is the smaller of the two middle values.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ from kahanmaps.experiments.results.export import Entry, entries, is_number, know
 from kahanmaps.experiments.results.records import STORED_OUTCOMES, VERDICTS, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
-_SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
+_SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # headings in tables
 OF_THE_RUN = ("seconds", "peak_memory")
 
-# Names whose values are text even if they look like numbers: an experiment may be called 007, a digest be 12e34567.
+# Entries whose values are text even if they look like numbers: an experiment may be called 007, a digest may be
+# 12e34567.
 _WORDS = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
-_RELATED = 3  # names suggested for a mistaken one
+_RELATED = 3  # maximal number of names suggested for an unknown name
 _LISTED = 60
-_MAX_WIDTH = 160  # characters of a printed cell: messages of failures and names of systems may be long
+_MAX_WIDTH = 160  # maximal number of characters of a printed cell
 
 
 class SummaryTable(NamedTuple):
-    """A table of texts. The first `words` columns are text, the others numbers, to be aligned on the right."""
+    """A table of texts. The first `words` columns contain text; the other columns contain numbers (right-aligned)."""
 
     title: str
     columns: tuple[str, ...]
@@ -43,10 +44,10 @@ class SummaryTable(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """A group of tasks with the same `values`; `outcomes` and `verdicts` count records.
+    """A group of tasks with the same `values`; `outcomes` and `verdicts` map each outcome and verdict to its count.
 
-    `numbers` has for each entry the count `n`, whether all values are the `same` double, and their `QUANTILES`. `flags`
-    has the counts of true and false.
+    `numbers` maps each numeric entry to the count `n` of its values, to `same` (whether all values are one double), and
+    to their `QUANTILES`. `flags` maps each boolean entry to the counts of true and false.
     """
 
     values: tuple[Any, ...]
@@ -60,13 +61,13 @@ class Group:
 
 @dataclass(frozen=True)
 class Summary(HtmlDisplay):
-    """Groups sorted by their values: numbers before texts, and None (unknown) last."""
+    """Groups of tasks, sorted by the values that define them: numbers before texts, None (unknown) last."""
 
     by: tuple[str, ...]
     groups: tuple[Group, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the summary as plain data; quantiles that overflow doubles are null."""
+        """Return the summary as plain data; quantiles that exceed all doubles are None."""
         groups = []
         for group in self.groups:
             data = {"group": dict(zip(self.by, group.values, strict=True)), **asdict(group)}
@@ -117,7 +118,7 @@ class Summary(HtmlDisplay):
 
 
 class _GroupBuilder:
-    """The counts and numbers of a group while rows are read; a number takes eight bytes."""
+    """Collects the counts and numbers of a group while rows are read; a number takes eight bytes."""
 
     def __init__(self, values: tuple[Any, ...]) -> None:
         self.values = values
@@ -146,12 +147,13 @@ def summarise(
     """Group rows by the entries named in `by`, and return counts and quantiles for each group.
 
     A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; an entry of the
-    system spec (m, parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has.
-    option.seed, family.seed and result.seed are unambiguous. Rows without the entry form a group with the value None.
+    system spec (m, parameters.a); or an entry of the result (dimension, heights.max). A name with several meanings has
+    the first one in this order; option.seed, family.seed and result.seed are unambiguous. Rows without the entry form a
+    group with the value None.
 
-    Numbers are the integers, floats and texts such as "7/3" or "21.2031" of the results, and seconds and peak_memory of
-    all records unless `stable`, except those in `by`, which are constant in a group. `values` restricts them to these
-    names. An entry of a result named seconds is called result.seconds.
+    Numbers (integers, floats, texts such as "7/3" or "21.2031") of the results are summarized, and unless `stable` also
+    seconds and peak_memory of all records. Entries in `by` are constant in a group and not summarized. If `values` are
+    given, only entries with these names are summarized. An entry of a result named seconds is called result.seconds.
 
     Rows are read once, and only their numbers are stored. Raises InputError for names that no row has.
 
@@ -181,7 +183,7 @@ def summarise(
             short, full = names_of(entry)
             for name in (short, full):
                 if name in by:
-                    keys.setdefault(name, value)  # the first entry with a name has it
+                    keys.setdefault(name, value)  # if entries have the same name, the first one keeps it
             if entry[0] == "result":
                 has_results = True
                 measured[full if short in OF_THE_RUN else short] = value
@@ -214,10 +216,10 @@ def summarise(
 
 
 def _sort_key_and_value(row: Row, name: str, value: Any) -> tuple[Any, Any]:
-    """Return the sort key and the value of a row for a name in `by`; `value` is that of an entry with this name."""
+    """Return the sort key and the value of a row for a name in `by`; `value` is the entry with this name."""
     if name == "system":
         word: str | None = system_words(row.task.system)
-        return (2, word, canonical(row.task.system)), word  # other files may have the same name
+        return (2, word, canonical(row.task.system)), word  # systems in different files may have the same name
     if name not in _WORDS:
         return _order(value), value
     word = (row.task.system or {}).get(name) if name == "document" else known(row)[name] or None
@@ -225,7 +227,7 @@ def _sort_key_and_value(row: Row, name: str, value: Any) -> tuple[Any, Any]:
 
 
 def _order(value: Any) -> tuple[Any, ...]:
-    """Return a sort key, equal for equal values only: numbers, then false and true, texts, None.
+    """Return a sort key: numbers, then false and true, texts, None. Only equal values have equal keys.
 
     >>> sorted([None, "x", 10, "1/7", True, "0.5", 2, "1/10"], key=_order)
     ['1/10', '1/7', '0.5', 2, 10, True, 'x', None]

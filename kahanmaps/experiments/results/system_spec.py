@@ -1,12 +1,12 @@
 """The spec of the system of a task, as plain data, and the system constructed from it.
 
-    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}           a random member, constructed again where needed
-    {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the catalogue
+    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}           a random member of the family, constructed when it
+    is needed {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the
+    catalogue
 
-A document is a system file as plain data. Specs refer to it by its digest, so that the task does not depend on where
-the file is, and changes when its content changes. The name of a system is part of its spec, since reports print it. A
-spec is complete: it contains all parameters, or all arguments of the random construction, so that equal systems have
-equal specs.
+A document is the content of a system file as plain data. A spec refers to a document by its digest: hence a task does
+not depend on the path of the file but on its content. The name of a system is part of its spec, since reports print it.
+A spec contains all parameters or all arguments of the random construction: equal systems have equal specs.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ def find_file(reference: str, folder: Path) -> SystemFile:
     """Return the system for a name of the catalogue, or for a path ending in .toml or .ode, relative to `folder`."""
     if reference.endswith(ENDINGS):
         return load(folder / reference)
-    # Any other path would give its system a name with folders in it, different on every machine.
+    # Any other path would give its system a name that depends on the machine.
     if reference not in names() and ("/" in reference or os.path.exists(reference)):
         raise InputError(f"found {show(reference)}, expected a name of the catalogue or a path that ends in .toml")
     return load(reference)
 
 
 def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
-    """Return the spec of a system file with its own parameters, and add its document to `documents`."""
+    """Return the spec of a system file with its parameters; add the document of the file to `documents`."""
     text = document_text(file)
     key = digest(text)
     documents[key] = text
@@ -65,7 +65,7 @@ def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
 
 
 def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the spec of a random member with these values of the options in `FAMILY` and this seed.
+    """Return the spec of the random member with these values of the seed and of the options in `FAMILY`.
 
     >>> family_spec({"m": 3, "seed": 7, "eps": "1/10"})
     {'family': {'draw': 'eigenvalues', 'size': 2, 'm': 3, 'seed': 7}}
@@ -77,7 +77,7 @@ def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> SystemFile:
-    """Return the system of a spec; `document` returns the text of a document from its digest.
+    """Return the system of a spec; `document` maps the digest of a document to its text.
 
     >>> system_from({"family": {"draw": "generic", "m": 2, "seed": 1}}, {}.__getitem__).name
     'random member, generic, m = 2, seed 1'

@@ -1,11 +1,11 @@
-"""Tasks on an existing dask cluster, to which they are sent in groups.
+"""Run tasks in groups on an existing dask cluster.
 
     python -m kahanmaps.experiments.running.cluster < group.json
 
-is the command that a dask worker runs for a group by `subprocess.run`. So neither the scheduler nor the worker
+is the command that a dask worker runs for a group, with `subprocess.run`. Hence neither the scheduler nor dask's worker
 processes import kahanmaps, and a crashing task does not affect them. The input is {"documents": {DIGEST: TEXT}, "jobs":
-[{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; the record of every job is printed on a line as soon as
-it is finished, and the exit status is 0 whatever the outcomes. A group takes a few seconds, since the scheduler has a
+[{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; The record of every job is printed on one line when the
+job ends. The exit status is 0 for all outcomes of the jobs. A group takes a few seconds, since the scheduler has a
 constant overhead for each group.
 
 This module does not access the database: `wait` returns each record once, and the caller stores it.
@@ -42,10 +42,10 @@ from kahanmaps.processes import end_with_parent
 MODULE = "kahanmaps.experiments.running.cluster"
 PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # environment variables that are passed on to the workers
 
-START_UP = 60.0  # seconds that a group may take in addition to the limits of its jobs, on a busy worker,
-START_UP_OF_A_JOB = 5.0  # and for each job in it
+START_UP = 60.0  # seconds allowed for a group beyond the limits of its jobs, for a busy worker,
+START_UP_OF_A_JOB = 5.0  # and seconds allowed in addition for each of its jobs
 LARGEST_GROUP = 200  # jobs
-UNFIT_AFTER = 3  # groups that ended by themselves without a record, while no group has printed one
+UNFIT_AFTER = 3  # groups that ended by themselves without a record before any group has printed one
 FETCH = 30.0  # seconds to fetch the output of a group that has ended
 COUNT_EVERY = 2.0  # seconds between two counts of the workers
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
@@ -62,16 +62,17 @@ class WorkersUnfit(ClusterLost):
 class ClusterWorkers(Executor):
     """Runs jobs on the workers of an existing dask scheduler.
 
-    `address` is that of the scheduler, "tcp://host:port", or the path of its scheduler file; for "tls://host:port" the
-    certificates are those of dask's own configuration. dask's parties unpickle what they are sent, so each of them can
-    run code on all others: scheduler and workers have to be trusted, and closed to everybody else.
+    `address` is the address "tcp://host:port" of the scheduler or the path of its scheduler file; for "tls://host:port"
+    dask's own configuration gives the certificates. The processes of dask unpickle all data sent to them, so each can
+    run code on all others: use only a trusted scheduler and trusted workers, in a network that nobody else can reach.
 
     `command` is the command that a worker runs for a group, by default this module with the interpreter `python`, which
     must have the same path on the workers. A group takes about `group_seconds`, estimated from the last tasks of the
     same kind, and has at most 200 jobs. `on_message` is called with messages about waiting.
 
     At most two groups for each thread of the workers are in flight, so that the memory used here does not depend on the
-    number of tasks. A job without a record is run again a few times, in a group of its own, before it is lost.
+    number of tasks. A job whose group ends without its record is run again a few times, in a group of its own, before
+    it is lost.
     """
 
     def __init__(
@@ -92,16 +93,16 @@ class ClusterWorkers(Executor):
         # `env=` of subprocess.run would replace the whole environment of the worker.
         passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
-        self._tries: dict[str, int] = {}  # of the jobs in flight, by key: failed attempts of the job alone
+        self._tries: dict[str, int] = {}  # key of a job in flight -> failed attempts in a group of its own
         self._open: list[Job] = []
-        self._again: deque[Job] = deque()  # to be run alone
-        self._groups: dict[Any, list[Job]] = {}  # futures at the scheduler
+        self._again: deque[Job] = deque()  # jobs to be run in groups of their own
+        self._groups: dict[Any, list[Job]] = {}  # future at the scheduler -> its group
         self._means: dict[str, float] = {}  # mean seconds of recent tasks by kind
-        self._unfit: set[str] | None = set()  # jobs of groups that ended by themselves; None: some record was printed
+        self._unfit: set[str] | None = set()  # jobs of groups without records; None: there was a record
         self._unfit_groups = 0
         self._client = connect(address, connect_seconds)
         self._results = import_module("distributed").as_completed(loop=self._client.loop)
-        self._lost: str | None = None  # why the scheduler is lost
+        self._lost: str | None = None  # reason why the scheduler is lost
         self._threads, self._counted_at, self._is_reported = 0, -COUNT_EVERY, False
         self._count_threads()
 
@@ -123,7 +124,7 @@ class ClusterWorkers(Executor):
             )
         self._tries[job.task.key] = 0
         self._open.append(job)
-        # A task of unknown duration fills a group.
+        # A task of unknown duration is a group of its own.
         seconds = sum(self._means.get(job.task.kind, self._group_seconds) for job in self._open)
         if len(self._open) >= LARGEST_GROUP or seconds >= self._group_seconds:
             self._send_open()
@@ -131,14 +132,14 @@ class ClusterWorkers(Executor):
     def wait(self, timeout: float) -> list[Record]:
         """Return the finished records as soon as there is one, or none after `timeout` seconds.
 
-        Raises ClusterLost when the scheduler does not answer, and WorkersUnfit when several groups have ended by
-        themselves, including those of all jobs in flight, and none has printed a record.
+        Raises ClusterLost if the scheduler does not answer. Raises WorkersUnfit if several groups, among them the
+        groups of all jobs in flight, have ended by themselves and none has printed a record.
         """
         deadline = time.monotonic() + timeout
         while True:
             while self._again and len(self._groups) < self._window:
                 self._send([self._again.popleft()])
-            # While every thread has a waiting group, the open group can be filled further.
+            # While every thread has a waiting group, the open group is not sent, and further jobs can be added.
             if len(self._groups) < self._window:
                 self._send_open()
             while not (is_ready := self._results.has_ready()) and time.monotonic() < deadline and self._is_connected:
@@ -157,10 +158,10 @@ class ClusterWorkers(Executor):
     def close(self) -> None:
         """Close the connection; the scheduler and its workers keep running. May be called twice.
 
-        Jobs in flight are dropped. Groups that a worker has begun cannot be stopped: they run to their end, and their
+        Jobs in flight are dropped. A group that a worker has begun cannot be stopped: it runs to its end, and its
         results are ignored.
         """
-        # A lost scheduler must not block us, and its errors do not matter any more.
+        # A lost scheduler must not block this process, and its errors no longer matter.
         with suppress(Exception), warnings.catch_warnings(action="ignore"):
             self._client.close(timeout=2)
         self._tries.clear()
@@ -168,7 +169,7 @@ class ClusterWorkers(Executor):
 
     @property
     def _window(self) -> int:
-        """The number of groups allowed at the scheduler: a running and a waiting one for each thread."""
+        """The number of groups allowed at the scheduler: for each thread one running group and one waiting group."""
         return max(2, 2 * self._threads)
 
     @property
@@ -180,7 +181,7 @@ class ClusterWorkers(Executor):
         if not self._is_connected or time.monotonic() - self._counted_at < COUNT_EVERY / (1 if self._threads else 4):
             return
         self._counted_at = time.monotonic()
-        with suppress(Exception):  # the scheduler may be lost meanwhile
+        with suppress(Exception):  # the scheduler may have been lost
             self._threads = sum(self._client.nthreads().values())
             if not self._threads and not self._is_reported:
                 self._on_message(f"waiting for workers: the scheduler at {self.address} has none")
@@ -192,13 +193,12 @@ class ClusterWorkers(Executor):
             self._send(jobs)
 
     def _send(self, jobs: list[Job]) -> None:
-        """Submit a group to the scheduler. A lost scheduler is reported by `wait`."""
         documents = {name: self._documents(name) for job in jobs for name in job.task.documents}
         group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
         times = [job.limits.time for job in jobs]
-        # The command enforces the limits of tasks: this timeout is for a command that hangs.
+        # The command itself enforces the limits of tasks: this timeout ends a command that hangs.
         timeout = None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
-        # distributed warns of arguments beyond 10 MB: a single document may be as large.
+        # distributed warns of arguments beyond 10 MB, but a single document may exceed this size.
         with warnings.catch_warnings(action="ignore"):
             try:
                 future = self._client.submit(
@@ -217,7 +217,7 @@ class ClusterWorkers(Executor):
         self._results.add(future)
 
     def _collect(self, future: Any) -> list[Record]:
-        """Return the records that a group has printed; its other jobs will be run again alone, or are lost."""
+        """Return the records that a group has printed. Its other jobs will be run again alone, or are lost."""
         unfinished = {job.task.key: job for job in self._groups[future]}
         is_alone = len(unfinished) == 1
         output: Any
@@ -226,14 +226,14 @@ class ClusterWorkers(Executor):
             message = f"the worker's command {ending(output.returncode)}"
             message += " and no record" if output.returncode == 0 else ""
             is_unfit = output.returncode >= 0
-        except TimeoutError:  # the worker has died with the output, and the scheduler runs the command again
+        except TimeoutError:  # the worker died before its output was fetched: the scheduler repeats the command
             self._results.add(future)
             return []
         except subprocess.TimeoutExpired as error:
             output, is_unfit = error, False
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
-            if future.status != "error":  # the error is not one of the command, but of the connection
+            if future.status != "error":  # an error of the connection, not of the command
                 self._lost = self._lost or on_one_line(error)
                 return []
             output, is_unfit = None, "KilledWorker" not in type(error).__name__
@@ -324,7 +324,7 @@ def connect(address: str, timeout: float) -> Any:
 
     def make() -> None:
         try:
-            # It warns of different versions of packages, which do not matter: workers only run a command.
+            # distributed warns of different package versions, which do not matter: workers only run a command.
             with warnings.catch_warnings(action="ignore"):
                 client_future.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
         except BaseException as error:
@@ -347,7 +347,7 @@ def connect(address: str, timeout: float) -> Any:
 def run_group(source: IO[str], target: IO[str]) -> None:
     """Run the jobs in the JSON text of `source` one after the other, and write their records to `target`.
 
-    A job whose process is killed from outside is lost at once: the sender runs it again, perhaps on another worker.
+    A job whose process is killed from outside is lost after one attempt: the sender runs it again, perhaps elsewhere.
     """
     group = json.load(source)
     workers = LocalWorkers(1, group["documents"].__getitem__, tries=1)
@@ -365,7 +365,7 @@ def run_group(source: IO[str], target: IO[str]) -> None:
 if __name__ == "__main__":
     end_with_parent(os.getppid())
     if hasattr(select, "poll"):
-        # The parent may have died before getppid was called: then the pipe has no reader.
+        # If the parent died before getppid was called, the pipe has no reader.
         reader = select.poll()
         reader.register(sys.stdout.fileno(), 0)
         if any(events & select.POLLERR for _, events in reader.poll(0)):

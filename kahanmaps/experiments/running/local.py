@@ -1,9 +1,9 @@
-"""Tasks in worker processes on this machine (pebble): each within its limits, and no worker outlives this process.
+"""Run tasks within their limits in worker processes on this machine (pebble); no worker outlives this process.
 
 Separate processes are needed since FLINT may abort its process, ignores Ctrl-C and allocates memory without bound. A
-worker runs tasks for some seconds and is then replaced. If a task fails in a worker that has run others before, or if
-the worker dies, the task is run again in a fresh worker, whose outcome is recorded: hence records do not depend on the
-order of tasks. A task whose worker is killed from outside is run again a few times before it is lost.
+worker runs tasks for some seconds and is then replaced. If a task fails in a worker that has run other tasks before, or
+if this worker dies, the task is run again in a fresh worker, and the second outcome is recorded. Hence records do not
+depend on the order of tasks. A task whose worker is killed from outside is run again a few times before it is lost.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.processes import end_with_parent
 from kahanmaps.version import __version__
 
-# Attempts of a task whose worker is killed from outside, before it is lost. A lost task has no result, and the next run
-# attempts it again.
+# A task is lost after this number of attempts in which its worker was killed from outside. A lost task has no result,
+# and the next run of the batch attempts it again.
 TRIES = 5
-GROUP_SECONDS = 5.0  # of work for one worker: starting it takes about a fifth of a second
+GROUP_SECONDS = 5.0  # seconds of work for one worker process: its start takes about 0.2 s
 TAIL = 2000  # characters stored of a message, a traceback, or the output of a worker
 
 # Error messages of Python, FLINT, GMP and OpenBLAS for lack of memory.
@@ -54,8 +54,8 @@ _NO_MEMORY = (
     *("memory allocation", "memory alloc failed", "malloc failed", "too many memory regions"),
 )
 # Signals raised by a fault in the process or by its own limits: the task, or a library that it called, has crashed. All
-# other signals were sent from outside: by a cancelled job, a stopped service, a shutdown. SIGKILL may also be sent by
-# the system for lack of memory, which cannot be recognized.
+# other signals are sent from outside, e.g. when a job is cancelled or the machine shuts down. The system sends SIGKILL
+# also for lack of memory; this case cannot be recognized.
 _OWN = {
     *(Signals.SIGSEGV, Signals.SIGABRT, Signals.SIGFPE, Signals.SIGBUS, Signals.SIGILL),
     *(Signals.SIGSYS, Signals.SIGTRAP, Signals.SIGXCPU, Signals.SIGXFSZ),
@@ -63,7 +63,7 @@ _OWN = {
 
 
 class WorkersError(KahanmapsError):
-    """Raised where worker processes cannot be started."""
+    """Raised if worker processes cannot be started."""
 
 
 # In this process
@@ -75,7 +75,7 @@ class _Attempt:
 
     job: Job
     documents: dict[str, str]
-    tries: int = 0  # attempts killed from outside
+    tries: int = 0  # number of attempts in which the worker was killed from outside
     had_fault: bool = False
     begun: float = 0.0
 
@@ -83,8 +83,8 @@ class _Attempt:
 class LocalWorkers:
     """An executor that runs at most `jobs` worker processes on this machine.
 
-    `documents` returns the text of a system document from its digest. A job is lost after `tries` attempts whose
-    workers are killed from outside. `submit` and `wait` raise WorkersError if no worker can be started.
+    `documents` returns the text of a system document from its digest. A job is lost after `tries` attempts in which the
+    worker was killed from outside. `submit` and `wait` raise WorkersError if no worker can be started.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class LocalWorkers:
     def wait(self, timeout: float) -> list[Record]:
         """Return the finished records, after at most `timeout` seconds."""
         wait_for(self._running, timeout, FIRST_COMPLETED)
-        # A pool that breaks at the moment in which it accepts a task never sets the result of the future.
+        # A pool that breaks while it accepts a task never sets the result of the future.
         ended = [future for future, (worker, _) in self._running.items() if future.done() or not worker.pool.active]
         records = []
         for future in ended:
@@ -142,7 +142,7 @@ class LocalWorkers:
         is_retry = attempt.tries > 0 or attempt.had_fault
         if is_retry or not self._idle:
             worker = _Worker()
-            self._workers.append(worker)  # before it is started: a second Ctrl-C may arrive now
+            self._workers.append(worker)  # before its start, so that `close` always kills it
         else:
             worker = self._idle.pop()
         attempt.begun = time.monotonic()
@@ -152,7 +152,7 @@ class LocalWorkers:
             self._end(worker)
             if worker.process is None:
                 raise WorkersError(f"a worker process cannot be started: {error.__cause__ or error}") from error
-            return self._begin(attempt)  # it died while it was idle
+            return self._begin(attempt)  # the idle worker had died
         self._running[future] = worker, attempt
 
     def _record(self, worker: _Worker, attempt: _Attempt, future: Future[str]) -> Record | None:
@@ -165,7 +165,7 @@ class LocalWorkers:
         if error is None:
             try:
                 data |= json.loads(future.result())
-            except (ValueError, RecursionError) as wrong:  # an integer with more digits than Python parses
+            except (ValueError, RecursionError) as wrong:  # e.g. an integer with more digits than Python parses
                 data |= {"outcome": Outcome.FAILED, "message": f"the result cannot be kept: {wrong}"}
             worker.seconds += data["seconds"]
             # An unexpected error, with a traceback, may be caused by earlier tasks of this worker.
@@ -180,7 +180,7 @@ class LocalWorkers:
                 attempt.had_fault = True
                 return None
             return _record_of(data)
-        # Pebble reports a broken pool for a worker that ended with status 0, or before it accepted the task.
+        # Pebble also reports a broken pool if the worker ended with status 0 or before it accepted the task.
         status = error.exitcode if isinstance(error, ProcessExpired) else worker.exitcode
         data["stderr"] = printed = worker.printed()
         is_ready = worker.is_ready
@@ -198,7 +198,7 @@ class LocalWorkers:
                 return None
             return _record_of({**data, "outcome": Outcome.LOST, "message": ended})
         lacks_memory = any(phrase in printed.lower() for phrase in _NO_MEMORY)
-        # The signal of a fault may also have been sent from outside, but hardly twice.
+        # A signal that reports a fault may also be sent from outside, but hardly twice.
         if not was_fresh or not (lacks_memory or attempt.had_fault or (status is not None and status > 0)):
             attempt.had_fault = True
             return None
@@ -207,7 +207,7 @@ class LocalWorkers:
         return _record_of({**data, "outcome": Outcome.CRASHED, "message": ended})
 
     def _end(self, worker: _Worker) -> None:
-        """Kill a worker. Its pool notices this after some tenths of a second, in a thread."""
+        """Kill a worker. A thread of its pool notices this after some tenths of a second."""
         self._workers.remove(worker)
         worker.kill()
         self._ending = [thread for thread in self._ending if thread.is_alive()]
@@ -219,7 +219,8 @@ class _Worker:
     """A process in a pool of its own, which runs one task after the other.
 
     The workers of a pool of pebble share one pipe with one lock. A worker that is killed while it holds the lock, or
-    while it sends a result, would block all others. Hence each worker has its own pool, discarded when it dies.
+    while it sends a result, would block all other workers. Hence each worker has its own pool, which is discarded when
+    the worker dies.
     """
 
     def __init__(self) -> None:
@@ -229,7 +230,7 @@ class _Worker:
         self.is_fresh = True  # it has not run any task
         self._documents: set[str] = set()
         with TemporaryFile() as file:
-            # The file of its output, as a connection: multiprocessing passes a file without a name only so.
+            # The output file of the worker, as a connection: multiprocessing cannot pass an unnamed file otherwise.
             self._output = Connection(os.dup(file.fileno()))
         fcntl(self._output.fileno(), F_SETFL, os.O_APPEND)
         self._context = _Context()
@@ -277,7 +278,7 @@ class _Worker:
     def end(self) -> None:
         """Kill the process; leave no zombie, no thread and no open file."""
         self.kill()
-        with suppress(Exception):  # whatever pebble raises for a dead worker
+        with suppress(Exception):  # pebble may raise any exception for a dead worker
             self.pool.join()
         self._output.close()
 
@@ -291,7 +292,7 @@ class _Context(SpawnContext):
 
     def Process(self, *args: Any, **keywords: Any) -> SpawnProcess:  # type: ignore[override]
         if self.process is not None:
-            raise OSError("the worker has ended")  # which breaks the pool, as intended
+            raise OSError("the worker has ended")  # this error breaks the pool, as intended
         self.process = _Process(*args, **keywords)
         return self.process
 
@@ -310,7 +311,7 @@ class _NoLock:
 
 
 class _Process(SpawnProcess):
-    """A process that does not import the main module, has a fixed order of sets, and starts with Ctrl-C blocked."""
+    """A process that does not import the main module, has a fixed hash seed, and starts with Ctrl-C blocked."""
 
     _starting = Lock()
 
@@ -320,7 +321,7 @@ class _Process(SpawnProcess):
             main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
             # With a fixed seed no result can depend on the order of sets of texts.
             seed, os.environ["PYTHONHASHSEED"] = os.environ.get("PYTHONHASHSEED"), "0"
-            # KeyboardInterrupt while Python starts would be a fatal error with status 1, or RuntimeError.
+            # A KeyboardInterrupt while Python starts would be a fatal error with status 1, or a RuntimeError.
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 super().start()
@@ -381,12 +382,12 @@ def _begin(parent: int, output: Connection) -> None:
     end_with_parent(parent)
     os.setpgid(0, 0)  # processes started by tasks end with the group, and Ctrl-C in a terminal reaches only the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler would wait until a call of FLINT returns
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # which pebble ignores
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # pebble ignores SIGINT
     # Records have their own pipe: output of tasks goes to the file, and their standard input is empty.
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
-    task_kinds()  # the time for importing them belongs to no task
+    task_kinds()  # import them now, so that no task is charged with the time
     _state.pid, _state.idle = os.getpid(), _address_space()
     os.fchmod(output.fileno(), S_IRUSR)  # signal to the parent that the worker is ready
 
@@ -396,10 +397,10 @@ def _run_task(text: str, memory: int | None, documents: dict[str, str]) -> str:
     _state.documents.update(documents)
     data = perform(Task.from_text(text), memory, _state.documents, _state.idle)
     if os.getpid() != _state.pid:
-        os._exit(0)  # the task has forked, and this is the copy
+        os._exit(0)  # the task has forked, and this process is the copy
     try:
         return canonical(data)
-    except (ValueError, TypeError, RecursionError) as error:  # JSON has no nan, Fraction or array
+    except (ValueError, TypeError, RecursionError) as error:  # JSON cannot represent nan, Fraction or arrays
         message = f"the result cannot be kept: {error}"[:TAIL]
         return canonical({"key": data["key"], "outcome": Outcome.FAILED, "message": message})
 
@@ -407,11 +408,11 @@ def _run_task(text: str, memory: int | None, documents: dict[str, str]) -> str:
 def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: int | None = None) -> dict[str, Any]:
     """Run a task and return plain data for its `Record`.
 
-    `idle` is the address space of a fresh worker. Memory that earlier tasks did not release counts as memory of this
-    task, since otherwise it would have more memory here than in a fresh worker.
+    `idle` is the address space of a fresh worker. Memory that earlier tasks did not release is charged to this task;
+    otherwise the task would have more memory here than in a fresh worker.
     """
     with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
-        file.write("5")  # from now on the peak is that of the task
+        file.write("5")  # reset the peak: from now on it is the peak of this task
     _limit_memory(memory, idle)
     begin = time.perf_counter()
     data: dict[str, Any] = {"key": task.key, "outcome": Outcome.OK}
@@ -438,7 +439,7 @@ def failure(error: BaseException) -> dict[str, Any]:
     cause: BaseException | None = error
     while cause is not None and not is_out_of_memory(cause):
         cause = cause.__cause__ or cause.__context__
-    if cause is not None:  # MemoryError or an equivalent, or an error caused by it
+    if cause is not None:  # MemoryError or an equivalent error, or an error caused by one
         return {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
     if isinstance(error, InputError):
         return {"outcome": Outcome.FAILED, "message": str(error)[:TAIL]}
@@ -448,7 +449,6 @@ def failure(error: BaseException) -> dict[str, Any]:
 
 @cache
 def _versions() -> dict[str, str]:
-    """Return the versions that a result may depend on."""
     import flint
 
     return {
@@ -461,7 +461,7 @@ def _versions() -> dict[str, str]:
 
 def _limit_memory(memory: int | None, idle: int | None) -> None:
     """Limit the address space to `idle` (default: its current size) plus `memory`; None removes the limit."""
-    with suppress(OSError, ValueError):  # a limit below the current size is refused
+    with suppress(OSError, ValueError):  # the system refuses a limit below the current size
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard
         if memory is not None and (used := idle or _address_space()) is not None:
@@ -471,7 +471,6 @@ def _limit_memory(memory: int | None, idle: int | None) -> None:
 
 
 def _address_space() -> int | None:
-    """Return the address space of this process in bytes, None if unknown."""
     with suppress(OSError), open("/proc/self/statm") as file:
         return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     return None

@@ -19,15 +19,15 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _TICK = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_SHARED = 4  # records are collected for this multiple of the time in which the last list was written
+_SHARED = 4  # records are collected for this multiple of the time taken to write the last list
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
     """An iterable of lists of records as they arrive: at least ten lists a second, some of them empty.
 
-    Since writing waits for the disk, records of short tasks are collected in one list for four times as long as the
-    last list took to be written. A caller that stores each list at once loses at most one list and the tasks in flight.
+    Since writing waits for the disk, records of short tasks are collected in one list, for four times as long as it
+    took to write the last list. A caller that stores each list at once loses at most one list and the tasks in flight.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
@@ -43,7 +43,7 @@ class Batch:
         return self._deadline is not None
 
     def interrupt(self) -> None:
-        """Submit no further jobs, and abandon those that need more than `grace` seconds (safe in a signal handler)."""
+        """Submit no further jobs, and abandon jobs in flight after `grace` seconds (safe in a signal handler)."""
         self._deadline = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
@@ -101,8 +101,8 @@ def executor_for(
     """Return an executor: `jobs` local worker processes, or the workers of a dask `scheduler`.
 
     The scheduler is given as "tcp://host:port" or by its scheduler file. Short tasks are run in groups of about
-    `group_seconds`. `python` is the interpreter on the workers, if it differs from this one; `on_message` gets messages
-    about waiting for the cluster.
+    `group_seconds`. `python` is the path of the interpreter on the workers, if it differs from the local one;
+    `on_message` is called with messages about waiting for the cluster.
     """
     if scheduler is None:
         return LocalWorkers(jobs, documents, group_seconds=group_seconds)
@@ -123,11 +123,12 @@ def run(
 ) -> Iterator[Record]:
     """Run the tasks of a spec and yield their records as they finish.
 
-    `spec` is a path, the text of a spec (anything with a line break), or a Spec. With `db`, a path, tasks that have
-    a record there are not run again, and every record is stored before it is yielded; without it, nothing is stored.
-    `jobs` worker processes run at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
-    the i-th of n parts, and `retry_failed` runs failed tasks again. A task that is killed from outside at every attempt
-    is yielded as lost, and has no record in `db`. Closing the generator kills the tasks in flight.
+    `spec` is a path, the text of a spec (a text with a line break), or a Spec. With `db`, the path of a database, tasks
+    with a record in it are not run again, and every record is stored before it is yielded; without `db` nothing is
+    stored. The tasks run in `jobs` local worker processes or on the workers of a dask `scheduler`. `only` names the
+    experiments to run, `shard` = (i, n) selects the i-th of n parts of the tasks, and `retry_failed` runs failed tasks
+    again. A task that is killed from outside at every attempt is yielded as lost, and has no record in `db`. Closing
+    the generator kills the tasks in flight.
 
     Raises SpecError, StoreError.
 

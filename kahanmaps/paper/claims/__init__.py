@@ -1,1 +1,1 @@
-"""The statements of the paper, a file a section."""
+"""The claims of the paper, one file for each section."""

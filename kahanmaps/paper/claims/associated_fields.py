@@ -34,11 +34,11 @@ def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
     g = J nabla K, K = alpha H_0 + beta H_1 + gamma H_2"""
     v = o.vector("v")
     for signs in o.all_signs():
-        # J^T = J^{-1}, so v . g = v . J nabla K is the slope of K along J^T v.
+        # J^T = J^{-1}, so v . g = v . J nabla K is the derivative of K along J^T v.
         B = o.B_signs(signs)
         slope = o.slope(lambda o, x: o.Kf(o.B_signs(signs), x), o.x, o.J.transpose() * v)
         yield o.dot(v, o.value(o.g(B), o.x)), slope
-        # B_s = I + the sum of (B_i - I) over the minus signs, as a polynomial in A.
+        # B_s = I + the sum of B_i - I over the i with s_i = -1, as a polynomial in A.
         minus = [o.lagrange(i) for i in o.each if signs[i] < 0]
         coefficients = [o.sum([c[k] for c in minus]) for k in range(o.m)]
         coefficients[0] = coefficients[0] + o.number(1 - len(minus))
@@ -161,7 +161,7 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation
     B_i = alpha_i I + beta_i A + gamma_i A^2"""
     for i in o.free:
-        # Independent of Lagrange's formula: I - 2 E_i with the projector E_i onto the eigenspace of lambda_i.
+        # This side does not use Lagrange's formula: I - 2 E_i, E_i the projector onto the eigenspace of lambda_i.
         E = o.projector(i)
         yield o.B(i), o.I - E * o.number(2)
         yield o.A * E, E * o.lam[i]

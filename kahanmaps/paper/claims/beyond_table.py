@@ -1,7 +1,7 @@
 """The table of the paper's statements under varied hypotheses: proved or refuted, cell by cell.
 
-Each cell is a claim of section 10, decided like the others for the generic member. For a statement that fails, the
-smallest counterexample is given: all numbers are 0 or 1, as few as possible are 1, and eps = 1.
+Each cell is a claim of section 10, decided for the generic member like all claims. For a statement that fails, the
+table gives a smallest counterexample: all numbers are 0 or 1, as few as possible are 1, and eps = 1.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from kahanmaps.paper.verify import VerifyOptions, verify
 _MAX_ONES = 7
 _KEY = "not "
 
-Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coordinates, "x" with one
+Slot = tuple[str, tuple[int, ...]]  # a number that may be 1: "H", exponents; "J", index pair; "x", one index
 
 
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
-    """Return all statements for all variations in dimension 2m: proved if they hold, refuted if they fail.
+    """Return the verdicts on all statements for all variations in dimension 2m: proved if they hold, else refuted.
 
-    Refuted cells are expected, and count as controls. Returns a Report with one Finding for each cell; raises
-    InputError as `verify` does.
+    Some cells are expected to be refuted, and count as controls. Returns a Report with one Finding for each cell.
+    Raises InputError as `verify` does.
 
     >>> cells = {result.claim: result for result in beyond_table(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
@@ -60,7 +60,7 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
 
 
 def table(report: Report) -> str:
-    """The cells as a table in Markdown, and the counterexamples below it."""
+    """Return the cells as a table in Markdown, followed by the counterexamples."""
     titles = [variation.title for variation in VARIATIONS.values()]
     lines = [f"| statement | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
     cells = {(finding.place["statement"], finding.place["variation"]): finding for finding in report.findings}
@@ -82,7 +82,7 @@ def table(report: Report) -> str:
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
-    """Return the data as text, and the point with both sides; None if no data with at most seven ones refute it."""
+    """Return data that refute a statement as text and as witness; None if none with at most seven ones refute it."""
     m, roots, slots, extras = _SMALL[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
@@ -108,9 +108,9 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 
 
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
-    """Objects in normal form with A = diag(roots, roots), H the sum of the monomials, x the sum of the unit vectors.
+    """Return objects in normal form: A = diag(roots, roots), H the sum of the monomials, x of the unit vectors.
 
-    If some of the `ones` are brackets {x_i, x_j}, these are the brackets of J.
+    If `ones` contain index pairs of J, J has the entry 1 at these pairs {x_i, x_j}, -1 at {x_j, x_i}, and 0 elsewhere.
     """
     n = 2 * m
     cubic, hessian, linear, J = ([0] * n**k for k in (3, 2, 1, 2))
@@ -121,7 +121,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
         elif kind == "J":
             J[place[0] * n + place[1]], J[place[1] * n + place[0]] = 1, -1
         else:
-            # The derivative of the monomial along its own coordinates, in each of their orders, gains 1.
+            # Add 1 to the third (second, first) derivative along the coordinates, in each order.
             where = [i for i, e in enumerate(place) for _ in range(e)]
             entries = {3: cubic, 2: hessian, 1: linear}[len(where)]
             for order in itertools.permutations(where):
@@ -142,7 +142,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
 
 
 def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
-    """The monomials of these degrees, each in the variables of one plane if `planar`, and the coordinates of x."""
+    """Return slots for monomials of these degrees (in the variables of one plane if `planar`) and coordinates of x."""
     slots: list[Slot] = []
     for degree in degrees:
         for exponent in monomials(2 * m, degree):
@@ -152,7 +152,7 @@ def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
     return slots + [("x", (i,)) for i in range(2 * m)]
 
 
-# Where a variation is tried: m, the roots of chi, what may be 1, and the matrices B.
+# Where a variation is tried: m, the roots of chi, the slots that may be 1, and the matrices B.
 _SMALL: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]]] = {
     "inhomogeneous": (1, (1,), _slots(1, (3, 2, 1)), {}),
     "steps": (1, (1,), _slots(1, (3,)), {"associate_matrices": (QQ.identity(2) * fmpq(-2),)}),

@@ -1,8 +1,8 @@
 """The question of the paper's conclusions: what are the level varieties, and how do the maps act on them?
 
-The theorem is proved in docs/mathematics.md, "Geometry of the level sets". The claims are the identities of its proof,
-for a generic point x. In every plane i, that is on the image of E_i^T, E_i the projector for lambda_i, let h be the
-restriction of H and D the determinant of f'; e, e' is a symplectic basis of the plane.
+The answer is a theorem proved in docs/mathematics.md, "Geometry of the level sets". The claims are the identities of
+its proof, for a generic point x. Plane i is the image of E_i^T, where E_i is the projector for lambda_i. In this plane
+let h be the restriction of H and D the determinant of f'; e, e' is a symplectic basis of the plane.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def _plane(o: PaperObjects, i: int) -> tuple[Any, Any, Any]:
     other = v * (o.K.one / o.dot(x, o.J * v))
     cubic = _restriction(o, (x, other))
     a, d = cubic[0, 0, 0], cubic[1, 1, 1]
-    b, c = cubic[0, 0, 1], cubic[0, 1, 1]  # a third of the coefficients
+    b, c = cubic[0, 0, 1], cubic[0, 1, 1]  # h = a u^3 + 3 b u^2 v + 3 c u v^2 + d v^3
     product, cubes = a * d, a * c**3 + b**3 * d
     disc = (b * c) ** 2 * o.number(81) + product * b * c * o.number(162) - product * product * o.number(27)
     return x, other, disc - cubes * o.number(108)

@@ -1,7 +1,7 @@
 """Section 9: differential equations for H~ and K~_i, and the inverse of the Poisson tensor.
 
-For every m: s_i = 1 - eps^2 (p_0 + sum q_j - 2 q_i), P_0 = ((m-2)^2 + (4-m) sum 1/s_j)/4 and
-eps^2 Q_i = (2 - m + sum 1/s_j - 2/s_i)/4, which are the paper's formulas for m = 3, where s_0 = 1.
+For every m: s_i = 1 - eps^2 (p_0 + sum q_j - 2 q_i), P_0 = ((m-2)^2 + (4-m) sum 1/s_j)/4 and eps^2 Q_i = (2 - m + sum
+1/s_j - 2/s_i)/4. For m = 3 these are the paper's formulas with s_0 = 1.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
     for i in o.free:
         right = o.slope(lambda o, x: o.Q(i, x), o.x, o.B(i).transpose() * v) * o.eps * o.eps
         yield left, right * o.number(4 - o.m)
-        yield reciprocals, right  # for m = 4 the line above is 0 = 0
+        yield reciprocals, right  # for m = 4 the previous pair is 0 = 0
 
 
 @claim("Theorem 15, proof", "", "H B")
@@ -310,12 +310,12 @@ def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
 
 
 def P_times(o: PaperObjects, value: Any) -> Any:
-    """-6 P_0 times a number."""
+    """Return -6 P_0 `value`."""
     return o.P0(o.x) * value * o.number(-6)
 
 
 def _product_rule(o: PaperObjects, v: Any) -> Any:
-    """The slope of P_0 H + eps^2 sum Q_i K_i along v, by the product rule."""
+    """Return the derivative of P_0 H + eps^2 sum Q_i K_i along v, by the product rule."""
     value = o.P0(o.x) * o.dot(v, o.grad(o.x)) + o.H(o.x) * o.slope(lambda o, x: o.P0(x), o.x, v)
     for i in o.each:
         inner = o.Q(i, o.x) * o.dot(v, o.B(i) * o.grad(o.x))
@@ -325,7 +325,7 @@ def _product_rule(o: PaperObjects, v: Any) -> Any:
 
 
 def _system_matrix(o: PaperObjects, entry: Any) -> tuple[Any, Any, Any]:
-    """The matrix of the 4 x 4 system with the factor `entry` of q_3 in place (2,3), the unknowns, the right side."""
+    """Return the matrix of the 4 x 4 system with entry (2,3) = `entry` q_3, the unknowns, and the right-hand side."""
     e = o.eps * o.eps
     q1, q2, q3 = (o.q(i, o.x) for i in o.each)
     d = o.K.one - e * o.p0(o.x)

@@ -12,7 +12,7 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, jordan_block, varied
 
-_ITERATES = 4  # the first iterate whose degree distinguishes a planar Hamiltonian map from others
+_ITERATES = 4  # iterates tested: Phi^4 is the first whose degree distinguishes planar Hamiltonian maps from others
 
 
 @claim("Structure", "", "H eps")
@@ -61,12 +61,12 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
     deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4"""
     direction, form = o.vector("direction"), o.vector("form")
     degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _ITERATES + 1)]
-    size = degrees[-1] + 1  # one more, to see a larger degree
+    size = degrees[-1] + 1  # one more than for the expected degree, so that a larger degree is recognized
     points = [o.x + direction * o.number(t) for t in range(2 * size)]
     for degree in degrees:
         points = [o.step(o.f, x) for x in points]
         values = [o.dot(form, x) for x in points]
-        # Of a rational function of degree d of t the matrix (y(s) - y(t))/(s - t) has the rank d.
+        # If y is a rational function of degree d in t, the matrix of (y(s) - y(t))/(s - t) has rank d.
         quotients = [(values[s] - values[t]) * o.number(1, s - t) for s in range(size) for t in range(size, 2 * size)]
         yield o.rank(o.K.matrix(size, size, quotients)), degree
 
@@ -137,7 +137,8 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
         x = o.projector(i).transpose() * o.x
         fx, x_tilde = o.value(o.f, x), o.step(o.f, x)
         square = o.eps * o.eps
-        # N has degree 5 in l over these denominators, and vanishes at 0, 1 and -1: a quadratic, known at 2, 3 and 4.
+        # The numerator has degree 5 in l and vanishes at 0, 1, -1; so N is the quadratic given by its values at 2, 3,
+        # 4.
         values = []
         for l in (2, 3, 4):
             denominator = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
@@ -213,7 +214,7 @@ def paper_integral(o: PaperObjects) -> Pairs:
 
 
 def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
-    """The modified Hamiltonian of the k-th associated field, for other numbers as well."""
+    """Return the modified Hamiltonian of the k-th associated field as a function of objects and point."""
     return lambda o, x: o.modified(list(o.associates())[k], x)
 
 
@@ -241,9 +242,9 @@ def formula(o: PaperObjects) -> Pairs:
     yield o.modified_H(o.x), right
 
 
-# The statements that are tested for the variations: the formula, the controls where it holds, how it is proved, and a
-# sign for each of VARIATIONS: + holds, - fails, blank not tested, since the variation changes g and the statement is
-# about f alone.
+# The statements that are tested for the variations: formula, controls for the variations for which the statement holds,
+# method of proof, and a sign for each of VARIATIONS: + holds, - fails, blank not tested, since the variation changes
+# only g and the statement is about f.
 _ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
 STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
     (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),
@@ -269,13 +270,13 @@ STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
 
 
 def _cell(function: ClaimFunction, name: str, holds: bool) -> ClaimFunction:
-    """The claim that the statement of a function holds, or fails, for the varied objects."""
+    """Return the claim that the statement of `function` holds, or fails, for the objects of a variation."""
 
     def cell(o: PaperObjects) -> Pairs:
         pairs = list(function(varied(name, o)))
         if holds or not pairs:
             yield from pairs
-        else:  # some pair has to differ
+        else:  # the sides of some pair have to differ
             yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
 
     cell.__name__ = f"{function.__name__}_{name}"

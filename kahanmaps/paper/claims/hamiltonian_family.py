@@ -74,7 +74,7 @@ def reasons_for_involution(o: PaperObjects) -> Pairs:
     JA skew;  (A^T)^2 J = A^T J A = J A^2"""
     JA = o.J * o.A
     yield JA.transpose(), -JA
-    w = o.vector("w")  # any vector instead of nabla H_0
+    w = o.vector("w")  # an arbitrary vector in place of nabla H_0
     yield o.dot(w, JA * w), o.K.zero
     yield o.dot(o.A * w, o.J * (o.A * (o.A * w))), o.K.zero
     yield o.AT * o.AT * o.J, o.AT * o.J * o.A

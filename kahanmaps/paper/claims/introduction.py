@@ -1,4 +1,4 @@
-"""Abstract and Section 1: what the paper promises, each promise in the form in which it can be tested."""
+"""Abstract and Section 1: the results that the paper announces, each in a form that can be tested."""
 
 from __future__ import annotations
 

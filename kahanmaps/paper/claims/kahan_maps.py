@@ -1,7 +1,7 @@
-"""Section 2: the discretization of any quadratic system; of Hamiltonian ones, an integral and a measure.
+"""Section 2: the discretization of any quadratic system, and its integral and measure for Hamiltonian systems.
 
-The claims are tried on the homogeneous f = J nabla H and on an inhomogeneous one; those that are stated for any system,
-or any Hamiltonian one, also on systems without any structure.
+The claims are tested on the homogeneous f = J nabla H and on an inhomogeneous field. Claims about any system, or any
+Hamiltonian system, are also tested on random systems without further structure.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
     x_tilde = o.step(f, o.x)
     moved = o.jacobian_of_step(f, o.x) * v
     yield moved, o.solve(o.minus_eps_jac(f, o.x), o.plus_eps_jac(f, x_tilde) * v)
-    # The defining equation, differentiated along v: the moved x~ solves the equation linearized at (x, x~).
+    # The derivative of x~ along v solves the derivative of the defining equation at (x, x~) along v.
     half_sum = (o.jac(f, x_tilde) * v + o.jac(f, o.x) * moved) * o.eps
     yield moved - v, half_sum
 

@@ -1,7 +1,7 @@
 """Section 8: the Poisson tensor Pi = J - eps^2 f'^2 J, invariant under all maps of a class.
 
 For every m: f'^2 = sum_k pi_k (A^T)^k with pi_k = delta_k0 p_0 + sum_i (coefficient k of B_i) q_i; for m = 3 these are
-the paper's p, q, r. Horner's polynomials C_k of chi stand for its matrices C_1 and C_2.
+the paper's p, q, r. Horner's polynomials C_k of chi generalize the paper's matrices C_1 and C_2.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def gradient_conditions(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     for k in range(o.m - 1):
         left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
-        # v . C_k(A) nabla r is the slope of r along C_k(A)^T v.
+        # v . C_k(A) nabla r is the derivative of r along C_k(A)^T v.
         along = o.horner(k).transpose() * v
         yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, along)
 
@@ -133,7 +133,7 @@ def jacobi_identity(o: PaperObjects) -> Pairs:
 
 
 def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
-    """The Jacobi identity of `factor` Pi, a constant matrix."""
+    """Yield the Jacobi identity of `factor` Pi, where `factor` is a constant matrix."""
     Pi = factor * o.Pi(o.x)
     rows = [o.K.column([Pi[i, k] for k in range(o.n)]) for i in range(o.n)]
     seconds = [o.second(o.f, row) for row in rows]
@@ -176,7 +176,7 @@ def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
     powers = [o.A_to(k).transpose() * o.J for k in range(o.m)]
     P = o.sum([power * values[k, 0] for k, power in enumerate(powers)])
     gradients = [o.horner(k) * w for k in range(o.m)]
-    # The derivative of P along row i of P is the sum over k of (P nabla pi_k)_i times the k-th power.
+    # The derivative of P along row i of P is the sum over k of (P nabla pi_k)_i times the k-th power of A^T (times J).
     slopes = [P * gradient for gradient in gradients]
     along = [o.sum([power * slope[i, 0] for power, slope in zip(powers, slopes, strict=True)]) for i in range(o.n)]
     for i, j, k in combinations(range(o.n), 3):
@@ -193,7 +193,7 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
     for i in o.free:
         right = o.slope(lambda o, x: o.q(i, x), o.x, o.B(i).transpose() * v)
         yield left, right * o.number(4 - o.m)
-        yield trace, right  # for m = 4 the line above is 0 = 0
+        yield trace, right  # for m = 4 the previous pair is 0 = 0
 
 
 @claim("Theorem 12, proof", "", "H", least_m=2)
@@ -283,7 +283,7 @@ def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
             expected = o.trace(derivative * o.df) * o.number(1, 8)
             for part in range(2):
                 yield o.sum([B[k, l] * sums[l][part] for l in range(o.n)]), expected
-            # The lines between: (88) and (89) move B^T to the index that is differentiated.
+            # The intermediate lines: (88) and (89) move B^T to the index of the derivative.
             BT = B.transpose()
             moved = [o.second(o.f, BT * o.unit(l)) for l in range(o.n)]
             for l in range(o.n):
@@ -294,7 +294,6 @@ def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
 
 
 def _long_form(o: PaperObjects, x: Any) -> Any:
-    """(1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J."""
     right = o.J * (o.K.one - o.eps * o.eps * o.p0(x))
     for i in o.each:
         right = right - o.B(i).transpose() * o.J * (o.eps * o.eps * o.q(i, x))
@@ -302,7 +301,7 @@ def _long_form(o: PaperObjects, x: Any) -> Any:
 
 
 def _first_order(o: PaperObjects) -> tuple[Any, Any]:
-    """The equations of first order in eps^2 for the unknowns d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
+    """Return the equations of first order in eps^2 for the d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
     n, m = o.n, o.m
     powers = [o.A_to(k).transpose() * o.J for k in range(m)]
     rows = []

@@ -1,1 +1,1 @@
-"""How far integrals move along float orbits."""
+"""The drift of integrals along float orbits of several methods."""

@@ -1,7 +1,7 @@
-"""Numerical experiments with Kahan's method and others: drift of functions, errors, orders, work.
+"""Numerical experiments with Kahan's method and other methods: drift of functions, errors, orders, work.
 
-All methods advance all initial points together, in the float engine (maps/floats). Nothing here is proved: numbers are
-measured in double precision, and do not depend on the kernel.
+All methods use the float engine (maps/floats), which advances all initial points together. Nothing is proved here: all
+numbers are measured in double precision, and do not depend on the kernel.
 """
 
 from __future__ import annotations
@@ -44,25 +44,26 @@ MAX_STEPS = 10**9
 MAX_FUNCTIONS = 12
 MAX_STARTS = 100_000
 _RANDOM_STARTS = 40
-_OF_ONE_SIZE = 5  # of them; the next ones are half as large
+_OF_ONE_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
 _PROBE_STEPS = 1000
-_REFERENCE_STARTS = 4  # initial points from which errors are measured
-_SHORTER_TIMES = 6  # times, each half as long, for which the solution is computed
-_COARSEST, _FINEST = 1, 14  # logarithms to base 2 of the number of steps
-_MIN_SIZES = 5  # step sizes, before an order is regarded as settled
-_SETTLED = 0.004  # change of the slope from one step size to the next
+_REFERENCE_STARTS = 4  # maximal number of initial points for which errors are measured
+_SHORTER_TIMES = 6  # number of times tried for the reference solution, each half of the previous time
+_COARSEST, _FINEST = 1, 14  # base-2 logarithms of the smallest and largest number of steps
+_MIN_SIZES = 5  # step sizes needed before the order counts as converged
+_SETTLED = 0.004  # change of the slope between step sizes below which the order counts as converged
 _ROUNDING = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
 _MIN_COMPILED_STEPS = 20_000
-_LONG = 60  # characters of a number; the record has all of them
+_LONG = 60  # maximal length of a printed number; JSON output has all characters
 _COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
 
 
 @dataclass(frozen=True, eq=False)
 class DriftCurve:
-    """The error of a function along the orbits of a method: the maximum in each bin of steps, and its step.
+    """The largest error of a function in each bin of steps along the orbits of a method, and the step of this error.
 
     The error is exactly 0 if all values in the bin are equal to the initial values. Bins without values are omitted;
-    `undefined` counts points at which the function is undefined. `last` is the error at the last step (or NaN).
+    `undefined` counts points at which the function is undefined. `last` is the error at the last step, NaN if
+    undefined.
     """
 
     method: str
@@ -74,7 +75,7 @@ class DriftCurve:
 
     @property
     def largest(self) -> float:
-        """The largest error of all steps; NaN without values."""
+        """The largest error of all steps; NaN if there are no values."""
         return float(self.errors.max()) if len(self.errors) else float("nan")
 
 
@@ -93,11 +94,11 @@ class StepError:
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """What was measured for a method.
+    """The measurements for one method.
 
-    `ends` says how the orbit of each initial point ended; `evaluations` counts evaluations of f and `systems` linear
-    systems of all orbits, `repeated` steps in which an implicit method needed more iterations, `failures` orbits that
-    ended because Newton's method found no solution. `errors` are those at the time of the reference, by decreasing step
+    `ends` says how the orbit of each initial point ended. The counts over all orbits are `evaluations` of f, solved
+    linear `systems`, `repeated` steps (in which an implicit method needed more iterations), and `failures` (orbits that
+    ended since Newton's method found no solution). `errors` are measured at the reference time, by decreasing step
     size; `order` is the slope between the last two errors above rounding (None: there are none). `seconds` is None
     without a clock.
     """
@@ -122,10 +123,11 @@ class MethodRun:
 class Comparison(ResultPart):
     """The result of `compare`.
 
-    `relative` is true for functions whose errors are relative to I(x_0) (for all initial points); they are absolute
-    otherwise. `labels` are the names of the functions in plots, `origins` says where each comes from: declared,
-    theorem, found, flow or requested. `time` is the time at which errors are measured, None without a reference;
-    `skipped` are methods that the system does not admit, with the reason. `eps` is half the time step (exact).
+    `relative` is true for functions I whose errors are divided by |I(x_0)| for all initial points; the errors of other
+    functions are absolute. `labels` are the names of functions in plots. `origins` are the origins of functions:
+    declared, theorem, found, flow or requested. `time` is the time at which errors are measured, None without a
+    reference; `skipped` maps methods that the system does not admit to the reason. `eps` is half the time step
+    (exact).
     """
 
     file: SystemFile = field(repr=False)
@@ -146,7 +148,7 @@ class Comparison(ResultPart):
         return next(curve for curve in self.curves if (curve.method, curve.function) == (method, function))
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return all measured curves as rows of one table, whose kind is drift or error."""
+        """Return all measured curves as rows of one table; the entry "kind" of a row is drift or error."""
         rows: list[tuple[Any, ...]] = []
         for curve in self.curves:
             for step, value in zip(curve.steps.tolist(), curve.errors.tolist(), strict=True):
@@ -172,7 +174,7 @@ class Comparison(ResultPart):
             write_atomically(path, self.to_pandas().to_parquet(index=False))
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data, without the curves of the drift, which `rows` has."""
+        """Return plain data without the drift curves; for these use `rows`."""
         methods = []
         for run in self.runs:
             drift = {c.function: attributes(c, "largest", "last") for c in self.curves if c.method == run.method}
@@ -199,7 +201,7 @@ class Comparison(ResultPart):
         }
 
     def tables(self) -> Iterator[list[list[str]]]:
-        """Yield the tables of the result as rows of cells: methods; drift of each function."""
+        """Yield tables as rows of cells: one table of the methods, and one of the drift of each function."""
         head = ["# method", "order", "measured", "error", "f per step", "systems per step", "orbits"]
         timed = any(run.seconds is not None for run in self.runs)
         rows = [head + ["seconds"] * timed]
@@ -232,7 +234,7 @@ class Comparison(ResultPart):
         return self.text
 
     def remarks(self) -> list[str]:
-        """Return sentences on what the numbers mean and on what is missing."""
+        """Return sentences that explain the numbers and list missing measurements."""
         sentences = []
         if self.time is not None:
             sentences.append(f"error: at time {_shown(self.time)}, against Taylor solutions in balls")
@@ -263,7 +265,7 @@ def compare(
     clock: Callable[[], float] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
-    """Compare Kahan's method with others: drift of integrals, errors, measured orders and work.
+    """Compare Kahan's method with other methods: drift of integrals, errors, measured orders and work.
 
     Args:
         system: a quadratic system.
@@ -272,7 +274,7 @@ def compare(
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps over which the drift is measured, by default 10,000.
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
-        integrals: functions, texts or pairs (name, text); by default known integrals, or those of a quick search.
+        integrals: functions, texts or pairs (name, text); by default known integrals, or the results of a quick search.
         linear_bins: whether the bins of the drift have equal lengths; by default they grow with the step.
         orders: whether to measure errors and orders, for which the solution is computed as reference.
         seed: the random seed of the initial point.
@@ -362,8 +364,8 @@ def compare(
 def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
     """Return a random initial point with small rational coordinates, determined by the seed.
 
-    It is the first of 40 candidates, decreasing in size, from which RK4 completes a thousand steps, so that methods can
-    be compared; the first candidate if there is none. `eps` is half the time step.
+    The function tries 40 candidates of decreasing size and returns the first from which RK4 completes a thousand steps,
+    so that methods can be compared; if none does, it returns the first candidate. `eps` is half the time step.
 
     >>> small_start(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "1/10")
     (1/2, 2/3)
@@ -385,7 +387,6 @@ def _shown(number: fmpq) -> str:
 
 
 def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
-    """Return the initial points as exact numbers."""
     if given is None:
         return (small_start(system, eps, seed),)
     if isinstance(given, str):
@@ -409,7 +410,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
 def _methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
-    """Return the methods, the reasons for omitted ones, and a function that starts the first orbits by a method."""
+    """Return the admitted methods, the reasons for omitted methods, and a function that returns orbits of a method."""
     if isinstance(requested, str) or not hasattr(requested or (), "__iter__"):
         raise InputError(f"found methods = {requested!r}, expected a list such as ['kahan', 'rk4']")
     names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))
@@ -451,7 +452,7 @@ def _initial(
         if None in numbers or not np.isfinite(values).all():
             where = "is not defined in floating point at the initial point: choose another one"
             raise InputError(f"{function.name} {where}")
-        # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
+        # Decide exactly whether I(x_0) = 0: its value in doubles may be a rounding error instead of 0.
         relative[function.name] = all(number != 0 for number in numbers) and bool((values != 0.0).all())
         initial.append((values, np.abs(values) if relative[function.name] else np.ones_like(values)))
     return initial, relative
@@ -460,9 +461,9 @@ def _initial(
 def _references(
     system: QuadraticSystem, starts: Sequence[Sequence[fmpq]], eps: fmpq, progress: Callable[[str], None]
 ) -> tuple[fmpq | None, FloatArray | None]:
-    """Return a time, after which the solutions have changed by about their own norm, and their values at that time.
+    """Return a time in which the solutions change by about their own norm, and the solutions at this time.
 
-    The time is the step times a power of 2, and has the sign of eps.
+    The time is the time step times a power of 2, with the sign of eps. If there is no reference, both values are None.
     """
     speeds = [max(abs(entry) for entry in system.over(QQ).value(start)) for start in starts]
     times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]
@@ -487,7 +488,7 @@ def _errors(
     references: FloatArray,
     progress: Callable[[str], None],
 ) -> tuple[tuple[StepError, ...], float | None]:
-    """Return the errors at a time for smaller and smaller steps, and the slope between the last two above rounding."""
+    """Return the errors at `time` for decreasing step sizes, and the slope of the last two errors above rounding."""
     found: dict[int, StepError] = {}
     size = float(np.abs(references).max())
 
@@ -524,7 +525,7 @@ def _errors(
 
 
 def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
-    """Return the ends of the bins: 0 = e_0 < e_1 < ... = steps; bin k holds the steps e_(k-1) < n <= e_k."""
+    """Return the ends 0 = e_0 < e_1 < ... = steps of the bins; bin k contains the steps e_(k-1) < n <= e_k."""
     if steps <= BINS:
         return np.arange(steps + 1)
     ends = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
@@ -532,7 +533,7 @@ def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
 
 
 class _Bins:
-    """The largest error so far in each bin."""
+    """The largest error in each bin among the steps that were added."""
 
     def __init__(self, edges: NDArray[np.int64]) -> None:
         self._edges = edges

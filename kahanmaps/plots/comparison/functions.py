@@ -25,20 +25,20 @@ from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
-_MAX_NAME = 30  # characters
-_EFFORT = -2  # of the search for integrals: it takes at most a few seconds
+_MAX_NAME = 30  # maximal number of characters
+_EFFORT = -2  # effort of the search for integrals, which then takes at most a few seconds
 
 
 class OfTheImage:
     """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
 
-    of_arrays = True  # for ensembles
+    of_arrays = True  # ensembles evaluate it at arrays of points
 
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
         self._function, self._eps = function, eps
         hamiltonian = function.hamiltonian
-        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # at points and their images
+        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # values at points (x, x~)
         if isinstance(function, ModifiedHamiltonian):
             polynomials = (hamiltonian.H, *hamiltonian.gradient)
             H, *gradient = (PointFunction("", _as_function(hamiltonian, polynomial)) for polynomial in polynomials)
@@ -71,8 +71,9 @@ WatchedFunction = PointFunction | OfTheImage
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
-    These are the integrals claimed in the file; the modified H of a cubic Hamiltonian; for a member of the family the
-    integrals of the commutant; and last H itself, which the Kahan map does not conserve. `eps` is half the time step.
+    In this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian; the integrals from the
+    commutant of a member of the family; and H itself, which the Kahan map does not conserve. `eps` is half the time
+    step.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
@@ -97,11 +98,11 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
 def watched_functions(
     file: SystemFile, eps: fmpq, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[list[WatchedFunction], dict[str, str]]:
-    """Return the known integrals of the Kahan map and of the flow, and the origin of each by name.
+    """Return the known integrals of the Kahan map and of the flow, and a dict from the name to the origin of each.
 
-    These are the `known_functions`, or the integrals that a quick search finds, normalized, and the limits for
-    eps -> 0 of those that depend on eps, which the flow conserves. The origin is "declared", "theorem", "found" or
-    "flow". `eps` is half the time step (exact).
+    Integrals of the map are the `known_functions` or, if there are none, normalized integrals from a quick search.
+    Integrals of the flow are limits for eps -> 0 of integrals that depend on eps. The origin is "declared", "theorem",
+    "found" or "flow". `eps` is half the time step (exact).
 
     >>> from kahanmaps.documents.catalog import load
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
@@ -134,10 +135,10 @@ def watched_functions(
 
 
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
-    """Return the integrals claimed in the file, or if there are none those that follow from theorems; and H.
+    """Return H and the integrals claimed in the file; if no integral is claimed, those that follow from theorems.
 
-    Claims are normalized by `measured_integrals`, since an integral with a constant limit as eps -> 0 has a small drift
-    in any case. Raises InputError if no integral is known.
+    Claimed integrals are normalized by `measured_integrals`: an integral with a constant limit for eps -> 0 has a small
+    drift along orbits of every method. Raises InputError if no integral is known.
     """
     functions = functions_of(file, eps)
     functions |= {
@@ -180,13 +181,13 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """Return one of `functions_of` by its name, or an expression; without `eps` it must not contain eps."""
+    """Return a function of `functions_of` by its name, or an expression, without eps unless `eps` is given."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if known is None else known
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return a function as `requested_function`, but refuse integrals that depend on the image x~ of the point."""
+    """Return the same as `requested_function`. Raises InputError for integrals that depend on the image x~ of x."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     named = {
         name: known_function.function

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
-_PANEL = 5.5  # minimal width of a panel beside another, in centimetres
+_PANEL = 5.5  # minimal width in centimetres of panels side by side
 _LOST = 1e3
 _MAX_PANELS = 6
 _NO_VALUES = (1e-17, 1e-15)  # limits of the axis if all errors are 0
@@ -40,10 +40,10 @@ _NO_VALUES = (1e-17, 1e-15)  # limits of the axis if all errors are 0
 def plot_comparison(
     result: Comparison, style: Style | None = None, *, show: str = "drift", scale: str = "loglog"
 ) -> Figure:
-    """Plot the result of `compare`: "drift", "error" or "work". Raises InputError where this was not measured.
+    """Plot the "drift", "error" or "work" of a comparison. Raises InputError if this was not measured.
 
-    The drift is plotted by `plot_drift`. Errors against the time step have lines of the slopes of the orders beside
-    them; the work is the number of evaluations of f.
+    `plot_drift` plots the drift. "error" plots errors against the time step, with dotted lines whose slopes are the
+    orders. "work" plots errors against the number of evaluations of f.
     """
     style = style or Style()
     if show == "drift":
@@ -62,7 +62,7 @@ def plot_comparison(
         axes.set_xscale("log")
         axes.set_yscale("log")
         handles = []
-        ends: dict[int, tuple[float, float]] = {}  # order: the step and the least error, for the lines of slopes
+        ends: dict[int, tuple[float, float]] = {}  # order -> step and least error, where its dotted line starts
         for k, run in enumerate(runs):
             entries = [entry for entry in run.errors if entry.error > 0]
             x = [abs(to_float(2 * entry.eps)) if show == "error" else entry.evaluations for entry in entries]
@@ -83,23 +83,23 @@ def plot_comparison(
 
 
 def _order_lines(axes: Axes, ends: dict[int, tuple[float, float]], step: float) -> None:
-    """Draw a dotted line of each order, a little below the best method of this order, and mark the requested step."""
+    """Draw a dotted line for each order, a little below the best method of this order, and mark the requested step."""
     low, high = axes.get_ylim()
     for order, (x, error) in sorted(ends.items()):
         y = error / 3
         end = max(axes.get_xlim()[0], x * (low / y) ** (1 / order))
         axes.plot([x, end], [y, y * (end / x) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1)
-        # At the end with small steps, where lines of different orders are apart.
+        # Label the lines at small steps, where lines of different orders are far apart.
         write_beside(axes, str(order), (end, y * (end / x) ** order), (13, 0), color="0.4", fontsize="small")
     axes.set_ylim(low, high)
     axes.axvline(step, color="0.85", linewidth=0.8, zorder=0)
 
 
 def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "loglog") -> Figure:
-    """Plot the errors of functions against the step, with a panel for each function and a line for each method.
+    """Plot the errors of functions against the step number: one panel for each function, one line for each method.
 
-    `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 is in a band marked 0 at the
-    bottom; an arrow at the top stands for errors above `clipped_from`. A cross ends the line of an orbit that ended
+    `scale` is "loglog", or "semilog" with a linear axis of steps. Errors of exactly 0 are drawn in a band labelled 0 at
+    the bottom; an arrow at the top stands for errors above `clipped_from`. A cross ends the line of an orbit that ended
     early, at the step given in the legend. Raises InputError for an unknown scale.
     """
     if scale not in SCALES:
@@ -125,7 +125,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
         aspect = panel * rows + legend_height(labels, style, title=True, max_columns=3)
         figure = new_figure(style, aspect)
-        height = 0.75 / rows * 72 * style.inches(aspect)[1]  # of a panel, in points
+        height = 0.75 / rows * 72 * style.inches(aspect)[1]  # height of a panel in points
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, names, strict=False):
             curves = [curve for curve in result.curves if curve.function == name]
@@ -173,7 +173,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
 def clipped_from(result: Comparison, name: str) -> float:
     """Return the bound above which errors of a function are shown as an arrow at the top.
 
-    It is a thousand, or ten times the largest error of the completed orbits if that is larger; without it a diverging
+    The bound is 1000, or ten times the largest error of completed orbits if this is larger. Without a bound a diverging
     orbit would flatten all other curves.
     """
     whole = {run.method for run in result.runs if not run.early}
@@ -182,5 +182,5 @@ def clipped_from(result: Comparison, name: str) -> float:
 
 
 def _look(k: int) -> dict[str, Any]:
-    """Return color and line style of the k-th method; beyond seven the same colors have other lines."""
+    """Return color and line style of the k-th method; after seven methods colors repeat with other line styles."""
     return {"color": COLORS[k % len(COLORS)], "linestyle": LINES[(k + k // len(COLORS)) % len(LINES)]}

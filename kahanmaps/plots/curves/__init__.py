@@ -1,1 +1,1 @@
-"""Invariant curves and the planes in which they are drawn."""
+"""Invariant curves and the planes that contain them."""

@@ -1,10 +1,10 @@
 """The orbits of a Kahan map of the family in the planes of its normal form, and the invariant cubics that contain them.
 
-The data are computed here, and plotted by `plot_invariant_curves.py`. At a real root of chi the plane is real, and its
-coordinates (u, v) are symplectic: those in which h = kappa (u^3 - 3 u v^2), if h has three real lines, or h =
-kappa (u^3 + 3 u v^2), if it has one; if h has a repeated factor they are those of `family show --normal-form`. A pair
-of complex roots has one plane with complex coordinates, those of the normal form at the root with positive imaginary
-part.
+The data are computed here, and plotted by `plot_invariant_curves.py`. Each real root of chi has a real plane with a
+cubic h and symplectic coordinates (u, v), in which h is kappa (u^3 - 3 u v^2) if it has three real linear factors, and
+kappa (u^3 + 3 u v^2) if it has one; if h has a repeated factor, (u, v) are the coordinates of `family show
+--normal-form`. A pair of complex roots has one plane, with the complex coordinates of the normal form at the root with
+positive imaginary part.
 
 Steps are computed in floating-point numbers of 256 bits, so that all plotted digits are correct. A point closer to
 infinity than 2^-96 counts as a pole, and ends the orbit.
@@ -34,14 +34,14 @@ MAX_STARTS = 7  # the number of colors
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps
-_LARGEST = 1e60  # largest coordinate that is drawn: its cube does not overflow
+_LARGEST = 1e60  # largest drawn coordinate: its cube does not overflow
 
 Numbers = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneOrbit:
-    """An orbit in one plane: `u` and `v` at the steps 0, 1, ..., complex where the plane is; and its curve.
+    """An orbit in one plane: its curve, and `u` and `v` at the steps 0, 1, ..., complex in a complex plane.
 
     `cubic` is None in a complex plane.
     """
@@ -53,11 +53,11 @@ class PlaneOrbit:
 
 @dataclass(frozen=True, eq=False)
 class InvariantPlane:
-    """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each initial point.
+    """One plane of the normal form: the root of chi as a number and as text, and one orbit for each initial point.
 
-    `h` are the coefficients of the cubic in the coordinates (u, v), complex if the root is; `shape` is the form of h,
-    one of the constants of `plane_cubics`. `index` is the number of the plane in its splitting, `block` its map in
-    the coordinates (u, v), and `matrix` the matrix that transforms coordinates of the splitting to (u, v).
+    `h` are the coefficients of the cubic in the coordinates (u, v), complex if the root is complex; `shape` is the form
+    of h, one of the constants of `plane_cubics`. `index` is the index of the plane in its splitting, `block` the planar
+    Kahan map in the coordinates (u, v), and `matrix` transforms coordinates of the splitting to (u, v).
     """
 
     index: int
@@ -71,13 +71,13 @@ class InvariantPlane:
 
     @property
     def is_real(self) -> bool:
-        """Whether the root is real, so that the plane has a curve to plot."""
+        """Whether the root is real: only a real plane has a curve to plot."""
         return self.root.imag == 0
 
 
 @dataclass(frozen=True, eq=False)
 class InvariantCurves:
-    """The planes of a member, real ones by increasing root, with the orbits of all initial points.
+    """The planes of a member with the orbits of all initial points: first the real planes, by increasing root.
 
     `poles[k]` is the step at which the k-th orbit reaches a pole, None if all `steps` were taken. `originals[k]` is the
     orbit in the original variables, with a row for each step.
@@ -99,11 +99,11 @@ def find_invariant_curves(
     steps: int,
     progress: Callable[[str], None] = lambda _: None,
 ) -> InvariantCurves:
-    """Compute the orbits of some initial points in all planes, and the cubics that contain them.
+    """Compute the orbits of initial points in all planes, and the cubics that contain these orbits.
 
     `starts` are exact points of the system, `eps` is half the time step (exact). A system that is not declared as a
-    member of the family is accepted if it is recognised as one. Raises HypothesisError if there is no normal form,
-    since the system is not a member or chi has a repeated root; InputError for invalid sizes.
+    member of the family is accepted if it is recognised as one. Raises HypothesisError if there is no normal form: the
+    system is not a member, or chi has a repeated root. Raises InputError for invalid sizes.
 
     >>> from kahanmaps.documents.catalog import load
     >>> curves = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
@@ -138,7 +138,7 @@ def find_invariant_curves(
             triples = splitting.triples([arb(rational(entry)) for entry in start])
             orbits: list[tuple[Numbers, Numbers]] = []
             curves: list[PlaneCubic | None] = []
-            length, pole = steps + 1, None  # up to the first pole in any of the planes
+            length, pole = steps + 1, None  # the orbit ends at the first pole in any of the planes
             for k, frame in enumerate(frames, 1):
                 f, g, m, n = frame.matrix.entries()
                 U, V, W = triples[frame.index]
@@ -168,7 +168,7 @@ def find_invariant_curves(
 
 
 def _frames(splitting: Splitting) -> list[InvariantPlane]:
-    """Return the planes without orbits, real ones by increasing root."""
+    """Return the planes, still without orbits: first the real planes, by increasing root."""
     rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
     frames = []
     for index, plane in enumerate(splitting.planes):
@@ -178,7 +178,7 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
             text = format_number(exact[0]) if exact else f"{float(root.mid()):.5g}"
             shape, matrix = symmetric_coordinates(plane.block)
         else:
-            # If the ball contains 0, the real part is 0.
+            # If the ball of the real part contains 0, the real part is taken as 0.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
@@ -210,7 +210,7 @@ def _orbit(
         vs.append(_to_floating_point(V / W / step))
         P = block.image(P)
         size = max(abs(entry) for entry in P)
-        # At an indeterminacy point the next step ends the orbit, as at a pole.
+        # An indeterminacy point ends the orbit at the next step, as a pole does.
         P = (U, V, W * 0) if size == 0 else tuple((entry / size).mid() for entry in P)
         if k % _PROGRESS_EVERY == 0:
             progress(f"{name}, step {k}")
@@ -218,7 +218,7 @@ def _orbit(
 
 
 def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
-    """Return the curve through the initial point, with its level as a fraction of numbers of moderate size."""
+    """Return the curve through the initial point, with numerator and denominator scaled to moderate size."""
     U, V, W = first
     step = 2 * arb(eps)
     u, v = U / W / step, V / W / step
@@ -241,5 +241,4 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
 
 
 def _to_floating_point(value: Any) -> Any:
-    """Convert a ball to a floating-point number."""
     return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

@@ -1,7 +1,7 @@
 """Level curves of a rational function in the plane, accurate to rounding errors.
 
-The level F = c of F = N/D is the zero set of N - c D, which has no poles. It is computed on a grid, and then each
-vertex is moved to the curve by Newton's method.
+The level F = c of F = N/D is the zero set of the polynomial N - c D. It is computed on a grid; then Newton's method
+moves each vertex to the curve.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window
 
 MAX_LEVELS = 200
-GRID = 301  # lines each way
+GRID = 301  # grid lines in each direction
 _NEWTON = 8
 
 
-Levels = tuple[tuple[FloatArray, ...], ...]  # for each level the pieces of its curve, arrays (n, 2) of vertices
+Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices
 
 
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
-    """Return the finite values at initial points (n, dim), in increasing order, without repetition up to rounding."""
+    """Return the finite values of `function` at initial points (n, dim), increasing and distinct up to rounding."""
     values = np.sort(function(starts))
     kept: list[float] = []
     for value in values[np.isfinite(values)].tolist():
@@ -80,9 +80,10 @@ def level_curves(
 def zero_curves(
     value: Callable[[FloatArray], FloatArray], window: Window, on_grid: FloatArray | None = None
 ) -> tuple[FloatArray, ...]:
-    """Compute the zero set of a function of points (..., 2) in a window: pieces of curves, arrays (n, 2) of vertices.
+    """Compute the zero set of a function of points (..., 2) in a window as curves: arrays (n, 2) of vertices.
 
-    The pieces are computed on a grid, and each vertex is moved onto the curve. `on_grid` are known values on the grid.
+    The curves are computed on a grid, and each vertex is moved onto the zero set. `on_grid` are known values on the
+    grid.
 
     >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
     >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))
@@ -99,7 +100,7 @@ def zero_curves(
         if not np.isfinite(values).all():
             values = np.ma.masked_invalid(values)
         lines = [np.asarray(line) for line in contour_generator(xs, ys, values).lines(0.0)]
-        # Each vertex is moved by Newton's method along the gradient, by less than a mesh of the grid.
+        # Newton's method moves each vertex along the gradient, by less than the mesh size of the grid.
         for line in lines:
             moved = line.copy()
             for _ in range(_NEWTON):

@@ -1,11 +1,12 @@
-"""Level curves of a planar Kahan map, which are plane cubics, in coordinates in which they are symmetric.
+"""Invariant cubics of a planar Kahan map, and the coordinates in which these plane curves are symmetric.
 
 The Kahan map of u' = h_v, v' = -h_u, h = a u^3 + b u^2 v + c u v^2 + d v^3, conserves h/(1 + eps^2 D) with the Hessian
 determinant D = h_uu h_vv - h_uv^2, so an orbit stays on a cubic denominator * h = numerator * (1 + eps^2 D).
 
-A real binary cubic without repeated factor is, after a linear change of determinant 1, kappa (u^3 - 3 u v^2), which has
-three real lines at angles of 60 degrees, or kappa (u^3 + 3 u v^2), with one; kappa > 0. Its Hessian determinant is then
--36 kappa^2 (u^2 + v^2) or 36 kappa^2 (u^2 - v^2). Hence there are only two such Kahan maps up to scaling.
+A linear change of determinant 1 transforms a real binary cubic without repeated factor to kappa (u^3 - 3 u v^2), zero
+on three real lines at angles of 60 degrees, or to kappa (u^3 + 3 u v^2), zero on one real line; kappa > 0. The Hessian
+determinant is then -36 kappa^2 (u^2 + v^2) or 36 kappa^2 (u^2 - v^2). Hence there are only two such Kahan maps up to
+scaling.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ Floats = NDArray[np.float64]
 class PlaneCubic:
     """The curve denominator * h = numerator * (1 + eps^2 D) in the plane.
 
-    `h` are the coefficients of the cubic, `eps` is half the time step. `numerator` = 0 gives h = 0, lines
-    through the origin; `denominator` = 0 gives the conic 1 + eps^2 D = 0, which the map sends to infinity. Both are 0
-    at a base point, which lies on all curves.
+    `h` are the coefficients of the cubic, `eps` is half the time step. If `numerator` = 0, the curve is h = 0, lines
+    through the origin. If `denominator` = 0, it is the conic 1 + eps^2 D = 0, which the map sends to infinity. Both are
+    0 for a base point, which lies on all curves.
 
     >>> circle = PlaneCubic((1.0, 0.0, -3.0, 0.0), 0.5, 1.0, 0.0)
     >>> round(circle.length, 12), bool(abs(circle.value(np.array([0, circle.length]))) < 1e-12)
@@ -42,7 +43,7 @@ class PlaneCubic:
 
     @property
     def D(self) -> tuple[float, float, float]:
-        """The coefficients of D = h_uu h_vv - h_uv^2, of u^2, uv and v^2."""
+        """The coefficients of u^2, uv and v^2 in D = h_uu h_vv - h_uv^2."""
         p, q, r = PlanarBlock(*self.h).D
         return 4 * p, 4 * q, 4 * r
 
@@ -63,12 +64,12 @@ class PlaneCubic:
         return float(1 / np.sqrt(largest)) if largest > 0 else 1.0
 
     def value(self, points: Floats) -> Floats:
-        """Return the values at points (..., 2) of the polynomial that vanishes on the curve."""
+        """Return the values of denominator h - numerator (1 + eps^2 D) at points (..., 2)."""
         u, v = np.moveaxis(points, -1, 0)
         return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
     def value_on_sphere(self, angles: Floats, length: float) -> Floats:
-        """Return values at points (..., 2) of a half sphere, which represents the projective plane.
+        """Return values of this polynomial at points (..., 2) of a half sphere that represents the projective plane.
 
         The first angle is the direction in the plane, the second the angle from the axis, pi/2 at infinity:
         (u, v) = length tan(second) (cos(first), sin(first)). If the curve consists of lines through the origin, or is a
@@ -88,7 +89,7 @@ class PlaneCubic:
         return PlaneCubic(self.h, 0.0, self.h_at(u, v), 1.0)
 
     def gradient(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives of denominator h - numerator (1 + eps^2 D) by u and v."""
+        """Return the derivatives of denominator h - numerator (1 + eps^2 D) with respect to u and v."""
         a, b, c, d = self.h
         p, q, r = (self.numerator * self.eps * self.eps * entry for entry in self.D)
         along_u = self.denominator * (3 * a * u * u + 2 * b * u * v + c * v * v) - 2 * p * u - q * v
@@ -96,7 +97,7 @@ class PlaneCubic:
         return along_u, along_v
 
 
-Matrix = arb_mat | acb_mat  # complex in a complex plane
+Matrix = arb_mat | acb_mat  # of complex balls in a complex plane
 
 COMPLEX = "complex"
 THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3 u v^2)", "a repeated factor", "0"
@@ -105,7 +106,8 @@ THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3
 def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
     """Return the shape of the cubic and the matrix of determinant 1 from (u, v) to the symmetric coordinates.
 
-    The coefficients of the block are real balls. A discriminant that may be 0 counts as 0, and then the matrix is I.
+    The coefficients of the block are real balls. If the ball of the discriminant contains 0, the discriminant counts as
+    0, and the matrix is I.
 
     >>> block = PlanarBlock(arb(0), arb(1), arb(1), arb(0))
     >>> shape, matrix = symmetric_coordinates(block)
@@ -125,7 +127,8 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
         upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
         # Now h is the real part of (a - i b/3) (u + i v)^3.
         a, b, _, _ = transformed(block, upright)
-        # atan2 of a ball across its branch cut would be all of [-pi, pi], so the ball is rotated away from the cut.
+        # atan2 of a ball that meets the branch cut would be the interval [-pi, pi], so the ball is rotated away from
+        # the cut.
         angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
         return THREE_LINES, arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
     # D is a product of two real forms L and M, and h = s L^3 + t M^3; scale L and M so that s = t, then rotate.
@@ -147,7 +150,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 
 
 def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
-    """Return the coefficients of the cubic in the new coordinates: the matrix, of determinant 1, times the old ones."""
+    """Return the coefficients of the cubic in the coordinates `matrix` (of determinant 1) times the old coordinates."""
     f, g, k, l = matrix.entries()
     # u = l u' - g v', v = -k u' + f v'
     a, b, c, d = block.a, block.b, block.c, block.d

@@ -1,7 +1,8 @@
 """Plots of the planes of a member: in each plane the orbit and its invariant cubic, colored by step.
 
 Dots of the same color are the projections of the same point to the planes. Each projection moves along its own curve,
-which shows that the map is a product. The window contains most of the dots, or the disc the whole projective plane.
+which shows that the map is a product. A panel shows a window with most of the dots, or a disc, the whole projective
+plane.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CURVE, _FLOW = "#9a9a9a", "#444444"
-_CROWDED = 0.06  # of the width of a panel: a closer number would cover the previous one
-_NUMBERED = 4  # steps whose dots are numbered
+_CROWDED = 0.06  # fraction of the panel width: a number closer to the previous one would cover it
+_NUMBERED = 4  # number of steps whose dots are numbered
 
 
 def plot_invariant_curves(
@@ -38,12 +39,12 @@ def plot_invariant_curves(
     original: tuple[int, int] | None = None,
     labels: Sequence[str] = (),
 ) -> Figure:
-    """Plot the cubics and the orbits on them, with one panel for each real plane and two for a complex one.
+    """Plot the cubics and the orbits on them: one panel for each real plane, two panels for each complex plane.
 
     With `projective` a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
     at infinity. `flow` adds the level curve of the differential equation through each initial point, dashed. `original`
-    are the numbers of two variables: the first panel then shows the orbit in them. `labels` are the names of several
-    initial points. Raises InputError for invalid numbers of variables.
+    are the indices of two variables: the first panel then shows the orbit in these variables. `labels` are the names of
+    the initial points, if there are several. Raises InputError for invalid indices.
     """
     if original is not None and not all(0 <= k < len(curves.variables) for k in original):
         raise InputError(f"found the variables {original}, expected two numbers from 0 to {len(curves.variables) - 1}")
@@ -51,7 +52,7 @@ def plot_invariant_curves(
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
     letter = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
-    columns = min(columns, max(1, int(style.width / (12 * letter))))  # narrower panels have no space for letters
+    columns = min(columns, max(1, int(style.width / (12 * letter))))  # a panel is at least 12 letters wide
     rows = ceil(count / columns)
     # The panels are squares, with space for letters and a color bar.
     side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
@@ -64,7 +65,7 @@ def plot_invariant_curves(
 
         figure = new_figure(style, height / style.width)
         steps = max(len(x) for x in curves.originals) - 1
-        # One orbit is colored by step, several have a color and a mark each.
+        # A single orbit is colored by step; each of several orbits has its own color and mark.
         pen = _Pen(Normalize(0, max(1, steps)) if len(curves.originals) == 1 else None, style)
         grid = iter(figure.subplots(rows, columns, squeeze=False).flat)
         if original is not None:
@@ -99,7 +100,7 @@ def plot_invariant_curves(
 
 
 def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
-    """Return the panels: the number of the root, the plane, and "uv", or "u" and "v" for a complex plane."""
+    """Return the panels: number of the root, plane, and "uv" for a real plane, "u" or "v" for a complex plane."""
     panels, number = [], 0
     for plane in curves.planes:
         number += 1
@@ -107,12 +108,12 @@ def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
             panels.append((str(number), plane, "uv"))
         else:
             panels += [(str(number), plane, "u"), (str(number), plane, "v")]
-            number += 1  # for the conjugate root
+            number += 1  # count the conjugate root
     return panels
 
 
 class _Pen:
-    """The style of dots: colored by step with a `scale` for a single orbit, otherwise by orbit."""
+    """The style of dots: colored by step if there is a `scale` (for a single orbit), by orbit if there is none."""
 
     def __init__(self, scale: Any, style: Style) -> None:
         self.scale, self.style = scale, style
@@ -163,7 +164,7 @@ def _draw_plane(
                 axes.plot(*rows.T, color=_FLOW, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
         normals = None
-        if orbit.cubic is not None:  # unit vectors across the curve as it appears, for the numbers beside the dots
+        if orbit.cubic is not None:  # unit normals of the drawn curve, along which the numbers are placed
             across, along = orbit.cubic.gradient(x[:_NUMBERED], y[:_NUMBERED])
             rows = np.stack([across, along * view.stretch], axis=1)
             length = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -173,9 +174,9 @@ def _draw_plane(
 
 Cloud = tuple[Floats, Floats]
 
-_SHARE = 0.85  # of the dots: orbits repeatedly come close to infinity
+_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
 _CUT = 0.7390851  # a direction in which no form with simple coefficients vanishes
-_MARGIN = 0.08  # of the width, on either side, for the numbers beside the dots
+_MARGIN = 0.08  # fraction of the width added on either side for the numbers beside the dots
 
 
 @dataclass(frozen=True)
@@ -217,13 +218,13 @@ class Rectangle:
         return x, y
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """Return the pieces (n, 2) of a curve in the panel."""
+        """Return the components (n, 2) of a curve in the panel."""
         return zero_curves(cubic.value, self.window)
 
 
 @dataclass(frozen=True)
 class Disc:
-    """The projective plane as a half sphere seen from above; its rim is at infinity; `length` is that of 45 degrees."""
+    """The projective plane as a half sphere seen from above; its rim is at infinity. `length` appears at 45 degrees."""
 
     length: float
     stretch: float = 1.0
@@ -253,7 +254,7 @@ class Disc:
         return x / radius, y / radius
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """Return the pieces (n, 2) of a curve in the panel, closed or from the rim to the rim."""
+        """Return the components (n, 2) of a curve in the panel; each is closed or joins two points of the rim."""
         turn = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
         pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), turn)
         return tuple(
@@ -274,9 +275,9 @@ def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
 
 
 def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
-    """Return the window of a plane: it contains most dots and, unless it is far away, the origin.
+    """Return the window of a plane: it contains most dots, and the origin unless this is far away from the dots.
 
-    If the cubic has a threefold symmetry, the origin is in the middle, and scales are equal along u and v.
+    If the cubic has a threefold symmetry, the origin is the center of the window, and u and v have the same scale.
     """
     clouds = clouds_of(plane, column)
     ranges = []

@@ -1,7 +1,7 @@
-"""The differential equation of a portrait: its direction, equilibria, separatrices and solutions as curves.
+"""The flow in a phase portrait: the direction of the vector field, equilibria, separatrices and solution curves.
 
-Curves are parametrized by their length, not by time: RK4 for x' = f/|f| with steps of a fraction of the window, so that
-they pass through poles of the solution and look smooth everywhere. Default initial points lie around an equilibrium.
+Curves are parametrized by arc length, not by time: RK4 solves x' = f/|f| with steps of a fixed fraction of the window.
+Hence curves pass through poles of the solution and look smooth. Default initial points lie around an equilibrium.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
-_MAX_DIMENSION = 20  # in which more than the origin and (1, ..., 1) are taken as starts
-_ZERO = 1e-7  # parts of eigenvalues, relative to the largest
-_ARROWS = 21  # along each side
-_FINE = 400  # steps of a curve across the window
-_MAX_STEPS = 6000  # fifteen times across
-_SLOW = 1e-4  # of the largest speed in the window: near an equilibrium curves stop
+_MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the origin and (1, ..., 1)
+_ZERO = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
+_ARROWS = 21  # number of arrows along each side of the window
+_FINE = 400  # number of steps of a curve that crosses the window
+_MAX_STEPS = 6000  # length of a curve: fifteen times the window
+_SLOW = 1e-4  # fraction of the largest speed in the window: curves stop near an equilibrium
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A point with f = 0 and the eigenvalues of the derivative f' there, with its eigenvectors as columns."""
+    """A point with f = 0, the eigenvalues of the derivative f' at this point, and the eigenvectors of f' as columns."""
 
     point: FloatArray
     values: NDArray[Any]
@@ -48,7 +48,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """The kind by the eigenvalues; a center of the linear part need not be a center of the field."""
+        """The kind given by the eigenvalues; a center of the linear part need not be a center of the vector field."""
         values, real = self.values, self.values.real
         least = _ZERO * max(float(np.abs(values).max()), _ZERO)
         if (np.abs(values) <= least).any():
@@ -63,7 +63,7 @@ class Equilibrium:
 
 
 def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
-    """Find the real equilibria to which Newton's method converges from sixty initial points, each once.
+    """Find the distinct real equilibria to which Newton's method converges from sixty initial points.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> sorted((equilibrium.point.round(6).tolist(), equilibrium.kind) for equilibrium in equilibria(pendulum))
@@ -79,11 +79,12 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
             if np.abs(value).max() <= bound:
                 nearest = np.round(x, 9)
                 point = nearest if np.abs(f(nearest)).max() <= bound else x
-                # Near a degenerate equilibrium Newton's method ends at slightly different points: keep one of them.
+                # Near a degenerate equilibrium Newton's method ends at slightly different points: keep only one of
+                # these points.
                 if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
                     all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria may not be isolated
+            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # f' may be singular
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
     return all_equilibria
@@ -91,10 +92,10 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The parts of the phase portrait of x' = f(x) that are drawn below the orbits of the map.
+    """The parts of the phase portrait of x' = f(x) that are drawn under the orbits of the map.
 
-    `places` and `arrows` (count, 2) are points of the plane and the direction there in units of the window;
-    `equilibria` are points (2,) with the word for their kind, `separatrices` and `solutions` curves (n, 2 or 3).
+    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f at these points in units of
+    the window. `equilibria` are points (2,) with their kinds; `separatrices` and `solutions` are curves (n, 2 or 3).
     """
 
     places: FloatArray
@@ -107,8 +108,8 @@ class Flow:
 def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) -> Flow:
     """Compute arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
 
-    `plane` are the indices of the variables along the axes. In higher dimensions the result is empty, since a point of
-    the picture has no single direction.
+    `plane` are the indices of the variables along the axes. In higher dimensions the result is empty, since f then does
+    not give a single direction at a point of the picture.
 
     >>> saddle = plane_flow(QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), (0, 1), ((-1, 1), (-1, 1)))
     >>> [kind for kind, _ in saddle.equilibria], len(saddle.separatrices)
@@ -116,7 +117,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     """
     if system.dim != 2 or sorted(plane) != [0, 1]:
         return Flow(np.zeros((0, 2)), np.zeros((0, 2)))
-    order = list(plane)  # its own inverse
+    order = list(plane)  # a permutation of (0, 1), hence its own inverse
     low, high = (np.array(side) for side in zip(*window, strict=True))
     f = VectorField(system)
     middles = (np.arange(_ARROWS) + 0.5) / _ARROWS
@@ -126,7 +127,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     with np.errstate(all="ignore"):
         arrows = np.where(length > 0, arrows / length, 0)
     all_equilibria = equilibria(system)
-    if len(all_equilibria) > 2**system.dim:  # more than conics have in common: they fill curves
+    if len(all_equilibria) > 2**system.dim:  # more than isolated equilibria can be (Bezout): they fill curves
         all_equilibria = []
     shown = [
         equilibrium
@@ -148,7 +149,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
 def projected_solutions(
     system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
-    """Return the solutions through the initial points of orbits, over the same time and around them, along some axes.
+    """Return the solutions through the initial points of orbits, for the same time and near the orbits, along `axes`.
 
     Raises InputError if an axis is the step.
     """
@@ -163,10 +164,10 @@ def projected_solutions(
 
 
 def solution(f: VectorField, start: FloatArray, box: Window, time: float | None = None) -> FloatArray:
-    """The solution through a start, as a curve (points, dim) that ends where it closes or leaves the box.
+    """Return the solution through `start` as a curve (points, dim) that ends when it closes or leaves the box.
 
-    `box` has a range for each variable, beyond which the curve may extend by the size of the box; `time` (negative for
-    the past) limits the time of the solution, by default not at all.
+    `box` has a range for each variable; a curve may leave each range by up to its length. `time` (negative for the
+    past) limits the time of the solution; None means no limit.
 
     >>> rotation = VectorField(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
     >>> circle = solution(rotation, np.array([1.0, 0.0]), ((-2, 2), (-2, 2)))
@@ -190,7 +191,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     for count in range(_MAX_STEPS):
         pace = speed(x)
         spent += step / pace if pace > 0 else np.inf
-        # Separatrices start slowly at their saddle: their time is not limited.
+        # A separatrix (no time limit) starts slowly at its saddle, so a small speed stops only long curves.
         slow = pace <= stop and (count > 2 * _FINE or not np.isinf(time or 0.0))
         if slow or (time is not None and spent > abs(time)) or np.abs((x - middle) / size).max() > 1.5:
             break
@@ -208,7 +209,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
 
 COUNT = 16
-_CENTERS = 4  # equilibria tried
+_CENTERS = 4  # maximal number of equilibria tried as centers of initial points
 _SIZES = 24
 _SHRINK = 0.8
 _STEPS = 300
@@ -221,9 +222,9 @@ def automatic_starts(
 ) -> FloatArray:
     """Choose sixteen initial points (16, dim) for a picture, deterministically; eps is half the time step.
 
-    They lie around the most stable equilibrium that is found: on a ray in the plane of these two variables or, if the
-    field is homogeneous (so that all points of a ray move alike), on a circle; other coordinates are shifted a little.
-    Their distance is the largest for which all orbits stay nearby for 300 steps.
+    The points lie around the most stable equilibrium that is found: on a ray in the plane of the variables `plane` or,
+    if f is homogeneous (so that all points of a ray move alike), on a circle; other coordinates are shifted a little.
+    Their distance from the equilibrium is the largest for which all orbits stay nearby for 300 steps.
 
     >>> lotka_volterra = QuadraticSystem.from_text(["x", "y"], ["x - x*y", "x*y - y"])
     >>> starts = automatic_starts(lotka_volterra, "1/20")
@@ -231,7 +232,7 @@ def automatic_starts(
     ((16, 2), True)
     """
     plane = [index for index in plane if index < system.dim][:2]
-    # Equilibria, those first at which the field expands least, then those without negative coordinates; the origin.
+    # Equilibria by increasing expansion, in a tie those without negative coordinates first; then the origin.
     order = sorted(
         equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
     )
@@ -241,13 +242,13 @@ def automatic_starts(
     others = [index for index in range(system.dim) if index not in plane]
     candidates: list[tuple[int, FloatArray]] = []
     for center in centers:
-        # Around the origin of a homogeneous field a smaller size is only a slower motion.
+        # For a homogeneous field, smaller initial points around the origin only move more slowly.
         is_scaled = system.is_homogeneous and not center.any()
         for k in range(1 if is_scaled else _SIZES):
             size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SHRINK**k
             starts = np.tile(center, (COUNT, 1))
             if is_scaled and len(plane) == 2:
-                angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
+                angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one to another
                 starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
                 starts[:, others] += size / 5
             else:

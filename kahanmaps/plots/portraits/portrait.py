@@ -1,6 +1,6 @@
 """A phase portrait: orbits projected to two or three axes, with a color for each point, drawn as dots or lines.
 
-The flow and level curves are drawn below the orbits, and a color bar beside them.
+The flow and level curves are drawn under the orbits, and a color bar beside the axes.
 """
 
 from __future__ import annotations
@@ -28,13 +28,11 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.comparison.functions import WatchedFunction
 
-_MAX_NEIGHBOURS = (
-    2000  # points: all pairs of points are compared; a curve through more points looks smooth without lines
-)
+_MAX_NEIGHBOURS = 2000  # points: all pairs are compared; a curve with more points looks smooth without lines
 _MIN_NEIGHBOURS = 8
-_OF_DEGREE_2 = 0.9  # of the points on a curve; of those of a cloud it is half
-# A gap in an orbit that has not filled its curve: in lengths of a usual line, and in diameters of the orbit. Points
-# that come in bunches, where the rotation is nearly rational, have long lines as well, but not so long ones.
+_OF_DEGREE_2 = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
+# A longer line is a gap in an orbit that does not fill its curve: in units of the median line, and of the diameter of
+# the orbit. If the rotation number is nearly rational, points form bunches joined by long lines, but shorter than this.
 _LONG, _WIDE = 8.0, 0.2
 STEP = "step"
 ORBIT = "orbit"
@@ -44,12 +42,12 @@ ORBIT = "orbit"
 class Portrait:
     """The data that a portrait shows.
 
-    `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
-    `window` have an entry for each axis. `values` (records, orbits) are the values of `value_label` that color the
-    points; None means a color for each orbit. `left_out` counts the points outside the window, `undefined` the points
-    of orbits that have not ended at which an axis or the color has a pole. `euler` are points (records, orbits, 2 or 3)
-    of the explicit Euler method, `levels` are curves, and `flow` is drawn below the points. `joined` has for each orbit
-    the pairs (count, 2) of records that are neighbours on its curve; None means successive records.
+    `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN for missing points; `labels` and `window`
+    have an entry for each axis. `values` (records, orbits) of the function `value_label` color the points; None means
+    one color for each orbit. `left_out` counts points outside the window. `undefined` counts points before the end of
+    an orbit at which an axis or the color has a pole. `euler` are points (records, orbits, 2 or 3) of the explicit
+    Euler method, `levels` are level curves, and `flow` is drawn under the points. `joined` contains for each orbit the
+    pairs (count, 2) of records that are neighbours on its curve; None means that successive records are joined.
     """
 
     points: FloatArray
@@ -65,7 +63,7 @@ class Portrait:
     joined: tuple[NDArray[np.int64] | None, ...] = ()
 
     def pairs(self, orbit: int) -> NDArray[np.int64]:
-        """The pairs (count, 2) of records of an orbit that a line joins."""
+        """Return the pairs (count, 2) of records of an orbit that are joined by lines."""
         joined = self.joined[orbit] if self.joined else None
         steps = np.arange(len(self.points))
         return np.stack([steps[:-1], steps[1:]], axis=1) if joined is None else joined
@@ -80,10 +78,11 @@ def portrait_of(
     euler: Trajectories | None = None,
     join: bool = False,
 ) -> Portrait:
-    """Project orbits to two or three axes: functions of the point, or the word "step".
+    """Project orbits to two or three axes, each of which is a function of the point or the word "step".
 
-    `color` is "orbit", "step" or a function of the point; the window is chosen if none is given. `join` looks for the
-    neighbours of each point on the curve of its orbit, unless an axis is the step. Raises InputError otherwise.
+    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. With `join`
+    the neighbours of each point on the curve of its orbit are computed, unless an axis is the step. Raises InputError
+    for other axes or colors.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
@@ -135,7 +134,7 @@ def _steps(trajectories: Trajectories) -> FloatArray:
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     """Return pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None if there is no curve.
 
-    Every point is joined to its nearest neighbour, and to the nearest point on its other side. For points that lie
+    Every point is joined to its nearest neighbour, and to the nearest point on the opposite side. For points that lie
     densely enough on a smooth curve, in any dimension and with any number of components, this reconstructs the curve
     (Dey and Kumar's NN-crust). NaN and points after the first 2000 are ignored.
 
@@ -146,7 +145,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     """
     rows = np.flatnonzero(~np.isnan(points).any(axis=1))[:_MAX_NEIGHBOURS]
     held = points[rows]
-    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a cycle repeats its points
+    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a periodic orbit repeats its points
     rows, held = rows[np.sort(first)], held[np.sort(first)]
     if len(rows) < _MIN_NEIGHBOURS:
         return None
@@ -156,7 +155,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     np.fill_diagonal(distances, np.inf)
     own = np.arange(len(rows))
     nearest = distances.argmin(axis=1)
-    # (q - p).(r - p) < 0: r is on the other side of p than its nearest neighbour q
+    # (q - p).(r - p) < 0: r and the nearest neighbour q of p are on opposite sides of p
     other = products[nearest] - products[own, nearest][:, None] - products + squares[:, None]
     beyond = np.where(other < 0, distances, np.inf)
     opposite = beyond.argmin(axis=1)
@@ -174,9 +173,9 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
 _ASPECT = 0.75
 _EULER = "#BBBBBB"
 _LEVEL: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
-_MAX_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
-_MAX_INITIAL = 40  # orbits, up to which the initial points are marked: more marks would cover the picture
-_MAX_MARKED = 60  # points of an orbit, up to which all of them have the mark of their orbit
+_MAX_JOINED = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
+_MAX_INITIAL = 40  # maximal number of orbits with marked initial points: more marks would cover the picture
+_MAX_MARKED = 60  # maximal number of points of an orbit that are all drawn as marks
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 _ARROWS: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
@@ -184,7 +183,7 @@ _SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 
 _SOLUTION = {"color": "#888888", "linewidth": 0.5}
 _FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
 _OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
-# No equilibrium and no orbit has this mark.
+# This mark is used for no equilibrium and for no orbit.
 _INITIAL: dict[str, Any] = {"marker": ">", "markersize": 3.5, "markeredgecolor": "black", "markeredgewidth": 0.5}
 _EQUILIBRIA: dict[str, dict[str, Any]] = {
     SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
@@ -198,9 +197,9 @@ _EQUILIBRIA: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait: dots or, with `lines`, joined orbits; `equal` gives both axes the same unit.
+    """Draw a portrait as dots or, with `lines`, as joined points; with `equal` both axes have the same unit.
 
-    `note` is printed above the right corner. Raises InputError if more than a million points are to be joined.
+    `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
     """
     count = portrait.points[..., 0].size
     if lines and count > _MAX_JOINED:
@@ -214,16 +213,16 @@ def plot_portrait(
         aspect = _ASPECT
         if in_space:
             aspect = 0.9 if portrait.values is None else 0.8
-        elif equal:  # height over width follows from the window and the color bar beside it
+        elif equal:  # the window and the color bar determine height over width
             (x0, x1), (y0, y1) = portrait.window
             aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if portrait.values is not None else 1.0)))
         figure = new_figure(style, aspect)
         if in_space:
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
-        handles: dict[str, Any] = {}  # of the legend, by their texts
+        handles: dict[str, Any] = {}  # legend text -> handle
         if portrait.flow is not None:
-            # Arrows and curves of the differential equation are drawn below the orbits, its equilibria above them.
+            # Arrows and curves of the differential equation are drawn under the orbits, equilibria on top of them.
             flow = portrait.flow
             if len(flow.places):
                 axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
@@ -241,7 +240,7 @@ def plot_portrait(
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
             handles["level curve"] = Line2D([], [], color=_LEVEL["colors"], linewidth=_LEVEL["linewidths"])
         if portrait.euler is not None:
-            # Lines continue to the edge of the plane; points far outside may be too large to draw.
+            # Lines continue beyond the edge of the window, but matplotlib cannot draw points too far outside.
             around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
             # Dashed, since colors are hard to distinguish in a gray copy.
             dashes: dict[str, Any] = {
@@ -256,12 +255,12 @@ def plot_portrait(
                     draw_points(axes, *orbit.T, color=_EULER, zorder=1.5, total=count)
             dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
             handles["explicit Euler"] = Line2D([], [], color=_EULER, **(dashes if lines else dot))
-        # Axes in space do not cut off what lies outside of them.
+        # Axes in space do not clip points outside of them.
         shown = _inside(portrait.points, portrait.window) if in_space else portrait.points
         if portrait.values is None and shown.shape[1] <= len(COLORS):
             _draw_few(axes, shown, lines, portrait)
         elif portrait.values is None:
-            # In the colors of the color map, the widest first, so that those inside stay visible.
+            # In the colors of the color map; the widest orbit is drawn first, so that the orbits inside stay visible.
             with np.errstate(all="ignore"):
                 extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
                 extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
@@ -303,7 +302,7 @@ def _draw_few(axes: Any, shown: FloatArray, lines: bool, portrait: Portrait) -> 
         if lines:
             pairs = portrait.pairs(k)
             path = orbit
-            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between the lines: plot takes many of them at once
+            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between lines, to draw all lines at once
                 ends = orbit[pairs]
                 path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
             axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **how)
@@ -321,7 +320,7 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Draw dots of the orbits in this order, or the lines that join them, in the colors of the values."""
+    """Draw the orbits in this order as dots or, with `lines`, as joined points, colored by the values."""
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
@@ -353,12 +352,11 @@ def _draw_colored(
 
 
 def _inside(shown: FloatArray, window: Window) -> FloatArray:
-    """Replace points outside the window by NaN."""
     return np.where(inside(shown, window)[..., None], shown, np.nan)
 
 
 def _make_room(axes: Any, window: Window | None) -> None:
-    """Format axes in space: light planes, few ticks, and labels inside the picture, which layouts do not ensure.
+    """Format axes in space: light planes, few ticks, and labels inside the picture (layouts would cut them off).
 
     With a window the box has the proportions of the window. matplotlib draws the edges of three planes only.
     """

@@ -1,4 +1,4 @@
-"""Float orbits to be drawn, and those of explicit Euler to compare them with."""
+"""Float orbits for pictures, of a map and of the explicit Euler method."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-MAX_POINTS = 4_000_000  # of all orbits together: beyond that a picture of single points shows nothing more
+MAX_POINTS = 4_000_000  # of all orbits together: more points would not be visible in a picture
 _MAX_NUMBERS = 40_000_000
-# Up to this work and number of steps, numpy finishes before compiled code is loaded.
+# Up to this work and this number of steps, numpy is faster than loading compiled code.
 _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 
 
@@ -31,7 +31,7 @@ _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 class Trajectories:
     """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,).
 
-    `ended` has sentences on the number of orbits that ended early, and the reason.
+    `ended` contains sentences that state how many orbits ended early, and why.
     """
 
     variables: tuple[str, ...]

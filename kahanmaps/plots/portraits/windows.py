@@ -13,23 +13,23 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
-_SHARE = 10.0  # percent of the points at either end that do not determine the range
-_REACH = 3.0  # ... unless they are within this multiple of the length that the others fill
-_UNBOUNDED, _SHOWN = 1e12, 10  # times the reach of the starts
+_SHARE = 10.0  # percent of the points at either end that are ignored if they are far away
+_REACH = 3.0  # "far away" is farther than this multiple of the range of all other points
+_UNBOUNDED, _SHOWN = 1e12, 10  # in units of the largest initial coordinate
 _MARGIN = 0.04
 _LARGEST = 1e307  # largest number that matplotlib can subtract
-_LOOKED_AT = 4000  # points, when axes are chosen
+_LOOKED_AT = 4000  # maximal number of points used in the choice of axes
 _VARIABLES = 16
-_CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
+_CELLS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
 
 
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     """Return a window for points (n, d) that ignores a few points far away.
 
-    Along each axis it is the range of all points. If some points of the outer tenth at either end are farther away than
-    three times the range of the others and of `starts`, it is this range, extended by half of its length at either end.
-    If this exceeds 10^12 times the range of the `starts`, since most orbits go to infinity, it is ten times the latter.
-    NaN is ignored; a range of length 0 is widened.
+    Along each axis the window is the range of all points. The inner range omits the outer tenth of the points and of
+    `starts` at either end. If a point is farther from it than three times its length, the window is the inner range,
+    extended by up to half its length at either end. If the window exceeds 10^12 times the largest coordinate of
+    `starts`, points beyond ten times this coordinate are omitted. NaN is ignored; a range of length 0 is widened.
 
     >>> window_of(np.array([[0.0], [1.0]]))
     ((-0.04, 1.04),)
@@ -46,7 +46,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
         low, high = main_range(column, required)
         if 0 < _UNBOUNDED * reach < max(-low, high):
             low, high = main_range(column[np.abs(column) <= _SHOWN * reach], required)
-        unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
+        unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in this unit nothing overflows
         margin = (high / unit - low / unit) * _MARGIN
         window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
     return tuple(window)
@@ -65,20 +65,20 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
     parts = [values]
     if required is not None and len(required := np.clip(required[np.isfinite(required)], -_LARGEST, _LARGEST)):
         parts.append(required)
-    # What all but a tenth at either end fill, in a unit in which nothing overflows.
+    # The inner range, without a tenth of the points at either end, in a unit in which nothing overflows.
     ends = [np.percentile(part, [_SHARE, 100 - _SHARE], method="nearest") / unit for part in parts]
     first, last = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
     low, high = float(values.min()) / unit, float(values.max()) / unit
     if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
         low = max(low, first - (last - first) / 2)
         high = min(high, last + (last - first) / 2)
-    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding, which is put in the middle
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # equal values up to rounding: center them
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
-    """Return low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
+    """Return low, high, low, high, ... as a window. Raises InputError unless each axis has two numbers, low < high."""
     if len(numbers) != 2 * axes:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
@@ -90,21 +90,21 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
 
 
 def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
-    """Return which points (..., d) lie in the window; NaN does not."""
+    """Return which points (..., d) lie in the window; NaN counts as outside."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
 def outside(points: FloatArray, window: Window) -> int:
-    """Return the number of points (n, d) outside the window; NaN does not count."""
+    """Return the number of points (n, d) outside the window, without counting NaN."""
     return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
-    """Return the `count` variables, in order, in whose plane or space the points (n, dim) spread most.
+    """Return the indices of the `count` variables along which the points (n, dim) spread most, in increasing order.
 
-    Each variable is scaled to its own window, and the boxes of a grid that contain a point are counted. Of equal
-    results the first is taken; of more than 16 variables only the first 16 that vary are compared.
+    Each variable is scaled to its own window. The choice maximizes the number of grid boxes that contain a point; in a
+    tie the first choice is taken. Of more than 16 variables only the first 16 non-constant ones are compared.
 
     >>> t = np.linspace(0, 6, 200)
     >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)
