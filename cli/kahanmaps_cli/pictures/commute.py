@@ -54,7 +54,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     grad H_1 = A grad H_0, which in general do not. Two systems have one panel.
 
     Blue arrows are steps of f, red ones steps of g. All points are exact: "closes exactly" means equality; the gap is
-    the distance in the maximum norm.
+    the largest Euclidean distance of corresponding points.
 
     Exit status: 0 done, 2 usage error, 3 some points are missing (indeterminacy points, or numbers too long).
     """
