@@ -69,7 +69,7 @@ class Samples:
     def check(self, needed: int = 0) -> None:
         """Raise Stop if `needed` further values exceed the limit or the budget is spent."""
         if self.taken + needed > self.max_samples:
-            raise Stop(f"{self.taken} values were requested and {needed} more are needed, the limit is {self.max_samples}")
+            raise Stop(f"{self.taken} values requested and {needed} more needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
             raise Stop(f"work limit reached after {self.taken} values; raise --effort")
 
