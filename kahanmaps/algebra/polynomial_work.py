@@ -36,7 +36,7 @@ def minpoly_units(length: int) -> float:
 
 
 def roots_units(length: int, roots: int = 0) -> float:
-    """Return the units for the roots modulo a 61-bit prime: powers of t modulo the polynomial and its factors."""
+    """Return the units of finding the roots of a polynomial of this length modulo a 61-bit prime."""
     return 150 * (product_units(length, length) + product_units(roots, roots) * roots.bit_length())
 
 

@@ -91,7 +91,7 @@ def choice(name: str, help: str, words: Sequence[str]) -> Option:
 
 
 def point(name: str, help: str, most: int | None = None) -> Option:
-    """Return an option whose value is a text of numbers separated by commas: a list would mean several values."""
+    """Return an option whose value is a text of numbers separated by commas; a list would be several values."""
 
     def read(value: Any) -> str:
         numbers = parse_point(_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))

@@ -435,18 +435,18 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     """Normalize an integral I: return (alpha I + beta)/gamma that tends to a nonconstant function of x as eps -> 0.
 
     If a map conserves I, it conserves (alpha I + beta)/gamma for all functions alpha, beta, gamma of eps and the
-    parameters, and a search returns an arbitrary one of these. If its limit is a constant, like that of the published
-    integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, its values hide how well it is conserved, since errors
-    of H are multiplied by a power of eps. So the constant is subtracted, and this power divided out.
+    parameters, and a search returns an arbitrary one of these. If I = const + eps^k H + ..., like the published
+    integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, the values of I hide how well the map conserves H, since
+    errors of H are multiplied by eps^k. So the constant is subtracted, and eps^k divided out.
 
     Args:
         function: an integral I of a map that approximates a flow, for every eps; a rational function of the variables,
-            the symbols and eps, its last variable.
+            the parameters that stay letters and, last, eps.
         dim: the number of variables.
 
     Returns:
         The normalized integral, exact; I itself if it is constant. The limit is in lowest terms; its numerator and
-        denominator have coprime integer coefficients and positive leading ones. Normalized integrals do not change.
+        denominator have coprime integer coefficients and positive leading ones. A normalized I is returned unchanged.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> result = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
@@ -470,8 +470,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         p, q = p / common, q / common
         if degree_in(p, dim) or degree_in(q, dim):
             break
-        # P/Q = p/q + O(eps) with constants p and q; without their content, p and q are not divisible by eps. The loop
-        # ends since I depends on x: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds the power in q P - p Q.
+        # P/Q = p/q + O(eps), and p and q do not contain x. They are not divisible by eps, since P and Q have no such
+        # content. The loop ends since I depends on x: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds that in
+        # q P - p Q.
         P, alpha, beta = q * P - p * Q, q * alpha, q * beta - p * gamma
         if P.is_zero():
             return unchanged

@@ -387,7 +387,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with rational coefficients for float computations. Raises InputError if a coefficient is not real."""
+        """The map with rational approximations of its coefficients. Raises InputError if one is not real."""
         return self
 
     @property

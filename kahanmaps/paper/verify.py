@@ -511,8 +511,8 @@ class Verifier:
         """Return an outcome that refutes the claim on the input of a control; the last outcome if none refutes it.
 
         One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
-        object exists or that it has a certain rank counts as refuted if several points do not show it. For m >= 5 ranks
-        and map steps of controls over Q take minutes, since nothing cancels.
+        object exists or that it has a certain rank counts as refuted if several points do not show it. For m >= 5
+        points modulo p come first: over Q a rank or a step of a control takes minutes, since nothing cancels.
         """
         at_one = claim.kind is ClaimKind.EQUAL
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)

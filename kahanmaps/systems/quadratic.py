@@ -269,7 +269,7 @@ class SystemOver:
 
     @cached_property
     def _derivatives(self) -> list[Any]:
-        """The derivatives of f' by each variable; f''(v) as their sum costs a third of a product with the tensor."""
+        """The partial derivatives of f'. Their linear combination f''(v) takes a third of a product with the tensor."""
         n, entries = self.dim, self.tensor.entries()
         with self.field.working():
             return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]

@@ -37,11 +37,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
 
     Linear algebra gives all g with [f, g] = 0; the next powers of eps give further equations, which are solved over Q;
-    then every solution is proved, or supported at random points. No solution is discarded at any stage, so the list is
-    complete unless the output says otherwise. If a parameter is an algebraic number of degree r, the search is made for
-    the equivalent system over Q, of r times the dimension, whose variables are the coefficients of 1, t, ...; the
-    default is then --shape linear in every dimension. 0, f and -f always commute and are left out; --json has them,
-    marked in "trivial".
+    then it is proved for each solution that the maps commute, or tested at random points. No solution is discarded at
+    any stage, so the list is complete unless the output says otherwise. If a parameter is an algebraic number t of
+    degree r, the search is made for the system over Q of the coefficients x_i in x = x_0 + x_1 t + ... + x_(r-1)
+    t^(r-1); the default is then --shape linear in every dimension. 0, f and -f always commute and are left out; --json
+    has them, marked in "trivial".
 
     Exit status: 0 the list is complete, 2 usage error, 3 undecided: there may be more.
     """

@@ -44,7 +44,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer divisible by all primes at which lifts of start and image may be imprimitive, and small primes."""
+        """An integer divisible by small primes, and by those modulo which the start or image may have only zeros."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant

@@ -67,7 +67,7 @@ class Splitting:
             self.planes: tuple[Plane, ...] = tuple(planes)
             rows = field.convert_matrix(S).tolist()
             m = form.m
-            # x is the sum over the planes of `matrix` times the coefficients of u, followed by those of v.
+            # x is the sum of M w over the planes: M is an entry of `_matrices`, w the coefficients of u, then of v.
             self._matrices = []
             for basis in bases:
                 columns = []
