@@ -231,6 +231,16 @@ def test_a_level_of_three_lines_and_a_fixed_point_have_no_curve():
     assert {plane.kind for plane in geometry(load("paper_m2"), [0, 0, 0, 0], "1/10").planes} == {PeriodKind.FIXED}
 
 
+@pytest.mark.parametrize("name", ["paper_m2", "paper_m3_irreducible"])
+def test_the_translation_lies_on_the_printed_curve_which_has_the_printed_discriminant(name):
+    start = [fmpq(1, 2), fmpq(-1, 3), fmpq(2, 5), fmpq(1), fmpq(3, 4), fmpq(-2, 7)][: load(name).dim]
+    for plane in geometry(name, start, eps="1/10").planes:
+        a2, a4, a6 = 9 + 3 * plane.gamma, 48 * plane.gamma, 64 * plane.gamma**2
+        x, y = plane.point
+        assert y**2 == x**3 + a2 * x**2 + a4 * x + a6
+        assert plane.discriminant == 16 * (a2**2 * a4**2 - 4 * a4**3 - 4 * a2**3 * a6 + 18 * a2 * a4 * a6 - 27 * a6**2)
+
+
 def test_the_curves_over_a_number_field_are_conjugate_and_tend_to_j_0():
     large, small = (
         geometry(load("paper_m3_irreducible"), [1, 2, 3, 4, 5, 6], eps).planes[0] for eps in ("1/10", "1/10000")
