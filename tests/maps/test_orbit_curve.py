@@ -238,3 +238,16 @@ def test_a_map_with_algebraic_parameters_is_refused():
     for call in (km.geometry, lambda *arguments: km.plot.rotation(system, [1, 2, 3], [2, 2, 3], eps="1/10")):
         with pytest.raises(InputError, match="expected rational parameters"):
             call(system, [1, 2, 3], "1/10")
+
+
+@pytest.mark.parametrize("start", [["1/3", "2/5"], [2, 3], ["1/5", -7]])
+def test_the_printed_discriminant_and_components_are_those_of_the_printed_cubic(start):
+    curve = km.geometry("mcmillan", start)
+    data = curve.to_json()
+    A, B = Fraction(data["A"]), Fraction(data["B"])
+    discriminant = -16 * (4 * A**3 + 27 * B**2)
+    assert Fraction(data["discriminant"]) == discriminant
+    assert f"discriminant\t{discriminant}," in str(curve)
+    largest = float(max(abs(A) ** Fraction(1, 2), abs(B) ** Fraction(1, 3)))  # so that roots are of size 1
+    roots = np.roots([1, 0, float(A) / largest**2, float(B) / largest**3])
+    assert data["components"] == (2 if np.sum(np.abs(roots.imag) < 1e-9) == 3 else 1)
