@@ -39,7 +39,6 @@ TERMS = {2: 6, 3: 3, 4: 3}
 START_UP = 5  # seconds of loading, which do not count
 MOST_RUNS = 200
 HERE = Path(__file__).parent
-sys.set_int_max_str_digits(0)  # coordinates have thousands of digits
 LAST = "w0"  # the homogeneous coordinate
 
 
@@ -266,6 +265,7 @@ def main() -> None:
     parser.add_argument("--programs", nargs="*", choices=list(QUESTIONS), default=list(QUESTIONS))
     parser.add_argument("--venv", type=Path)
     options = parser.parse_args()
+    sys.set_int_max_str_digits(0)  # coordinates have thousands of digits
     with tempfile.TemporaryDirectory() as folder:
         programs = install(options.venv or Path(folder))
         for program in options.programs:
