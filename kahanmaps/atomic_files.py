@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import NamedTemporaryFile, TemporaryFile
 from typing import IO, Any
 
 
@@ -20,13 +18,16 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: its
     content is written at the end of the block. Raises OSError that names `path`.
     """
+    from shutil import copyfileobj  # imported here: tempfile and shutil load modules for random numbers and compression
+    from tempfile import NamedTemporaryFile, TemporaryFile
+
     with named(path):
         if os.path.exists(path) and not os.path.isfile(path):
             with TemporaryFile() as buffer:
                 yield buffer
                 buffer.seek(0)
                 with open(path, "wb") as stream:
-                    shutil.copyfileobj(buffer, stream)
+                    copyfileobj(buffer, stream)
             return
         target = resolved(path)
         os.umask(umask := os.umask(0o022))  # the umask cannot be read without setting it

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from functools import wraps
-from html import escape
 from importlib import import_module
 from types import FunctionType, ModuleType
 from typing import Any
@@ -214,4 +213,6 @@ def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
 
 
 def _bar(message: str) -> str:
+    from html import escape
+
     return f'<progress style="width: 6em"></progress> <span>{escape(message)}</span>'

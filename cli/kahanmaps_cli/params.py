@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps import internals as lib
+import kahanmaps.internals as lib  # `from kahanmaps import` would first look for a public name and suggest others
 from kahanmaps.errors import ExpressionError, InputError, quoted
 from kahanmaps_cli.screen.terminal import color_option
 

@@ -9,7 +9,6 @@ each operation is slower, but quotients with many factors stay small. Work is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from hashlib import sha256
 from itertools import chain
 from threading import Lock
 from typing import Any
@@ -362,6 +361,8 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     counted like a new computation, so that no verdict depends on earlier computations. For the same reason a failure is
     cached together with its budget: with another budget, the work done before the failure would differ.
     """
+    from hashlib import sha256
+
     count_work(sum(map(len, chain(*rows))))  # the work of writing the text that is hashed
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, before = field.budget, counted()

@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import import_module, resources
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -333,7 +333,7 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
         generated = family_member(name)
         if generated is not None:
             return generated[1], generated[0], None
-        folder = resources.files("kahanmaps.documents").joinpath("catalog")
+        folder = Path(__file__).parent / "catalog"
         for candidate in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and candidate.is_file():
                 return _TOML.document(candidate.read_bytes(), name), name, None

@@ -7,7 +7,6 @@ in the text. The colors are named ones that are legible on light and dark backgr
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from collections.abc import Sequence
 from textwrap import fill
@@ -36,7 +35,9 @@ def on_terminal() -> bool:
 
 def columns() -> int:
     """The width of the terminal."""
-    return max(20, shutil.get_terminal_size().columns)
+    from shutil import get_terminal_size  # loads four modules for compression
+
+    return max(20, get_terminal_size().columns)
 
 
 def is_colored() -> bool:

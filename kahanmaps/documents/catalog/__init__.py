@@ -22,11 +22,9 @@ file was made). Degrees, growth, verdict and relations are also given as structu
 
 from __future__ import annotations
 
-import difflib
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,8 +32,6 @@ from kahanmaps.documents.families import family_member
 from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
-
     from kahanmaps.documents.files import SystemFile
 
 
@@ -44,6 +40,7 @@ class UnknownSystem(InputError, KeyError):
 
 
 _ENDING = ".toml"
+_FOLDER = Path(__file__).parent
 _LIST_THEM = "'kahanmaps systems' lists the catalogue"
 
 
@@ -53,7 +50,7 @@ def names() -> tuple[str, ...]:
     >>> "lorenz" in names()
     True
     """
-    return _names_in(resources.files(__name__))
+    return _names_in(_FOLDER)
 
 
 def map_names() -> tuple[str, ...]:
@@ -62,10 +59,10 @@ def map_names() -> tuple[str, ...]:
     >>> "lyness" in map_names()
     True
     """
-    return _names_in(resources.files(__name__).joinpath("maps"))
+    return _names_in(_FOLDER / "maps")
 
 
-def _names_in(folder: Traversable) -> tuple[str, ...]:
+def _names_in(folder: Path) -> tuple[str, ...]:
     entries = (entry.name for entry in folder.iterdir())
     return tuple(sorted(name.removesuffix(_ENDING) for name in entries if name.endswith(_ENDING)))
 
@@ -77,12 +74,11 @@ def text_of(name: str) -> bytes:
         from kahanmaps.documents.toml_text import to_toml
 
         return to_toml(generated[1], ("variables",), ("catalog", "system", "integrals", "density")).encode()
-    folder = resources.files(__name__)
     if name in map_names():
-        return folder.joinpath("maps", name + _ENDING).read_bytes()
+        return (_FOLDER / "maps" / (name + _ENDING)).read_bytes()
     if name not in names():
         raise KeyError(name)
-    return folder.joinpath(name + _ENDING).read_bytes()
+    return (_FOLDER / (name + _ENDING)).read_bytes()
 
 
 def titles() -> dict[str, tuple[int, str]]:
@@ -200,7 +196,9 @@ def _unknown(name: str) -> InputError:
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())
-    close = difflib.get_close_matches(normalized, known_names, 3)
+    from difflib import get_close_matches
+
+    close = get_close_matches(normalized, known_names, 3)
     # Otherwise suggest names that contain the given text, e.g. "volterra".
     close += [other for other in known_names if len(normalized) > 2 and normalized in other and other not in close]
     close = close[:3]

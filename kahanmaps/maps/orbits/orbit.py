@@ -45,7 +45,9 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _MAX_SINGLE_STEPS = 10**13  # more single steps would take years
-_MIN_STEPS = 3  # up to this number of steps, a search for a normal form takes longer than it saves
+# Up to these numbers of steps, no normal form is searched for: an exact search takes longer than it saves. In floating
+# point and with balls it also makes the points more accurate.
+_MAX_STEPS_WITHOUT_SEARCH = {"exact": 20, "float": 3, "ball": 3, "mod": DOUBLING_FROM["mod"] - 1}
 _LONG_INPUT = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
 _MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
 _FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
@@ -637,7 +639,7 @@ def _normal_form(
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
     if method is None:  # do not search for a normal form if the search takes longer than the orbit
-        max_steps = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _MIN_STEPS
+        max_steps = _MAX_STEPS_WITHOUT_SEARCH[arithmetic.kind]
         numbers = [eps, *(rational(entry) for entry in request.start)]
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
             max_steps = max(max_steps, 24)

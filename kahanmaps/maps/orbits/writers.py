@@ -12,13 +12,11 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import csv_line, spreadsheet_safe
@@ -182,6 +180,8 @@ def _arrow_lines(steps: Sequence[int], x: Any) -> str:
             result = compute.replace_with_mask(result, odd, arrow.array(list(map(repr, column[odd].tolist()))))
         return result
 
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(min(2, processors())) as pool:
         columns = list(pool.map(texts, x.T.copy()))
     numbers = arrow.array(steps, arrow.int64()).cast(arrow.string())
@@ -228,6 +228,8 @@ class Npz(Writer):
         if self._rows is None:
             name = getattr(self.stream, "name", "")  # the temporary file is next to this file, on the same disk
             folder = os.path.dirname(name) if isinstance(name, str) and name.startswith(os.sep) else None
+            from tempfile import TemporaryFile
+
             self._rows = TemporaryFile(dir=folder)  # noqa: SIM115 (closed by `end`)
         self._rows.write(x.astype("<f8").tobytes())
         self._count, self._every = self._count + len(x), every
