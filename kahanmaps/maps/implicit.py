@@ -333,8 +333,8 @@ class ElementaryMap(Map):
         return IntegerSteps(equation.exponents, equation.terms)
 
     def __repr__(self) -> str:
-        name, eps = type(self).__name__, self.field.format(self.eps)
-        return f"{name}({', '.join(self.variables)}; eps={eps}, over {self.field})"
+        eps = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
+        return f"{type(self).__name__}({', '.join(self.variables)}; {eps}over {self.field})"
 
 
 def det_of(name: str) -> str:

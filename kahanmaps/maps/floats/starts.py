@@ -62,6 +62,8 @@ def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
         pieces = value.split(":")
         if len(pieces) not in (1, 3):
             raise InputError(f"found {quoted(value)} for {name}, expected LOW:HIGH:N or a number: -1:1:20")
+        if pieces[2:] and pieces[2].strip() == "1":
+            raise InputError(f"found 1 point from LOW to HIGH for {name}, expected at least 2: type {name}={pieces[0]}")
         low, high = parse_number(pieces[0]), parse_number(pieces[-2] if len(pieces) == 3 else pieces[0])
         values[name] = np.array([to_float(low)]) if len(pieces) == 1 else _values(low, high, pieces[2], dim)
         if (size := prod(map(len, values.values()))) * dim > MAX_NUMBERS:
