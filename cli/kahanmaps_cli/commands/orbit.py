@@ -89,7 +89,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     --integral adds a column with the values of a function.
 
-    Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
+    Exit status: 0 done, 2 usage error, 3 stopped early (indeterminacy point, digit limit, ...), 130 interrupted.
     """
     _require_consistent(options)
     output = None if output == "-" else output
