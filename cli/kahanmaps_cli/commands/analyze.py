@@ -39,12 +39,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
     SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
-    has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; integrals and densities in
-    closed form with their proofs; which integrals of the flow the map conserves, deforms or loses; genus and base
-    points of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their recurrence;
-    heights; symmetries and reversing symmetries; commuting systems; singularity confinement; and whether the system
-    belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps
-    all results hold for every eps.
+    has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; formulas of integrals and
+    densities with their proofs; which integrals of the flow the map conserves, deforms or loses; genus and base points
+    of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their recurrence; heights;
+    symmetries and reversing symmetries; commuting systems; singularity confinement; and whether the system belongs to
+    the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps all
+    results hold for every eps.
 
     Each statement begins with its status. Formulas are "proved" or "supported" as identities in x and eps. A growth of
     degrees is "derived" if it follows from the measured singularity patterns. What was computed modulo primes or along

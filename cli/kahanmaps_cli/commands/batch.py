@@ -93,14 +93,14 @@ def command() -> None:
     help='Skip systems that cannot be read, and list them in the database (as on_error = "skip" in the spec).',
 )
 @click.option(
-    "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
+    "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more than N tasks (default 1000000)."
 )
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
     help="Use the workers of a dask scheduler that you trust: tls://host:port, tcp://host:port or its file.",
 )
-@click.option("--worker-python", metavar="PATH", help="Python of those workers (default: the path of this one).")
+@click.option("--worker-python", metavar="PATH", help="Path of Python on those workers (default: as here).")
 @click.option(
     "--group-seconds",
     type=click.FloatRange(0, 86400),
@@ -462,7 +462,7 @@ def show(key: str, db: str, as_json: bool) -> None:
     "--parquet", "form", flag_value="parquet", help="Write the table of --csv with types (needs pyarrow, -o)."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
-@click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions: the same in each run.")
+@click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions, which differ between runs.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
     """Export the results of a database in the order of the plan.
@@ -543,7 +543,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
       kahanmaps batch merge all.db part1.db part2.db
       kahanmaps batch merge A.db B.db
 
-    Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
+    Exit status: 0 done, 2 usage error, 3 some task has different results in two databases (those of TARGET are kept).
     """
     for source in sources:  # check all sources before an empty target is created
         lib.Store.open(source, readonly=True).close()

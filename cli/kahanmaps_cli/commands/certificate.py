@@ -31,7 +31,7 @@ _CHECKERS = ("rocq", "gp", "sympy")  # as in kahanmaps.certificates.certificate,
     "all of these); or all that a search proves: integrals, density, poisson, darboux, symmetry, equivalence (to a "
     "system of the catalogue); or entropy: positive entropy of a planar map.",
 )
-@click.option("--all", "everything", is_flag=True, help="Certify all of these claims, also those of searches.")
+@click.option("--all", "everything", is_flag=True, help="Certify all these claims, including the results of searches.")
 @integral_option("Certify that this function of x and eps is an integral.", into="integrals")
 @click.option(
     "--commute",
@@ -73,8 +73,8 @@ def command(system: str | None, checker: str, output: str | None, as_json: bool,
     symmetry, and proves it by identities of polynomials, without kahanmaps. gp and python print true for each identity,
     and end with a status that is not 0 if one does not hold.
 
-    A line on standard error says how many claims and bytes it has, and estimates the seconds that the program takes to
-    check it. --json prints these numbers, and the text unless it goes to FILE.
+    A line on standard error says how many claims and bytes the certificate has, and estimates the seconds that the
+    program takes to check it. --json prints these numbers, and the text unless it goes to FILE.
 
     Exit status: 0 the certificate is written, 1 a claim is false, 2 usage error.
     """

@@ -39,7 +39,8 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
 
     All points of P^n over GF(P) are followed, or random points where there are more than two million (above dimension 6
-    the limit halves with each dimension). Without --eps two values are tried for each prime, as one may be special.
+    the limit halves with each dimension). Without --eps two values of eps are tried for each prime, as one may be
+    special.
 
     A point is indeterminate if the map is not defined there; common factors of the forms of the map are divided out
     first (up to dimension 6). A point is pre-indeterminate if its orbit reaches an indeterminate point, and preperiodic

@@ -38,8 +38,8 @@ _MAX_VALUES = 200_000  # maximal number of values of integrals
     "'known' for all known integrals and H."
 )
 @click.option("--radius", type=ExactNumber(), metavar="R", help="Count the orbits that leave max |x_i| <= R.")
-@click.option("--method", type=click.Choice(("generic", "normal-form")), help="By default chosen automatically.")
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Affects only the speed, not the numbers.")
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Method (default: automatic).")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel; it affects only the speed.")
 @click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.output_options
@@ -56,15 +56,16 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble henon_heiles --grid q1=-1:1:40,q2=-1:1:40 \\
           --eps 1/20 --steps 500 --radius 100 --integral known
 
-    The drift of an orbit is the largest |I(x_n) - I(x_0)|; the table has its distribution over the completed orbits.
-    An orbit escapes at the first step with max |x_i| > R, and may return, since Kahan maps have poles.
+    The drift of an orbit is the largest |I(x_n) - I(x_0)|; the table has its distribution over the completed orbits. An
+    orbit escapes at the first step with max |x_i| > R, and may return later, since Kahan maps are unbounded near
+    indeterminacy points.
 
     FILE.npy is an array (records, orbits, dimension): record k holds the points after
     k*K steps, where K is the value of --every. It grows during the computation and is
     valid at all times, also after Ctrl-C. It contains NaN for orbits that ended early. Initial points in text files are
     exact numbers, separated by commas or blanks; # begins a comment, and the first line may name the columns.
 
-    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
     _require_consistent(system, options)
     file = opt.load_system(system, {**options, "quiet": quiet})

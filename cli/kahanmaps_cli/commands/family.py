@@ -134,8 +134,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
       kahanmaps family show hamiltonian.toml
       kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
-    For a SYSTEM of kind [hamiltonian] or [system] the command searches for a matrix A with A^T J = J A and
-    A Hess(H) = Hess(H) A^T that is not a multiple of I: such an A makes it a member.
+    For a SYSTEM of kind [hamiltonian] or [system] the command searches for a matrix A with A^T J = J A and A Hess(H) =
+    Hess(H) A^T that is not a multiple of I: such an A makes the system a member.
     """
     file = opt.load_system(system, options)
     recognised, member = None, file.member
@@ -279,9 +279,9 @@ def associated(
       kahanmaps check-commute paper_m3_irreducible \\
           associated/paper_m3_irreducible-p-t.toml
 
-    If a factor g of chi is irreducible of degree 2 or more, the list also contains those over Q[t]/g that have the
-    other sign only at one root t of g: systems with the parameter t, "root of g". All other associated systems are
-    conjugates of these, or belong to products of their matrices B_s.
+    If a factor g of chi is irreducible of degree 2 or more, the list also contains the associated systems over Q[t]/g
+    whose sign at one root t of g differs from all other signs: systems with the parameter t, "root of g". All other
+    associated systems are conjugates of these, or belong to products of their matrices B_s.
     """
     file, member = _member(system, parameters)
     written: dict[str, lib.SystemFile] = {}
@@ -350,7 +350,7 @@ def associated(
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
-    """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
+    """Write a quadratic system over the algebra K = Q[t]/(chi) as a system over Q.
 
     \b
       kahanmaps family tensor euler_top --algebra 't^2-2' -o top.toml

@@ -42,7 +42,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     help="Search for discrete Darboux polynomials up to this degree instead; with --flow for those of the differential "
     "equation.",
 )
-@click.option("--flow", is_flag=True, help="Integrals of the differential equation, compared with those of the map.")
+@click.option("--flow", is_flag=True, help="Compare integrals of the differential equation with those of the map.")
 @click.option(
     "--max-degree",
     type=click.IntRange(1, 20),
@@ -51,7 +51,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 )
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Search for integrals of the map of SYSTEM: their number, closed forms P/Q, and proofs.
+    """Search for integrals of the map of SYSTEM: their number, formulas P/Q, and proofs.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -67,15 +67,15 @@ def command(system: str | None, **options: Any) -> int:
 
     Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals follows from
     theorems and from orbits, measured modulo primes; every formula is verified as an identity. If there is no formula
-    in x alone, it may contain x~, the image of x, x~~, the image of x~, and so on. --flow reports which integrals of
-    the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
+    in x alone, a formula may contain x~, the image of x, x~~, the image of x~, and so on. --flow reports which
+    integrals of the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
     combination of values; with --json one record per line. Values at which the map does not exist are listed at the
     end.
 
     Exit status: 0 if every integral that theorems give or orbits show has a formula, 2 for a usage error, 3 if some
-    have none, orbits were not measured, or the work or time limit was too small.
+    have no formula, orbits were not measured, or the work or time limit was too small.
     """
     require_one_form(options)
 

@@ -74,8 +74,8 @@ def command(system: str | None, **options: Any) -> int:
     combination of values; with --json one record per line. Values at which the map does not exist are listed at the
     end.
 
-    Exit status: 0 if all orbits whose growth was decided grow alike, 2 for a usage error, 3 if none was decided, they
-    differ, or the work limit was reached.
+    Exit status: 0 if all orbits whose growth was decided grow alike, 2 for a usage error, 3 if no growth was decided,
+    the orbits differ, or the work limit was reached.
     """
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)

@@ -45,7 +45,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|.
 
-    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early or --seconds stopped the run.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early or --seconds stopped the run.
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]

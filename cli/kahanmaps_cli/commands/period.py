@@ -55,8 +55,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     translation.
 
     --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
-    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps also these levels in each plane
-    at a rational root of chi, as values of the integral h/(1 + eps^2 D).
+    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps it also prints these levels in
+    each plane at a rational root of chi, as values of the integral h/(1 + eps^2 D).
 
     Exit status: 0 if the period was found, or proved not to exist, 2 for a usage error or a system without a normal
     form, 3 if undecided, or if the orbit cannot be continued at some point.

@@ -35,7 +35,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     The exceptional hypersurfaces, those that the map contracts, are computed over Q, together with the zeros of the
     denominator det(I - eps f'(x)). Their images are followed along power series modulo large primes. A singularity is
-    confined if after some steps the image is a hypersurface again. Without --eps two values are tried and compared.
+    confined if after some steps the image is a hypersurface again. Without --eps two values of eps are tried and
+    compared.
 
     "ranks" are the dimensions of the images after 1, 2, ... steps, and "pole orders" the multiplicities with which
     they lie in the hyperplane at infinity, called Z, for the first steps. Confined singularities are evidence for

@@ -97,9 +97,9 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --section conclusions  # geometry of the level sets
 
     The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
-    proved by symbolic expansion, by a formal proof or exactly, or supported at random points over GF(p) with a bound on
-    the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with
-    sums over all eigenvalues are only supported.
+    proved by symbolic expansion, by a formal proof or by an exact computation, or supported at random points over GF(p)
+    with a bound on the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m >
+    6 claims with sums over all eigenvalues are only supported.
 
     --certificate FILE also writes the proofs of `kahanmaps certificate` for the member: its integrals, invariant
     measure and Poisson tensor. (`kahanmaps certificate SYSTEM --commute associates` is about its commuting maps.)

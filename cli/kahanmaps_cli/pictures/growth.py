@@ -127,8 +127,8 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     coordinates over a common denominator. Each eps has a color; marks are heights, lines are fits. Results
     read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
-    Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
-    work limit was reached before all orbits were finished (the picture is written).
+    Exit status: 0 done, 2 usage error, 3 some orbit met an indeterminacy point, or
+    the work limit was reached before all orbits were finished (the picture is written).
     """
     require_heights(options)
     file: lib.SystemFile | None = None
