@@ -21,7 +21,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.following import StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
     BUDGET_SPENT,
     CONFINED,
@@ -215,7 +215,7 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
     form = HypersurfaceForm(x**2 - 2 * z**2, False, None)
     for seed, units in enumerate((1e6, 1e6, 1e6, 1e6, 0)):
-        limits = Range(4, 4, 4, Budget(units), 4)
+        limits = StepLimits(4, 4, 4, Budget(units), 4)
         outcome = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
         if units == 0:
             assert (outcome.status, outcome.note) == (UNDECIDED, BUDGET_SPENT)

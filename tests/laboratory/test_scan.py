@@ -21,7 +21,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.scan import scan as scan_module
 from kahanmaps.laboratory.scan.lift import lift_conjugate_points, lift_hypersurfaces, lift_linear
-from kahanmaps.laboratory.scan.members import Scanned
+from kahanmaps.laboratory.scan.members import ScannedFamily
 from kahanmaps.laboratory.scan.modular_components import find_components
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirm, _continues_as, scan
@@ -76,7 +76,7 @@ def test_everything_is_confirmed_and_nothing_is_left(three_lines):
 
 def test_a_wrong_condition_is_not_confirmed():
     file = parse_system(THREE_LINES)
-    family = Scanned(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
+    family = ScannedFamily(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))

@@ -46,8 +46,8 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     forms = [f.B] if size == 2 else f.Q
     entries = (((i, j, k)[-size:], form[j, k]) for i, form in enumerate(forms) for j in range(n) for k in range(n))
     table: Table = {index: value for index, value in entries if value != 0}
-    base, scales, numbers = _balance(table, n)
-    for permutation in _signed_permutations_of(numbers, n, sign, budget):
+    base, scales, numbers = _balance_coefficients(table, n)
+    for permutation in _search_signed_permutations(numbers, n, sign, budget):
         if permutation is None or len(matrices) >= MAX_FOUND:
             return matrices, False
         S = fmpq_mat(n, n)
@@ -60,12 +60,12 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     return matrices, True
 
 
-def _balance(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[tuple[int, ...], int]]:
+def _balance_coefficients(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[tuple[int, ...], int]]:
     """Return coprime integers b, the exponents of each b in the scales e_i, and the coefficients in y_i = e_i x_i.
 
     A coefficient in y is represented by its sign times an index of its absolute value, which is irrational in general.
     """
-    base = _coprime_base(part for c in table.values() for part in (abs(c.p), c.q))
+    base = _coprime_base(integer for c in table.values() for integer in (abs(c.p), c.q))
     # In y the coefficient has the logarithm log |c| + row . log e, with e the shortest least-squares solution.
     logarithms = [[fmpq(_exponent(c.p, b) - _exponent(c.q, b)) for b in base] for c in table.values()]
     rows = [[fmpq((index[0] == k) - index[1:].count(k)) for k in range(n)] for index in table]
@@ -73,36 +73,36 @@ def _balance(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[t
     if base:
         M, L = fmpq_mat(rows), fmpq_mat(logarithms)
         G = M.transpose() * M
-        right = M.transpose() * L
+        right_side = M.transpose() * L
         for j in range(len(base)):
-            system = fmpq_mat([[*(G * G).tolist()[i], right[i, j]] for i in range(n)])
-            special = next(v for v in reversed(nullspace(QQ, system)) if v[-1] != 0)
-            shortest = G * fmpq_mat(n, 1, [w / special[-1] for w in special[:-1]])
+            equations = fmpq_mat([[*(G * G).tolist()[i], right_side[i, j]] for i in range(n)])
+            special_solution = next(v for v in reversed(nullspace(QQ, equations)) if v[-1] != 0)
+            shortest_solution = G * fmpq_mat(n, 1, [w / special_solution[-1] for w in special_solution[:-1]])
             for i in range(n):
-                scales[i][j] = shortest[i, 0]
+                scales[i][j] = shortest_solution[i, 0]
         logarithms = (L + M * fmpq_mat(scales)).tolist()
-    sizes: dict[tuple[fmpq, ...], int] = {}
+    size_indices: dict[tuple[fmpq, ...], int] = {}
     numbers = {}
     for (index, c), row in zip(table.items(), logarithms, strict=True):
-        numbers[index] = sizes.setdefault(tuple(row), len(sizes) + 1) * (1 if c > 0 else -1)
+        numbers[index] = size_indices.setdefault(tuple(row), len(size_indices) + 1) * (1 if c > 0 else -1)
     return base, scales, numbers
 
 
 def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
     """Return pairwise coprime integers > 1, no perfect powers, such that all given ones are products of powers."""
-    waiting, base = list(integers), list[fmpz]()
-    while waiting:
-        number = waiting.pop()
+    remaining_integers, base = list(integers), list[fmpz]()
+    while remaining_integers:
+        number = remaining_integers.pop()
         if number == 1:
             continue
-        other = next((b for b in base if b.gcd(number) > 1), None)
-        if other is not None:
-            common = other.gcd(number)
-            base.remove(other)
-            waiting += [number // common, common, other // common]
+        base_element = next((b for b in base if b.gcd(number) > 1), None)
+        if base_element is not None:
+            divisor = base_element.gcd(number)
+            base.remove(base_element)
+            remaining_integers += [number // divisor, divisor, base_element // divisor]
         elif number.is_perfect_power():
             k = next(k for k in range(2, number.bit_length() + 1) if number.root(k) ** k == number)
-            waiting.append(number.root(k))
+            remaining_integers.append(number.root(k))
         else:
             base.append(number)
     return sorted(base)
@@ -116,7 +116,7 @@ def _exponent(number: fmpz, b: fmpz) -> int:
     return count
 
 
-def _signed_permutations_of(
+def _search_signed_permutations(
     numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
     """Yield the signed permutations that preserve a table of numbers, as images and signs; None at the work limit."""
@@ -130,11 +130,11 @@ def _signed_permutations_of(
         for last in range(n)
     ]
 
-    def fits(p: list[int], s: list[int]) -> bool:
-        for checked, index in enumerate(equations[len(p) - 1], 1):
+    def is_consistent(p: list[int], s: list[int]) -> bool:
+        for checked_count, index in enumerate(equations[len(p) - 1], 1):
             image = numbers.get(tuple(p[k] for k in index), 0) * math.prod(s[k] for k in index)
             if image != numbers.get(index, 0) * sign:
-                count_work(2 + 1.5 * checked)
+                count_work(2 + 1.5 * checked_count)
                 return False
         count_work(2 + 1.5 * len(equations[len(p) - 1]))
         return True
@@ -145,9 +145,9 @@ def _signed_permutations_of(
         elif len(p) == n:
             yield list(zip(p, s, strict=True))
         else:
-            choices = (([*p, image], [*s, t]) for image in range(n) if image not in p for t in (1, -1))
-            for images, signs in choices:
-                if fits(images, signs):
+            extensions = (([*p, image], [*s, t]) for image in range(n) if image not in p for t in (1, -1))
+            for images, signs in extensions:
+                if is_consistent(images, signs):
                     yield from extend(images, signs)
 
     return extend([], [])
