@@ -128,18 +128,18 @@ def _if_linear(facts: _Facts) -> _Verdict | None:
     return _Verdict("linear", sentence, ground=Certainty.PROVED)
 
 
-def _if_contradictory(facts: _Facts) -> _Verdict | None:
-    if not (sentences := contradictions(facts.result)):
+def _if_inconsistent(facts: _Facts) -> _Verdict | None:
+    """Return "undecided" if results contradict each other, or if the map is not birational.
+
+    The degrees and periodic orbits of a map that is not birational are no evidence.
+    """
+    if sentences := contradictions(facts.result):
+        sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capitalize(facts.integrals_text)}."
+    elif facts.result.defect and facts.growth is not Growth.ZERO:
+        sentence = f"{_capitalize(facts.result.defect)}; {facts.growth_text}."
+    else:
         return None
-    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capitalize(facts.integrals_text)}."
     return _Verdict("undecided", sentence, ground=None)
-
-
-def _if_not_birational(facts: _Facts) -> _Verdict | None:
-    """Return "undecided" for maps that are not birational; their degrees and periodic orbits are no evidence."""
-    if not facts.result.defect or facts.growth is Growth.ZERO:
-        return None
-    return _Verdict("undecided", f"{_capitalize(facts.result.defect)}; {facts.growth_text}.", ground=None)
 
 
 def _if_linearisable(facts: _Facts) -> _Verdict | None:
@@ -219,7 +219,7 @@ def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
 
 # Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
-    *(_if_nowhere_defined, _if_linear, _if_contradictory, _if_not_birational, _if_linearisable, _if_entropy_positive),
+    *(_if_nowhere_defined, _if_linear, _if_inconsistent, _if_linearisable, _if_entropy_positive),
     *(_if_orbits_on_curves, _verdict_by_growth),
 )
 

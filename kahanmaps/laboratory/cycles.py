@@ -124,6 +124,8 @@ def cycle_census(
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
+    import numpy as np
+
     map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
     exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
@@ -131,12 +133,32 @@ def cycle_census(
     space = _ProjectiveMap(map_, exact_eps, prime)
     census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
-        return _of_all_points(space, census, progress)
-    random_seed = derive_seed(seed, map_.subject, exact_eps, prime)
-    return _of_samples(space, census, samples or DEFAULT_SAMPLES, steps, random_seed, progress)
+        return _count_all_points(space, census, progress)
+    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.subject, exact_eps, prime))
+    vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # zero vectors among them are no points
+    initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
+    census = replace(census, examined=initial_points.shape[1])
+    step, lengths, stopped = 0, dict[int, int](), False
+    indeterminate = [0, 0]  # initial points without image, and points whose orbits end later
+    try:
+        while step < steps and points.shape[1]:
+            progress(f"p = {prime}: step {step} of at most {steps}")
+            batches = range(0, points.shape[1], space.batch_size)
+            points = np.hstack([space.images(points[:, k : k + space.batch_size]) for k in batches])
+            is_indeterminate, is_periodic = ~points.any(axis=0), (points == initial_points).all(axis=0)
+            indeterminate[step > 0] += int(is_indeterminate.sum())
+            step += 1
+            if is_periodic.any():
+                lengths[step] = int(is_periodic.sum())
+            is_open = ~(is_indeterminate | is_periodic)
+            points, initial_points = points[:, is_open], initial_points[:, is_open]
+    except TimeLimit:
+        stopped = True
+    census = replace(census, stopped=stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
+    return replace(census, indeterminate=indeterminate[0], pre_indeterminate=indeterminate[1])
 
 
-def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[str], None]) -> Census:
+def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[str], None]) -> Census:
     import numpy as np
 
     p, count = census.prime, census.points
@@ -145,9 +167,9 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     place_values = p ** np.arange(census.dim + 1)
     image = np.full(count + 1, count)  # `count` stands for a point without image
     try:
-        for low in range(0, count, space.portion):
+        for low in range(0, count, space.batch_size):
             progress(f"p = {p}: the images of {low} of {count} points")
-            image_codes = place_values @ space.images(codes[low : low + space.portion] // place_values[:, None] % p)
+            image_codes = place_values @ space.images(codes[low : low + space.batch_size] // place_values[:, None] % p)
             image[low : low + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
     except TimeLimit:
         return replace(census, stopped=True)
@@ -171,32 +193,6 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **counts_by_kind)
 
 
-def _of_samples(
-    space: _ProjectiveMap, census: Census, samples: int, steps: int, seed: int, progress: Callable[[str], None]
-) -> Census:
-    import numpy as np
-
-    drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
-    start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
-    examined, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
-    try:
-        while done < steps and start.shape[1]:
-            progress(f"p = {census.prime}: step {done} of at most {steps}")
-            portions = range(0, points.shape[1], space.portion)
-            points = np.hstack([space.images(points[:, low : low + space.portion]) for low in portions])
-            is_indeterminate, is_periodic = ~points.any(axis=0), (points == start).all(axis=0)
-            ended[done > 0] += int(is_indeterminate.sum())
-            done += 1
-            if is_periodic.any():
-                lengths[done] = int(is_periodic.sum())
-            goes_on = ~(is_indeterminate | is_periodic)
-            points, start = points[:, goes_on], start[:, goes_on]
-    except TimeLimit:
-        stopped = True
-    census = replace(census, stopped=stopped, examined=examined, steps=done, lengths=lengths)
-    return replace(census, indeterminate=ended[0], pre_indeterminate=ended[1], open=start.shape[1])
-
-
 class _ProjectiveMap:
     """A map at one eps on P^n over GF(p); points are columns of n + 1 residues whose last nonzero residue is 1."""
 
@@ -205,7 +201,7 @@ class _ProjectiveMap:
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
-        self.portion = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
+        self.batch_size = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
         # For each map of a composition: its forms, or a matrix whose maximal minors are its forms, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
@@ -220,7 +216,7 @@ class _ProjectiveMap:
             self.maps.append((by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """Return the images of at most `portion` points; a point without image has a column of zeros."""
+        """Return the images of at most `batch_size` points; a point without image has a column of zeros."""
         p = self.prime
         for by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}

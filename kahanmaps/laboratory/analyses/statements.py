@@ -236,7 +236,29 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
     elif structures is not None and structures.proved:
         yield Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}")
     if result.file.is_quadratic:
-        yield from _hyperplanes(result)
+        # The hyperplanes that are invariant under the flow, grouped by the action of the map on them.
+        system, eps = result.file.system, result.eps
+        planes_by_image: dict[str, list[str]] = {}
+        for darboux in affine_darboux(system).functions:
+            image = "not birational" if result.defect else "invariant"
+            if eps is not None and not result.defect:
+                image = under_map(system, darboux.function, eps)
+            planes_by_image.setdefault(image, []).append(f"{format_polynomial(darboux.function)} = 0")
+        kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
+        for image, planes in planes_by_image.items():
+            subject_text, it = f"the {kind} {planes[0]} is", "it"
+            if len(planes) > 1:
+                subject_text, it = f"the {kind}s {', '.join(planes[:-1])} and {planes[-1]} are", "them"
+            at_eps = f" for the flow; at eps = {eps} the map"
+            endings = {
+                "invariant": ", for flow and map",
+                "contracted": f"{at_eps} contracts {it}: det(I + eps f'(x)) is 0 there",
+                "undefined": f"{at_eps} is not defined on {it}: det(I - eps f'(x)) is 0 there",
+                "undecided": f" for the flow; deciding the image of {it} under the map at eps = {eps} "
+                "would take too long",
+                "not birational": " for the flow",
+            }
+            yield Statement(PROVED, f"{subject_text} invariant{endings[image]}")
     if result.normal_form is not None and result.normal_form.text:
         text = f"belongs to the commuting family: {result.normal_form.text}"
         centre = f"({', '.join(map(format_number, result.centre))})" if result.centre and any(result.centre) else ""
@@ -251,30 +273,6 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
         form = result.normal_form.form
         text = f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), one block for"
         yield Statement(PROVED, f"{text} each root t")
-
-
-def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the hyperplanes that are invariant under the flow, grouped by the action of the map on them."""
-    system, eps = result.file.system, result.eps
-    planes_by_image: dict[str, list[str]] = {}
-    for darboux in affine_darboux(system).functions:
-        image = "not birational" if result.defect else "invariant"
-        if eps is not None and not result.defect:
-            image = under_map(system, darboux.function, eps)
-        planes_by_image.setdefault(image, []).append(f"{format_polynomial(darboux.function)} = 0")
-    kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
-    for image, planes in planes_by_image.items():
-        subject_text, it = f"the {kind} {planes[0]} is", "it"
-        if len(planes) > 1:
-            subject_text, it = f"the {kind}s {', '.join(planes[:-1])} and {planes[-1]} are", "them"
-        endings = {
-            "invariant": ", for flow and map",
-            "contracted": f" for the flow; at eps = {eps} the map contracts {it}: det(I + eps f'(x)) is 0 there",
-            "undefined": f" for the flow; at eps = {eps} the map is not defined on {it}: det(I - eps f'(x)) is 0 there",
-            "undecided": f" for the flow; deciding the image of {it} under the map at eps = {eps} would take too long",
-            "not birational": " for the flow",
-        }
-        yield Statement(PROVED, f"{subject_text} invariant{endings[image]}")
 
 
 def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:

@@ -9,7 +9,7 @@ from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.family.tensor import TensorStructure, tensor_structure
+from kahanmaps.family.tensor import tensor_structure
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses import statements
 from kahanmaps.laboratory.analyses.step import AnalysisContext, AnalysisStep, MapKinds
@@ -17,7 +17,7 @@ from kahanmaps.laboratory.analysis_result import AnalysisResult
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities, with_factors
+from kahanmaps.laboratory.preserve.densities import find_densities, with_factors
 from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation, sparse_relations
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map, with_limit
@@ -59,11 +59,6 @@ def _normal_form_json(result: AnalysisResult) -> dict[str, Any]:
         data = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
         data |= {**attributes(result.normal_form, "A", "T"), **attributes(result, "centre")}
     return {"family": (result.normal_form.text or None) if result.normal_form is not None else None, "member": data}
-
-
-def _algebra(context: AnalysisContext, **_: Any) -> TensorStructure | None:
-    """Return an algebra larger than Q over which f is defined; None if f has a normal form, which says more."""
-    return None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
 
 
 def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
@@ -125,13 +120,6 @@ def _find_poisson_tensors(context: AnalysisContext, effort: Budget, **options: A
     return with_brackets(search, context.integrals, effort)
 
 
-def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
-    """Search for densities: polynomials, or products of powers of factors of the integrals."""
-    return with_factors(
-        find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
-    )
-
-
 def _find_limits(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
     """Return the limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
     if context.result.integrals is None:
@@ -166,7 +154,10 @@ ANALYSES = (
     ),
     AnalysisStep(
         "a larger algebra",
-        _algebra,
+        # An algebra larger than Q over which f is defined, unless f has a normal form, which says more.
+        lambda context, **_: (
+            None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
+        ),
         key="tensor",
         json=lambda result: {
             "algebra": result.tensor and attributes(result.tensor, "text", "C", "rank", chi="chi_text")
@@ -235,7 +226,16 @@ ANALYSES = (
         key="poisson",
     ),
     AnalysisStep(
-        "densities", _densities, "measure", statements.of_densities, MapKinds.ALL, weight=0.25, requires=("integrals",)
+        "densities",
+        # Polynomials, or products of powers of factors of the integrals.
+        lambda context, **options: with_factors(
+            find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
+        ),
+        "measure",
+        statements.of_densities,
+        MapKinds.ALL,
+        weight=0.25,
+        requires=("integrals",),
     ),
     AnalysisStep("the flow", _find_limits, "the flow", statements.of_flow, MapKinds.OVER_Q, weight=0.06, key="flow"),
     AnalysisStep(

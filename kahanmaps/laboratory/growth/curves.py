@@ -108,7 +108,7 @@ class Line:
             # With a guess that is too small the terms of the margin disagree, and the length is doubled.
             while curve is None:
                 self._require_budget()
-                curve = self._reconstruct_curve(self._image_series(equation, length), length)
+                curve = self._image_by_series(equation, length)
                 if curve is None and length == max_length:
                     raise too_large
                 length = min(2 * length, max_length)
@@ -149,8 +149,8 @@ class Line:
         if self._budget.is_spent:
             raise Stopped(Ended.BUDGET, f"work limit reached at iterate {self.steps + 1}; raise --effort")
 
-    def _image_series(self, equation: Equation, length: int) -> list[nmod_poly]:
-        """Return the coordinates of the next curve as power series, to `length` terms."""
+    def _image_by_series(self, equation: Equation, length: int) -> list[nmod_poly] | None:
+        """Return the image from power series with `length` terms, or None if these are too few to be certain."""
         X = [entry.truncate(length) for entry in self._X]
         values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
         count_work(row_units(equation, length))
@@ -163,10 +163,8 @@ class Line:
             raise ZeroDivisionError("the point t = 0 of the line has no image")
         count_work(series_units(length) + len(x) * product_units(length, length))
         inverse = denominator.inverse_series_trunc(length)
-        return [entry.mul_low(inverse, length) for entry in x]
-
-    def _reconstruct_curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
-        """Return the polynomials (X : Z) with X/Z = x, or None if x has too few terms to be certain."""
+        x = [entry.mul_low(inverse, length) for entry in x]
+        # The polynomials (X : Z) with X/Z = x.
         for _ in range(2):
             numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)

@@ -222,7 +222,18 @@ def lift_conjugate_points(
         # If the points are not conjugate, the relation of the first coordinate is reducible.
         if equations is None or len(equations[0].factor()[1]) > 1:
             continue
-        solution_sets = {p: _solve_modulo(equations, p) for p in point_sets}
+        size = len(names)
+        leading_coefficients = [
+            equation[tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))]
+            for k, equation in enumerate(equations)
+        ]
+        # Modulo a prime that divides a leading coefficient no solutions are counted: some of them are at infinity.
+        solution_sets = {
+            p: set[tuple[int, ...]]()
+            if any(int(c.p) % p == 0 for c in leading_coefficients)
+            else {tuple(map(int, x)) for x in solutions(equations, range(size), [0] * size, GF(p))}
+            for p in point_sets
+        }
         primes = tuple(p for p in sorted(solution_sets) if solution_sets[p] and solution_sets[p] <= point_sets[p])
         if len(primes) >= _MIN_PRIMES and sum(map(bool, solution_sets.values())) <= len(primes) + 1:
             lifted_points.append((equations, primes))
@@ -264,13 +275,3 @@ def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits:
     # Any residues have a relation of a height with (2 height + 1)^size about the modulus; it must be much smaller.
     is_small = (2 * height + 1) ** size << spare_bits <= modulus
     return [int(c) for c in shortest] if is_small and shortest[-1] else None
-
-
-def _solve_modulo(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
-    """Return the solutions modulo a prime; no solutions if the prime divides a leading coefficient."""
-    variable_count = len(equations)
-    for k, equation in enumerate(equations):
-        leading_monomial = tuple(int(equation.degrees()[k]) * (i == k) for i in range(variable_count))
-        if int(equation[leading_monomial].p) % p == 0:
-            return set()
-    return {tuple(map(int, x)) for x in solutions(equations, range(variable_count), [0] * variable_count, GF(p))}

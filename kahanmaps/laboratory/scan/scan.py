@@ -177,17 +177,11 @@ def scan(
     components.sort(key=lambda component: component.degrees[::-1])
     # Growth that is measured on one component; other components with the same degrees share it if more degrees agree.
     shared_growths: dict[Degrees, DegreeGrowth] = {}
-
-    def add_growth(component: Component, _: Callable[[], None]) -> Component:
-        if component.degrees[-1] < 0 or _continues_as(component, shared_growths.get(component.degrees), family):
-            return component
-        growth = _measure_growth(component, family, budget)
-        if growth is not None and growth.growth not in _MEASURED_ON_EACH:
-            shared_growths[component.degrees] = growth
-        return replace(component, growth=growth)
-
     components, omitted_count = run.apply(
-        components, "growth on component", 1 if analysis is None else _STAGE_ENDS[3], add_growth
+        components,
+        "growth on component",
+        1 if analysis is None else _STAGE_ENDS[3],
+        lambda component, _: run.with_growth(component, shared_growths),
     )
     run.omit(omitted_count, f"the growth on {omitted_count} components")
     growth_kinds = {component.degrees: Growth.UNKNOWN for component in components}
@@ -368,25 +362,33 @@ class _ScanRun:
         )
         return list(chain.from_iterable(components)), skipped_count
 
+    def with_growth(self, component: Component, shared_growths: dict[Degrees, DegreeGrowth]) -> Component:
+        """Add the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees.
 
-def _measure_growth(component: Component, family: ScannedFamily, budget: Budget) -> DegreeGrowth | None:
-    """Return the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees."""
-    growth = None
-    if component.values is not None:
-        member, eps_of_member = family.member(component.values)
-        for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
-            growth = degree_growth(
-                member.map,
-                eps_of_member,
-                seed=family.seed + attempt,
-                effort=Budget(min(_GROWTH_UNITS, budget.left)),
-                steps=STEPS,
-                enclosed=False,
-            )
-            if growth.growth is not Growth.UNKNOWN:
-                break
-    is_typical = growth is not None and _agree(growth.degrees, (1, *component.degrees))
-    return growth if is_typical else _fit_growth(component, family)
+        Nothing is added if the component shares the growth of another one, or if an iterate is nowhere defined.
+        """
+        family = self.family
+        if component.degrees[-1] < 0 or _continues_as(component, shared_growths.get(component.degrees), family):
+            return component
+        growth = None
+        if component.values is not None:
+            member, eps_of_member = family.member(component.values)
+            for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
+                growth = degree_growth(
+                    member.map,
+                    eps_of_member,
+                    seed=family.seed + attempt,
+                    effort=Budget(min(_GROWTH_UNITS, self.budget.left)),
+                    steps=STEPS,
+                    enclosed=False,
+                )
+                if growth.growth is not Growth.UNKNOWN:
+                    break
+        if growth is None or not _agree(growth.degrees, (1, *component.degrees)):
+            growth = _fit_growth(component, family)
+        if growth is not None and growth.growth not in _MEASURED_ON_EACH:
+            shared_growths[component.degrees] = growth
+        return replace(component, growth=growth)
 
 
 def _fit_growth(

@@ -149,8 +149,26 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         raise InputError(f"found the algebraic number {file.map.root}, expected a system over the rational numbers")
     fields = modified_fields(file.system, order, progress)
     series = () if file.hamiltonian is None else modified_hamiltonian(file.hamiltonian, order)
-    integrals = tuple(_continue(integral, fields, order) for integral in _flow_integrals(file, progress))
-    return ModifiedField(file, order, fields, series, integrals)
+    # Independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search.
+    context, candidates = ring(file.variables), []
+    if file.hamiltonian is not None:
+        candidates.append(file.hamiltonian.H)
+    functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
+    progress("searching for integrals of the flow")
+    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
+    for function in functions:
+        if function is not None and function.denominator.is_constant():
+            candidates.append(function.numerator.project_to_context(context))
+    integrals, gradients = list[fmpq_mpoly](), list[list[fmpq]]()
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
+    for candidate in candidates:
+        integral = primitive_part(candidate - candidate[(0,) * file.dim])[1]
+        gradient_at_point = [evaluate(p, QQ, point) for p in gradient(integral)]
+        is_new = rank(QQ, fmpq_mat([*gradients, gradient_at_point])) > len(gradients)
+        if is_new and _derivative(file.system.rhs, [integral])[0].is_zero():
+            integrals.append(integral)
+            gradients.append(gradient_at_point)
+    return ModifiedField(file, order, fields, series, tuple(_continue(I, fields, order) for I in integrals))
 
 
 def modified_fields(
@@ -201,29 +219,6 @@ def _derivative(vector: Field, functions: Sequence[fmpq_mpoly]) -> Field:
     return tuple(
         sum((v * d for v, d in zip(vector, gradient(function), strict=True)), 0 * function) for function in functions
     )
-
-
-def _flow_integrals(file: SystemFile, progress: Callable[[str], None]) -> list[fmpq_mpoly]:
-    """Return independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search."""
-    context, candidates = ring(file.variables), []
-    if file.hamiltonian is not None:
-        candidates.append(file.hamiltonian.H)
-    functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
-    progress("searching for integrals of the flow")
-    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
-    for function in functions:
-        if function is not None and function.denominator.is_constant():
-            candidates.append(function.numerator.project_to_context(context))
-    f, integrals, gradients = file.system.rhs, list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
-    for candidate in candidates:
-        primitive_integral = primitive_part(candidate - candidate[(0,) * file.dim])[1]
-        gradient_at_point = [evaluate(p, QQ, point) for p in gradient(primitive_integral)]
-        is_new = rank(QQ, fmpq_mat([*gradients, gradient_at_point])) > len(gradients)
-        if is_new and _derivative(f, [primitive_integral])[0].is_zero():
-            integrals.append(primitive_integral)
-            gradients.append(gradient_at_point)
-    return integrals
 
 
 def _continue(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:

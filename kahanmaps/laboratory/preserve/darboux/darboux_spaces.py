@@ -86,7 +86,23 @@ class DarbouxSpace:
             vectors = full_rows
         descending_rows = echelon([vector[::-1] for vector in vectors], prime)
         basis = [vector[::-1] for vector in reversed(descending_rows)]
-        return cls(dim, degree, _sparsest_elements(basis, dim, degree, prime) if len(basis) == 2 else basis)
+        if len(basis) != 2:
+            return cls(dim, degree, basis)
+        # The two sparsest elements of the pencil are among those that lack a monomial of the pencil.
+        P, Q = basis
+        degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
+        count_work(len(P) + 2 * len(degrees))
+        support = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
+        zero_sets: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
+        for k in support:
+            zero_sets.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
+        supports = [([k for k in support if k not in zeros], min(zeros)) for zeros in zero_sets.values()]
+        elements = []
+        for terms, zero in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
+            element = [(Q[zero] * p - P[zero] * q) % prime for p, q in zip(P, Q, strict=True)]
+            inverse = pow(element[terms[-1]], -1, prime)
+            elements.append([c * inverse % prime for c in element])
+        return cls(dim, degree, elements)
 
     @property
     def support(self) -> tuple[tuple[int, ...], ...]:
@@ -109,24 +125,6 @@ class DarbouxSpace:
         factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
         rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
         return echelon([row for row in rows if row is not None], prime)
-
-
-def _sparsest_elements(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
-    """Return the two sparsest elements of a pencil, among the elements that lack a monomial of the pencil."""
-    degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
-    P, Q = basis
-    count_work(len(P) + 2 * len(degrees))
-    support = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
-    zero_sets: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
-    for k in support:
-        zero_sets.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
-    supports = [([k for k in support if k not in zeros], min(zeros)) for zeros in zero_sets.values()]
-    members = []
-    for terms, zero in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
-        member = [(Q[zero] * p - P[zero] * q) % prime for p, q in zip(P, Q, strict=True)]
-        inverse = pow(member[terms[-1]], -1, prime)
-        members.append([c * inverse % prime for c in member])
-    return members
 
 
 def darboux_spaces(

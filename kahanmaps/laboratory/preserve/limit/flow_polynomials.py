@@ -378,7 +378,27 @@ class _Line:
 
         Returns None if there are too many choices.
         """
-        p, extactic = self.flow.prime, self._extactic_factor()
+        # The common factor, on the line, of the minors of the matrix of Taylor coefficients. The minors have as many
+        # rows as the rank at random points; the first rows are independent there. Replacing the last row by the next
+        # one gives the derivative of a minor along the flow; the common factor of minor and derivative contains all
+        # invariant factors (and multiple ones). Columns are combined at random. If there are more columns than the
+        # rank, the two minors use different combinations, and share the factor common to all minors.
+        p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
+        matrices = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
+        if size < self.count:
+            matrices[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
+        # The i-th derivative of a monomial has the degree of the monomial plus i (deg f - 1).
+        degree_step = max(0, flow.degree - 1)
+        degree_bound = sum(self.degree + order * degree_step for order in range(size)) + degree_step
+        values: list[tuple[int, ...]] = []
+        for t in range(degree_bound + 1):
+            *rows, last_row, next_row = flow.series(self.at(t), self.degree, size + 1, self.support)
+            minors = (
+                multiply(matrix([*rows, row], p), M) for row, M in zip((last_row, next_row), matrices, strict=True)
+            )
+            values.append(tuple(map(determinant, minors)))
+        minor, other_minor = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
+        extactic = minor.gcd(other_minor)
         for P in self.known:
             factor = self.restricted(P)
             while (common_factor := extactic.gcd(factor)).degree() > 0:
@@ -428,31 +448,6 @@ class _Line:
             basis.append([int(L[k]) for k in range(factor.degree())])
         coefficients = combine(list(zip(*basis, strict=True)), values, p)
         return [row[k : k + self.count] for row in coefficients for k in range(0, len(row), self.count)]
-
-    def _extactic_factor(self) -> nmod_poly:
-        """Return the common factor, on the line, of the minors of the matrix of Taylor coefficients.
-
-        The minors have as many rows as the rank at random points; the first rows are independent there. Replacing the
-        last row by the next one gives the derivative of a minor along the flow; the common factor of minor and
-        derivative contains all invariant factors (and multiple ones). Columns are combined at random. If there are more
-        columns than the rank, the two minors use different combinations, and share the factor common to all minors.
-        """
-        p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
-        matrices = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
-        if size < self.count:
-            matrices[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
-        # The i-th derivative of a monomial has the degree of the monomial plus i (deg f - 1).
-        degree_step = max(0, flow.degree - 1)
-        degree_bound = sum(self.degree + order * degree_step for order in range(size)) + degree_step
-        values: list[tuple[int, ...]] = []
-        for t in range(degree_bound + 1):
-            *rows, last_row, next_row = flow.series(self.at(t), self.degree, size + 1, self.support)
-            minors = (
-                multiply(matrix([*rows, row], p), M) for row, M in zip((last_row, next_row), matrices, strict=True)
-            )
-            values.append(tuple(map(determinant, minors)))
-        minor, other_minor = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
-        return minor.gcd(other_minor)
 
     def restricted(self, P: fmpq_mpoly) -> nmod_poly:
         """Return the restriction of a polynomial to the line, as a polynomial in t."""
