@@ -165,30 +165,32 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
     # The code of a point has the coordinates as digits. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
     place_values = p ** np.arange(census.dim + 1)
-    image = np.full(count + 1, count)  # `count` stands for a point without image
+    images = np.full(count + 1, count)  # `count` stands for a point without image
     try:
-        for low in range(0, count, space.batch_size):
-            progress(f"p = {p}: the images of {low} of {count} points")
-            image_codes = place_values @ space.images(codes[low : low + space.batch_size] // place_values[:, None] % p)
-            image[low : low + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
+        for k in range(0, count, space.batch_size):
+            progress(f"p = {p}: the images of {k} of {count} points")
+            image_codes = place_values @ space.images(codes[k : k + space.batch_size] // place_values[:, None] % p)
+            images[k : k + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
     except TimeLimit:
         return replace(census, stopped=True)
-    final = image
+    iterates = images
     for _ in range(count.bit_length()):  # doubles the number of steps until all orbits have reached their cycles
-        final = final[final]
-    cyclic = np.setdiff1d(final, [count])
+        iterates = iterates[iterates]
+    cyclic_points = np.setdiff1d(iterates, [count])
     lengths: Counter[int] = Counter()
-    following, is_seen = image.tolist(), bytearray(count)
-    for point in cyclic.tolist():
+    successors, is_seen = images.tolist(), bytearray(count)
+    for point in cyclic_points.tolist():
         length = 0
         while not is_seen[point]:
             is_seen[point] = 1
-            point = following[point]
+            point = successors[point]
             length += 1
         lengths[length] += length > 0
-    indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, final))
+    indeterminate, ending = (int((points[:count] == count).sum()) for points in (images, iterates))
     counts_by_kind = dict[str, Any](
-        indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
+        indeterminate=indeterminate,
+        pre_indeterminate=ending - indeterminate,
+        preperiodic=count - ending - len(cyclic_points),
     )
     return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **counts_by_kind)
 
@@ -205,20 +207,20 @@ class _ProjectiveMap:
         # For each map of a composition: its forms, or a matrix whose maximal minors are its forms, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
-            matrix, by_minors = factor.equation.polynomials(), False
+            matrix, is_by_minors = factor.equation.polynomials(), False
             if factor.equation.explicit is not None:
                 matrix = factor.equation.explicit.polynomials()
-            elif map_.dim <= MAX_FACTORED and not (reduced := homogeneous_map(factor)).factor.is_constant():
-                matrix = [reduced.forms]
+            elif map_.dim <= MAX_FACTORED and not (projective_map := homogeneous_map(factor)).factor.is_constant():
+                matrix = [projective_map.forms]
             else:
-                by_minors = True
+                is_by_minors = True
             terms = [[[(tuple(map(int, m)), int(c)) for m, c in form.terms()] for form in row] for row in matrix]
-            self.maps.append((by_minors, terms))
+            self.maps.append((is_by_minors, terms))
 
     def images(self, X: Any) -> Any:
         """Return the images of at most `batch_size` points; a point without image has a column of zeros."""
         p = self.prime
-        for by_minors, matrix in self.maps:
+        for is_by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}
             for exponents in {exponents for row in matrix for form in row for exponents, _ in form}:
                 monomial = X[0] ** 0
@@ -227,7 +229,7 @@ class _ProjectiveMap:
                         monomial = monomial * coordinate % p
                 powers[exponents] = monomial
             rows = [[sum(c * powers[m] % p for m, c in f) % p if f else None for f in row] for row in matrix]
-            image = kernel_minors(rows, lambda a, b: a * b % p) if by_minors else rows[0]
+            image = kernel_minors(rows, lambda a, b: a * b % p) if is_by_minors else rows[0]
             values = 0 * X
             for value, form in zip(values, image, strict=True):
                 value += 0 if form is None else form % p
@@ -236,11 +238,11 @@ class _ProjectiveMap:
 
     def normalized(self, X: Any) -> Any:
         """Divide each column by its last nonzero entry; columns of zeros are unchanged."""
-        last = X[0]
+        scale = X[0]
         for row in X[1:]:
-            last = row + last * (row == 0)
+            scale = row + scale * (row == 0)
         for bit in reversed(f"{self.prime - 2:b}"):  # 1/x = x^(p - 2), and 0 for x = 0
-            X, last = X * last % self.prime if bit == "1" else X, last * last % self.prime
+            X, scale = X * scale % self.prime if bit == "1" else X, scale * scale % self.prime
         return X
 
 
@@ -253,10 +255,10 @@ def default_eps(prime: int) -> list[fmpq]:
     >>> default_eps(101)
     [1/7, 2/11]
     """
-    chosen: dict[int, fmpq] = {}
+    eps_by_residue: dict[int, fmpq] = {}
     for eps in map(rational, DEFAULT_EPS):
         if eps.p % prime and eps.q % prime:
             residue = int(GF(prime).convert(eps))
             if prime <= 5 or pow(residue, 4, prime) != 1:
-                chosen.setdefault(min(residue, prime - residue), eps)
-    return list(chosen.values())[:2]
+                eps_by_residue.setdefault(min(residue, prime - residue), eps)
+    return list(eps_by_residue.values())[:2]

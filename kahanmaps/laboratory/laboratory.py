@@ -286,8 +286,8 @@ class Laboratory:
         return verdict, evidence
 
     @cached_property
-    def _separated_system(self) -> Separated | None:
-        return None if self.system is None or self.symbols else separated(self.system)
+    def _separated_system(self) -> SeparatedSystem | None:
+        return None if self.system is None or self.symbols else separate_planes(self.system)
 
     def formulas(
         self,
@@ -313,7 +313,7 @@ class Laboratory:
         """
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
-        supports = [set(space.places) for space in model]
+        supports = [set(space.indices) for space in model]
         # In echelon forms the coefficient of the largest monomial is 1. The unknowns are all other nonzero
         # coefficients.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
@@ -328,7 +328,7 @@ class Laboratory:
             except (NoPoint, BadPrime):
                 return None
             if not spaces or any(
-                not set(space.places) <= support or len(space.basis) != len(space_pivots)
+                not set(space.indices) <= support or len(space.basis) != len(space_pivots)
                 for space, support, space_pivots in zip(spaces, supports, pivots, strict=True)
             ):
                 return None  # the spaces have other monomials or dimensions
@@ -589,7 +589,7 @@ def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[C
 
 
 @dataclass(frozen=True)
-class Separated:
+class SeparatedSystem:
     """A system written in z, where x = T z; Kahan's method is equivariant under linear changes of variables."""
 
     system: QuadraticSystem
@@ -606,14 +606,14 @@ class Separated:
         return RationalFunction(change_variables(function.numerator), change_variables(function.denominator))
 
 
-def separated(system: QuadraticSystem) -> Separated | None:
+def separate_planes(system: QuadraticSystem) -> SeparatedSystem | None:
     """Write a system in coordinates in which the planes over Q of its normal form separate.
 
     Returns None for a system without such planes, and if the system written so is no shorter.
 
     >>> from kahanmaps.documents.catalog import load
     >>> system = load("paper_m2").system
-    >>> [len(f) for f in system.rhs], [len(f) for f in separated(system).system.rhs]
+    >>> [len(f) for f in system.rhs], [len(f) for f in separate_planes(system).system.rhs]
     ([8, 8, 9, 9], [2, 3, 3, 2])
     """
     normal_form = system_normal_form(system)
@@ -623,4 +623,5 @@ def separated(system: QuadraticSystem) -> Separated | None:
     matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
     T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
     separated_system = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
-    return Separated(separated_system, T) if sum(map(len, separated_system.rhs)) < sum(map(len, system.rhs)) else None
+    is_shorter = sum(map(len, separated_system.rhs)) < sum(map(len, system.rhs))
+    return SeparatedSystem(separated_system, T) if is_shorter else None

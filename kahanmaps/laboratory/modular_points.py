@@ -168,7 +168,7 @@ class ModularFlow(ModularMap):
             residue = field.convert(coefficient)
             for value, exponent in zip(self.values, monomial[n:], strict=True):
                 residue = residue * field.convert(value) ** int(exponent)
-            terms.append((int(residue), places_of(n, self.degree)[tuple(map(int, monomial[:n]))]))
+            terms.append((int(residue), monomial_index(n, self.degree)[tuple(map(int, monomial[:n]))]))
         return terms
 
     def step(self, x: Point) -> Point:
@@ -247,7 +247,7 @@ def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def places_of(dim: int, degree: int) -> dict[Exponent, int]:
+def monomial_index(dim: int, degree: int) -> dict[Exponent, int]:
     """Return the index of each monomial in `exponents_up_to` this degree."""
     return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
 
@@ -255,7 +255,7 @@ def places_of(dim: int, degree: int) -> dict[Exponent, int]:
 @cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     """Return, for each monomial, (variable, exponent, index of monomial/variable) for each of its variables."""
-    indices = places_of(dim, degree)
+    indices = monomial_index(dim, degree)
     return [
         [(k, e, indices[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
         for exponent in indices
@@ -324,7 +324,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 
     Lists of coefficients may end before the last monomial; missing coefficients are 0.
     """
-    exponents, indices = exponents_up_to(dim, degree), places_of(dim, degree)
+    exponents, indices = exponents_up_to(dim, degree), monomial_index(dim, degree)
     coefficients = [0] * len(exponents)
     count_work(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
     for a, p in zip(exponents, P, strict=False):
@@ -359,7 +359,7 @@ def scaled_gradient(function: RationalFunction, field: Any, point: Sequence[Any]
     return [evaluate(a, field, point) * D - evaluate(b, field, point) * N for a, b in zip(dN, dD, strict=True)]
 
 
-class Independent:
+class IndependentGradients:
     """The gradients of independent functions at one random point modulo a prime, for tests of independence.
 
     `rows` are multiples of the gradients of the functions added so far.

@@ -31,7 +31,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     HypersurfaceForm,
     outcome_of,
 )
-from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
+from kahanmaps.laboratory.singular.singularities import Patterns, _merge_patterns, patterns_of, singularities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -251,4 +251,4 @@ def test_patterns_are_the_fates_of_what_is_contracted(hypersurfaces, expected):
     for status, settled_at, *more in hypersurfaces:
         multiplicity, followed, note = (*more, *(1, 100, "")[len(more) :])
         known.append(Hypersurface("x - 1", 1, False, multiplicity, status, 1, None, (), (), note, followed, settled_at))
-    assert replace(_patterns(1, known), series=()) == expected
+    assert replace(_merge_patterns(1, known), series=()) == expected

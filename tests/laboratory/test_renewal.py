@@ -19,7 +19,7 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed_hypersurfaces
 from kahanmaps.laboratory.singular.following import OrbitData, StepLimits
 from kahanmaps.laboratory.singular.singularities import Patterns, default_eps, patterns
 from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
@@ -159,15 +159,15 @@ def explicit(*image):
 
 def test_unknown_orders_that_are_needed_derive_nothing():
     costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
-    assert needed([costly, attracted]) == [0, 1]
-    assert needed([costly, replace(attracted, eventually_in=(1,))]) is None
-    assert needed([costly, replace(attracted, eventually_in=(0,))]) is None
-    assert needed([costly, replace(attracted, rows=((0, 0, 2),), eventually_in=(1,))]) == [0]
+    assert needed_hypersurfaces([costly, attracted]) == [0, 1]
+    assert needed_hypersurfaces([costly, replace(attracted, eventually_in=(1,))]) is None
+    assert needed_hypersurfaces([costly, replace(attracted, eventually_in=(0,))]) is None
+    assert needed_hypersurfaces([costly, replace(attracted, rows=((0, 0, 2),), eventually_in=(1,))]) == [0]
     # Through a return as well: the first becomes the third, which costs and is met by the second.
     returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), continues_as=(2, 2))
     chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
-    assert needed(chain) == [0, 1, 2]
-    assert needed([*chain[:2], replace(chain[2], eventually_in=(0,))]) is None
+    assert needed_hypersurfaces(chain) == [0, 1, 2]
+    assert needed_hypersurfaces([*chain[:2], replace(chain[2], eventually_in=(0,))]) is None
     with pytest.raises(ValueError, match="expected known multiplicities"):
         degree_series([2], [(1, costly), (1, replace(attracted, eventually_in=(0,)))])
     # What is not needed does not count.

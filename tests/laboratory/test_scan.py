@@ -183,7 +183,7 @@ def test_a_curve_that_is_missed_is_said_to_be_one():
     assert "as many as a curve has, so one may have been missed" in scanned.text
 
 
-@pytest.mark.parametrize("stage", ["_confirm", "_measure_growth", "symmetries", "conditions"])
+@pytest.mark.parametrize("stage", ["_confirm", "degree_growth", "symmetries", "conditions"])
 def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
     def stop(*_):
         raise TimeLimit

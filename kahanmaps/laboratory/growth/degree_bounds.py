@@ -38,7 +38,7 @@ from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduce_map
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.laboratory.singular.written import forms_over_eps
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -115,7 +115,7 @@ def bound_dynamical_degree(
     budget = budget_for("dynamical degree", effort)
     for _ in range(_TRIES):
         try:
-            modular_map = reduced(map_, eps, rng)
+            modular_map = reduce_map(map_, eps, rng)
             if not is_birational(modular_map, rng):
                 continue
             bounds = _search_lower_bound(modular_map, rng, budget, progress)

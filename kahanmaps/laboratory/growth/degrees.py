@@ -35,7 +35,7 @@ from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import ITERATE_DEGREE, budget_for
-from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
+from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduce_map
 from kahanmaps.laboratory.growth.degree_bounds import DynamicalDegreeBounds, bound_dynamical_degree
 from kahanmaps.laboratory.growth.proofs import (
     GrowthProof,
@@ -413,7 +413,7 @@ class _Search:
         def new_line() -> Line:
             while True:
                 try:
-                    return Line(reduced(self.map, self.eps, rng), rng, self.budget, self.max_degree)
+                    return Line(reduce_map(self.map, self.eps, rng), rng, self.budget, self.max_degree)
                 except BadPrime:
                     continue
 

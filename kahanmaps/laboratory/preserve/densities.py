@@ -293,16 +293,16 @@ def _search_polynomials(
         # With a product higher degrees are not needed, and the lower degrees get only a part of the budget.
         degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
     # If the space of a degree is 0, the spaces of lower degrees are 0: each degree tried doubles the monomials.
-    degrees, highest = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
+    degrees, tried_degree = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
-        smaller = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
-        degrees.insert(0, next(smaller, degrees[0] - 1))
+        low_degrees = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
+        degrees.insert(0, next(low_degrees, degrees[0] - 1))
     try:
-        while highest < last_degree and not degree_budget.is_spent:
-            degree = next(d for d in degrees if d > highest)
+        while tried_degree < last_degree and not degree_budget.is_spent:
+            degree = next(d for d in degrees if d > tried_degree)
             progress(f"densities of degree {degree}")
             model = _compute_space(laboratory.maps[0], degree)
-            if model.basis and degree > highest + 1:
+            if model.basis and degree > tried_degree + 1:
                 degrees = list(range(last_degree + 1))  # search again for the least degree with a density
                 continue
             if model.basis and len(model.basis) == len(_compute_space(laboratory.maps[1], degree, model).basis):
@@ -324,11 +324,12 @@ def _search_polynomials(
                     reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
                 if densities or product is None:
                     return densities, degree, "" if densities else reason
-            highest = degree
+            tried_degree = degree
     except NoPoint as error:
-        return [], highest, str(error)
-    ending = "" if highest == last_degree else f"polynomials of degree {highest + 1} and more were not tried: {SPENT}"
-    return ([], highest, ending) if product is None else ([product], product.degree(dim), ending)
+        return [], tried_degree, str(error)
+    ending = f"polynomials of degree {tried_degree + 1} and more were not tried: {SPENT}"
+    ending = "" if tried_degree == last_degree else ending
+    return ([], tried_degree, ending) if product is None else ([product], product.degree(dim), ending)
 
 
 def _find_product_density(

@@ -46,8 +46,8 @@ from kahanmaps.laboratory.modular_points import (
     Point,
     exponents_up_to,
     monomial_derivatives,
+    monomial_index,
     monomial_tables,
-    places_of,
 )
 
 _SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at each with probability 1/p
@@ -228,14 +228,14 @@ def orbit_profile(
     codimensions: list[int] = []
     with_known = 0
     maps_agree, period, reason = True, None, ""
-    leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
+    leading_by_map: list[frozenset[Exponent]] = [frozenset()] * len(maps)
     last_degree = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         last_degree = max((d for d in range(1, last_degree + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
     max_support = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
     for degree in range(1, last_degree + 1):
         if comb(dim + degree, degree) > MAX_UNKNOWNS or any(
-            len(_indices_of_non_multiples(dim, degree, lower)) > max_support for lower in leading
+            len(_indices_of_non_multiples(dim, degree, leading)) > max_support for leading in leading_by_map
         ):
             reason = "too many unknowns"
         elif budget.is_spent:
@@ -243,8 +243,11 @@ def orbit_profile(
         if reason:
             break
         progress(f"relations of degree {degree} along orbits")
-        orbits = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
-        leading = [orbit.leading for orbit in orbits]
+        orbits = [
+            relations_on_orbit(map_, degree, leading=leading)
+            for map_, leading in zip(maps, leading_by_map, strict=True)
+        ]
+        leading_by_map = [orbit.leading for orbit in orbits]
         maps_agree = maps_agree and len({(orbit.dimension, orbit.codimension) for orbit in orbits}) == 1
         # A special orbit never has fewer relations than a generic one, so the minimum counts.
         nullities.append(min(orbit.dimension for orbit in orbits))
@@ -444,7 +447,7 @@ def _descending_exponents(dim: int, degree: int) -> list[tuple[int, ...]]:
 
 def _relation_basis(map_: ModularMap, degree: int) -> list[list[int]]:
     """Return the reduced echelon basis of the relations of a random orbit, on `_descending_exponents`."""
-    order = [places_of(map_.dim, degree)[exponent] for exponent in _descending_exponents(map_.dim, degree)]
+    order = [monomial_index(map_.dim, degree)[exponent] for exponent in _descending_exponents(map_.dim, degree)]
     return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
 
 

@@ -27,7 +27,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals_and_densities import normalized
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, flow_preserves
-from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
+from kahanmaps.laboratory.modular_points import IndependentGradients, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, SpaceSearch, denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
@@ -307,8 +307,8 @@ def integrals_of(
         inherited = [systems[map_.values] for map_ in laboratory.maps]
     theorems, by_theorems = "", 0
     if inherited:
-        listing = ", ".join(laboratory.free_symbols)
-        theorems = inherited[0].text + (f", at random values of {listing}" if listing else "")
+        values_text = ", ".join(laboratory.free_symbols)
+        theorems = inherited[0].text + (f", at random values of {values_text}" if values_text else "")
         if not laboratory.defect:
             pairs = zip(inherited, laboratory.maps, strict=True)
             by_theorems = min(integrals.count(map_) for integrals, map_ in pairs)
@@ -408,7 +408,7 @@ def integrals_of(
     reasons = [reason, *([space_search.cut, note] if missing_count > 0 else []), *collection.skipped_searches]
     if map_at_values is not None:
         # At the values of the file, integrals with symbols may become dependent or vanish.
-        independent = Independent(map_at_values)
+        independent = IndependentGradients(map_at_values)
         rows = [independent.gradient(integral.function) for integral in result_so_far.integrals]
         point = independent.point
         rows += [
@@ -416,9 +416,9 @@ def integrals_of(
         ]
         rank = sum(map(independent.add, rows))
         if rank < len(rows):
-            listing = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
+            values_text = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
             count_text = f"only {rank} of the {len(rows)} formulas {'is' if rank == 1 else 'are'} independent"
-            reasons.append(f"at {listing} {count_text}: without --symbolic others may be found")
+            reasons.append(f"at {values_text} {count_text}: without --symbolic others may be found")
     if profile.cut and (profile.cut == SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
@@ -467,7 +467,7 @@ class _IntegralCollection:
     def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:
         self._laboratory, self._progress = laboratory, progress
         self.skipped_searches: list[str] = []
-        self._gradients = Independent(laboratory.maps[0])
+        self._gradients = IndependentGradients(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
         self.time_dependent: list[TimeDependentIntegral] = []
         self.in_iterates: list[IntegralInIterates] = []
@@ -575,7 +575,7 @@ class _IntegralCollection:
         """Add integrals in iterates of x, and further integrals in x alone, until there are `required` of them."""
         laboratory = self._laboratory
         # Time-dependent integrals do not count here.
-        self._gradients = Independent(laboratory.maps[0], [integral.function for integral in self.integrals])
+        self._gradients = IndependentGradients(laboratory.maps[0], [integral.function for integral in self.integrals])
         try:
             formulas, ratios, note = integrals_in_iterates(
                 laboratory, required, self._gradients, budget, self._progress

@@ -35,7 +35,7 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.integrals_and_densities import normalized, orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, certified
-from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
+from kahanmaps.laboratory.modular_points import IndependentGradients, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
@@ -190,7 +190,7 @@ def verdict_on_ratio(
 def integrals_in_iterates(
     laboratory: Laboratory,
     required: int,
-    independent: Independent,
+    independent: IndependentGradients,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:

@@ -363,7 +363,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     values = constants_of(laboratory, constants)
     vectors_with_constant = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
-    def with_constant(allowed_constants: list[RationalFunction]) -> list[list[int]]:
+    def select_vectors(allowed_constants: list[RationalFunction]) -> list[list[int]]:
         """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed constants."""
         combinations = multiplicative_relations([*(c for _, c in vectors_with_constant), *allowed_constants])
         combined_vectors = [
@@ -373,10 +373,10 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         ]
         return _reduce_basis(combined_vectors, weights)
 
-    constant_one = with_constant([])
+    constant_one = select_vectors([])
     time_dependent = [(v, c) for v, c in vectors_with_constant if v[0] == 0 and c != one]
     return _build_products(
-        polynomials, n, constant_one, [(one, constant_one), (minus_one, with_constant([minus_one]))], time_dependent
+        polynomials, n, constant_one, [(one, constant_one), (minus_one, select_vectors([minus_one]))], time_dependent
     )
 
 

@@ -69,16 +69,16 @@ _SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction o
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern, distinguished by the coefficient at `place`, which is `roots[i]` for the space i."""
+    """Spaces of one zero pattern: their coefficients at `position` differ, and that of the space i is `roots[i]`."""
 
-    place: tuple[int, int]
+    position: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
     def in_order(self, spaces: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
         """Return the spaces on a map in the order of the roots; None if two roots are equal there or one is missing."""
         field = GF(map_.prime)
         parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
-        row, column = self.place
+        row, column = self.position
         by_value = {space.basis[row][column]: space for space in spaces}
         values = [root.value(field, parameters[: len(root.names)]) for root in self.roots]
         if len(by_value) < len(spaces) or None in values:
@@ -313,7 +313,7 @@ def find_branches(
     `model` holds the spaces on one map; `spaces_at(prime, values)` returns the spaces on another map in any order, or
     None at special values. Returns None if the spaces are conjugate over an extension of Q, or if the budget is spent.
     """
-    distinguishing_places = [
+    distinguishing_positions = [
         (i, k)
         for i, vector in enumerate(model[0].basis)
         for k in range(len(vector))
@@ -322,19 +322,19 @@ def find_branches(
     count, context = len(model), ring((*names, "T"))
     *gens, T = context.gens()
     at_zero = {"T": fmpq(0)}
-    for samples, place in cartesian(_SAMPLES, distinguishing_places[:_COEFFICIENTS]):
+    for samples, position in cartesian(_SAMPLES, distinguishing_positions[:_COEFFICIENTS]):
         if budget.is_spent:
             return None
 
         def symmetric_functions(
-            prime: int, values: tuple[int, ...], place: tuple[int, int] = place
+            prime: int, values: tuple[int, ...], position: tuple[int, int] = position
         ) -> list[int] | None:
             spaces = spaces_at(prime, values)
             if spaces is None or len(spaces) != count:
                 return None
             coefficients = [1]  # of prod (T - w), in descending order
             for space in spaces:
-                w = space.basis[place[0]][place[1]]
+                w = space.basis[position[0]][position[1]]
                 pairs = zip([*coefficients, 0], [0, *coefficients], strict=True)
                 coefficients = [(coefficient - w * previous) % prime for coefficient, previous in pairs]
             return coefficients[1:]
@@ -349,5 +349,5 @@ def find_branches(
             RationalFunction(-substitute(factor, at_zero), substitute(factor.derivative(len(gens)), at_zero))
             for factor in linear_factors
         )
-        return Branches(place, roots) if len(roots) == count else None
+        return Branches(position, roots) if len(roots) == count else None
     return None

@@ -168,9 +168,9 @@ class Scan(PrintableResult):
         phrases = [f"all members with parameters modulo {complete}"] if complete else []
         for k, subspaces, primes in ((1, "lines", lines), (2, "planes", planes)):
             if primes:
-                number = round(min(sweep.measured / sweep.prime**k for sweep in self._grouped_sweeps[k]))
+                subspace_count = round(min(sweep.measured / sweep.prime**k for sweep in self._grouped_sweeps[k]))
                 noun = "those" if phrases else "members"
-                phrases.append(f"{noun} on {number} random {subspaces} of parameter space modulo {primes}")
+                phrases.append(f"{noun} on {subspace_count} random {subspaces} of parameter space modulo {primes}")
         small_components = (
             "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
         )

@@ -427,11 +427,12 @@ def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members
             [(p, None, 1) for p in group] for group in (_PRIMES[parameter_count] if primes is None else (primes,))
         ]
         plans = [
-            [*full, *(extra if parameter_count > 1 else ())] for full, extra in product(full_plans, [*on_lines, []])
+            [*main_plan, *(line_plan if parameter_count > 1 else ())]
+            for main_plan, line_plan in product(full_plans, [*on_lines, []])
         ]
     else:
         planes: list[Choice] = [(p, _PLANES, 2) for p in _PLANE_PRIMES]
-        plans = [[*full, *planes] for full in on_lines] + on_lines
+        plans = [[*main_plan, *planes] for main_plan in on_lines] + on_lines
         plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
     return next((plan for plan in plans if _count_members(parameter_count, plan) <= max_members), plans[-1])
 

@@ -202,12 +202,11 @@ class _Curve:
     def form_orders(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
         size, form_orders = len(self.forms.poles), []
-        orders = [self.initial_orders, *(step.orders for step in run)]
-        for mu, here, there in zip(
-            divided_powers(run, self.initial_orders, self.minor_exponents), orders, orders[1:], strict=False
-        ):
-            images = zip(self.forms.images, there[size:-1], strict=True)
-            form_orders.append((*here[:size], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
+        run_orders = [self.initial_orders, *(step.orders for step in run)]
+        powers = divided_powers(run, self.initial_orders, self.minor_exponents)
+        for mu, orders, next_orders in zip(powers, run_orders, run_orders[1:], strict=False):
+            images = zip(self.forms.images, next_orders[size:-1], strict=True)
+            form_orders.append((*orders[:size], *(k + mu * int(form.total_degree()) for form, k in images), orders[-1]))
         return form_orders
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
@@ -323,7 +322,7 @@ def exceptional_hypersurfaces(
     poles = tuple(form for form in determinant_factors(map_at_eps.equations[0]) if form != infinity)
     forms = _Forms(poles, determinant_factors(map_at_eps.inverse.equations[0]), infinity)
     curves_by_key: dict[Key, list[_Curve]] = {}
-    for line in range(_MAX_LINES):
+    for i in range(_MAX_LINES):
         if limits.budget.is_spent:
             break
         field = GF(random_prime(rng, _BITS))
@@ -336,7 +335,7 @@ def exceptional_hypersurfaces(
         for curve in curves:
             curves_by_key.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension of Q has points in GF(p) for some primes p only.
-        if line >= _MIN_LINES and all(len({curve.prime for curve in group}) > 1 for group in curves_by_key.values()):
+        if i >= _MIN_LINES and all(len({curve.prime for curve in group}) > 1 for group in curves_by_key.values()):
             curves_by_key = dict(sorted(curves_by_key.items()))  # an order that does not depend on random choices
             try:
                 return degree, _patterns(curves_by_key, forms, degree, zeros)
@@ -377,8 +376,8 @@ def _patterns(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int
     if exponents * degrees != total_degrees or sum(degrees.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
     # Orders in hypersurfaces that are not contracted are not needed.
-    contracted = [k for k, key in enumerate(keys) if key[0]]
-    return _follow(pairs, [int(degree) for degree in degrees.entries()], contracted)
+    columns = [k for k, key in enumerate(keys) if key[0]]
+    return _follow(pairs, [int(degree) for degree in degrees.entries()], columns)
 
 
 def _follow(

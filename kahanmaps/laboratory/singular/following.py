@@ -295,18 +295,18 @@ class TestCurve:
                 max_precision *= 2
                 continue
             step_limit = min(limits.max_steps, max(limits.series_steps, 2 * (event or 0)))
-            if rows and is_cut and (recurring := self._find_recurring(run[-1].limit)) is not None:
+            if rows and is_cut and (hypersurfaces := self._find_incidences(run[-1].limit)) is not None:
                 other_steps = (
                     t
                     for t, (mu, *nu) in enumerate(rows, 1)
-                    if mu or any(order for k, order in enumerate(nu) if k not in recurring)
+                    if mu or any(order for k, order in enumerate(nu) if k not in hypersurfaces)
                 )
-                return OrbitData(rows[: max(other_steps, default=1)], (), limits.max_steps, True, None, recurring)
+                return OrbitData(rows[: max(other_steps, default=1)], (), limits.max_steps, True, None, hypersurfaces)
             if not is_complete or step_count >= step_limit:
                 return OrbitData(rows, (), len(rows), False)
             step_count = step_limit
 
-    def _find_recurring(self, point: Sequence[int]) -> tuple[int, ...] | None:
+    def _find_incidences(self, point: Sequence[int]) -> tuple[int, ...] | None:
         """Return the critical hypersurfaces that the orbit of a point meets, or None if the orbit is not periodic.
 
         Also returns None if a point of the orbit is an indeterminacy point, where a power of t would be divided out.

@@ -202,8 +202,8 @@ class Hypersurface(ResultPart):
         `at` names the eps of the polynomial, for a polynomial that is not over Q[eps].
         """
         text, max_characters = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
-        short = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
-        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{short} = 0{'' if self.generic else at}")
+        head = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
+        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{head} = 0{'' if self.generic else at}")
         if self.orbit_data.continues_as:
             steps, target = self.orbit_data.continues_as
             outcome = f"mapped onto C{target + 1} after {counted(steps, 'step')}"
@@ -213,10 +213,10 @@ class Hypersurface(ResultPart):
             outcome = f"its multiplicities satisfy a recurrence of order {self.orbit_data.settled_at}"
         else:
             outcome = f"not confined within {counted(self.followed, 'step')}"
-        by = "" if self.stage is None else f" by map {self.stage + 1}"
-        factor = ", a factor of the denominator" if self.divides_denominator else ""
-        phrases = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
-        return "; ".join(phrases)
+        map_text = "" if self.stage is None else f" by map {self.stage + 1}"
+        factor_text = ", a factor of the denominator" if self.divides_denominator else ""
+        summary = f"{name}, degree {self.degree}{factor_text}: contracted{map_text}, {outcome}"
+        return "; ".join([summary, *self.orbit_data.sentences])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, without the first steps."""
@@ -343,8 +343,8 @@ def outcome_of(
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits) -> list[Hypersurface]:
-    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `unwritten`."""
-    hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
+    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `outcomes_of_points`."""
+    hypersurfaces = outcomes_of_points(map_, eps, rng, limits, poles=True) + outcomes_of_points(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
         try:
@@ -360,7 +360,7 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: S
     return hypersurfaces
 
 
-def unwritten(
+def outcomes_of_points(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits, poles: bool = False
 ) -> list[Hypersurface]:
     """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.

@@ -29,8 +29,8 @@ from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
-from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduce_map
+from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed_hypersurfaces
 from kahanmaps.laboratory.singular.exceptional import OrbitDataUnknown, exceptional_hypersurfaces
 from kahanmaps.laboratory.singular.following import Fraction, StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
@@ -44,7 +44,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     Tracking,
     outcome_of,
     outcomes_at_random,
-    unwritten,
+    outcomes_of_points,
 )
 from kahanmaps.laboratory.singular.written import (
     Word,
@@ -235,7 +235,7 @@ def singularities(
         count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
-            line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
+            line = Line(reduce_map(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
         except Stopped as error:
             raise InputError(f"found a composition whose singularities cannot be followed: {error.message}") from error
@@ -283,9 +283,9 @@ def singularities(
             break
     if critical_degree is None and not is_stopped:
         progress("following critical points")
-        too_large = "the polynomials of the exceptional hypersurfaces are too large"
+        note = "the polynomials of the exceptional hypersurfaces are too large"
         without_polynomials = (
-            unwritten(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=too_large)]
+            outcomes_of_points(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=note)]
         )
         hypersurfaces += without_polynomials
     is_stopped |= limits.budget.is_spent and (
@@ -299,8 +299,8 @@ def _follow_map_by_map(
 ) -> SingularityRun | None:
     """Return the run for a composition whose maps are followed one by one; None if one of the maps is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
-    pair = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return pair and replace(run, word=pair[0], hypersurfaces=tuple(pair[1]), stopped=limits.budget.is_spent)
+    result = followed_map_by_map(map_, run.eps, rng, limits, progress)
+    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -401,13 +401,13 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     results = set()
     for run in runs:
         if not run.is_dominant:
-            result = _not_dominant(run.eps)
+            result = _patterns_if_not_dominant(run.eps)
         elif run.stopped:
-            result = _unknown(_STOPPED)
+            result = _no_patterns(_STOPPED)
         else:
-            result = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
+            result = _merge_patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
         results.add(result)
-    return results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
+    return results.pop() if len(results) == 1 else _no_patterns(_DIFFERENT)
 
 
 def patterns(
@@ -425,7 +425,7 @@ def patterns(
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
-    result = _unknown("")
+    result = _no_patterns("")
     for attempt in range(_DRAWS if eps is None else 1):
         if attempt and (not result.running or budget.is_spent):
             break
@@ -438,7 +438,7 @@ def patterns(
                 pairs = zip(values, budgets, strict=True)
                 runs = [singularities(map_, value, steps=steps, seed=seed, effort=share) for value, share in pairs]
             except TooLongFormula:
-                return _unknown("the composition is too long for its singularities to be followed")
+                return _no_patterns("the composition is too long for its singularities to be followed")
             result = patterns_of(runs, map_.has_eps)
         else:
             results = set()
@@ -446,18 +446,18 @@ def patterns(
                 limits, equations = _step_limits(map_.dim, steps, share), map_.at(value).equations
                 rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
                 if not _is_dominant(map_, value):
-                    result_at_eps = _not_dominant(value)
+                    result_at_eps = _patterns_if_not_dominant(value)
                 elif period_of(equations) > 1:
                     outcomes = outcomes_at_random(map_, value, rng, limits)
-                    result_at_eps = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
+                    result_at_eps = _no_patterns(_STOPPED) if limits.budget.is_spent else _merge_patterns(0, outcomes)
                 else:
                     try:
                         degree, hypersurfaces = exceptional_hypersurfaces(map_, value, rng, limits)
-                        result_at_eps = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
+                        result_at_eps = _merge_patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrbitDataUnknown as error:
-                        result_at_eps = _unknown(_STOPPED if limits.budget.is_spent else str(error))
+                        result_at_eps = _no_patterns(_STOPPED if limits.budget.is_spent else str(error))
                 results.add(result_at_eps)
-            result = results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
+            result = results.pop() if len(results) == 1 else _no_patterns(_DIFFERENT)
     return result
 
 
@@ -476,51 +476,51 @@ def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budge
     return map_.dim <= MAX_DIMENSION and _count_digits(map_, eps) <= _max_digits(map_.dim, budget)
 
 
-def _not_dominant(eps: fmpq) -> Patterns:
-    return _unknown(f"the map is not dominant at eps = {format_number(eps)}, so that no singularity is followed")
+def _patterns_if_not_dominant(eps: fmpq) -> Patterns:
+    return _no_patterns(f"the map is not dominant at eps = {format_number(eps)}, so that no singularity is followed")
 
 
-def _unknown(reason: str) -> Patterns:
+def _no_patterns(reason: str) -> Patterns:
     return Patterns((), None, None, reason)
 
 
-def _patterns(
+def _merge_patterns(
     map_degree: int, hypersurfaces: Sequence[Hypersurface], eps_text: str = "", word: Word | None = None
 ) -> Patterns:
     maps_per_step = 1 if word is None else word.length
     # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
-    contracted = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
-    for h in contracted:
+    exceptional = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
+    for h in exceptional:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
         if h.status == UNDECIDED:
-            return _unknown(f"the pattern of {name} is undecided: {h.note or 'its series ended'}")
+            return _no_patterns(f"the pattern of {name} is undecided: {h.note or 'its series ended'}")
         if h.settled_at is None:
-            return _unknown(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
-    lengths = {h.settled_at for h in contracted if h.settled_at}
-    unconfined_steps = [h.followed for h in contracted if h.status != CONFINED]
+            return _no_patterns(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
+    lengths = {h.settled_at for h in exceptional if h.settled_at}
+    unconfined_steps = [h.followed for h in exceptional if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
-    if all(h.orbit_data.is_settled and h.degree for h in contracted) and map_degree > 0:
-        if needed([h.orbit_data for h in contracted]) is None:
-            return _unknown(
+    if all(h.orbit_data.is_settled and h.degree for h in exceptional) and map_degree > 0:
+        if needed_hypersurfaces([h.orbit_data for h in exceptional]) is None:
+            return _no_patterns(
                 "some images lie in a hypersurface that lowers the degree at all steps, with unknown multiplicities"
             )
         degrees = (map_degree,) if word is None else word.degrees
         fraction = degree_series(
-            degrees, [(h.degree, h.orbit_data) for h in contracted], [h.stage or 0 for h in contracted]
+            degrees, [(h.degree, h.orbit_data) for h in exceptional], [h.stage or 0 for h in exceptional]
         )
         if maps_per_step > 1:
             try:
                 fraction = every_nth(fraction, maps_per_step)
             except ArithmeticError as error:
-                return _unknown(f"{error}: those of the degrees of a composition")
+                return _no_patterns(f"{error}: those of the degrees of a composition")
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
         tuple(sorted({-(-length // maps_per_step) for length in lengths})),
         min((steps // maps_per_step for steps in unconfined_steps), default=None),
-        any(h.status == CONFINED for h in contracted),
+        any(h.status == CONFINED for h in exceptional),
         "",
         series,
-        tuple(contracted),
+        tuple(exceptional),
         eps_text,
         word,
     )

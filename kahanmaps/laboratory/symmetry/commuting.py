@@ -300,7 +300,7 @@ class _Search:
             elif finding.verdict is Certainty.UNDECIDED:
                 result.undecided.append(f"one solution: {finding.evidence.summary}")
             else:
-                result.solutions.append(self._member(weights, finding))
+                result.solutions.append(self._build_field(weights, finding))
                 self._report()
 
     def _report(self) -> None:
@@ -381,12 +381,11 @@ class _Search:
             pivot = next(k for k, entry in enumerate(row) if entry != 0)
             base = [b - base[pivot] * entry for b, entry in zip(base, row, strict=True)]
         directions = [tuple(fmpq(e) for e in primitive_integers(tuple(row))) for row in direction_matrix.tolist()]
-        self.result.families.append(
-            CommutingFamily(self._member(base, finding), tuple(self._member(d, finding) for d in directions), finding)
-        )
+        base_field, *fields = (self._build_field(weights, finding) for weights in (base, *directions))
+        self.result.families.append(CommutingFamily(base_field, tuple(fields), finding))
         self._report()
 
-    def _member(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
+    def _build_field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
         matrix = combination_of(weights, self.space.matrices) if self.space.matrices else None
         g = field_at(self.space, weights)
         names = [name for name, multiple in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(multiple)]

@@ -45,9 +45,13 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
     ('proved', 'refuted')
     """
     claim, certified_objects = "the Kahan maps of f and g commute", {"system": f, "commute": g}
-    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
+    for factor, reason in (
+        (1, "g = f"),
+        (-1, "g = -f, and its map is the inverse"),
+        (0, "g = 0, and its map is x -> x"),
+    ):
         if g == f.scaled(factor):
-            evidence = Evidence(theorems.METHOD, why)
+            evidence = Evidence(theorems.METHOD, reason)
             return Finding(claim, theorems.PROVED, evidence, formula=_FORMULA, certified=certified_objects)
     count_work(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
@@ -91,8 +95,10 @@ def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem])
 def _proof_in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     if f.dim > 1:
         return None
-    is_met = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
-    return theorems.evidence("the lemma of Moebius maps", [("f and g are proportional, in dimension 1", is_met)])
+    are_proportional = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
+    return theorems.evidence(
+        "the lemma of Moebius maps", [("f and g are proportional, in dimension 1", are_proportional)]
+    )
 
 
 def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent) -> Identity:

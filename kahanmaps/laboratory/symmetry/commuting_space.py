@@ -120,10 +120,10 @@ class _SeriesMap:
         # that no linear system has to be solved.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
-        sizes = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
+        term_counts = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
         for order in range(len(y)):
             lengths = [len(e) if isinstance(e, fmpq_mpoly) else 1 for row in (*y[: order + 1], *v) for e in row]
-            count_work((order + 1) * (2 * len(sizes) + sum(sizes) * sum(lengths) / len(lengths) / 2))
+            count_work((order + 1) * (2 * len(term_counts) + sum(term_counts) * sum(lengths) / len(lengths) / 2))
             value = [fmpq(0)] * len(y[0])
             for i, terms in enumerate(self._terms):
                 for c, j, k in terms:

@@ -153,8 +153,8 @@ class Symmetries(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        signed = self.group_of != MATRICES
-        count = sum(not t.reversing for t in self.signed) if signed else (self.order or 0) - self.reversing_order
+        is_signed = self.group_of != MATRICES
+        count = sum(not t.reversing for t in self.signed) if is_signed else (self.order or 0) - self.reversing_order
         group = {
             "of": self.group_of,
             "order": self.order,
@@ -162,13 +162,13 @@ class Symmetries(PrintableResult):
             "reversing_symmetries": self.reversing_order,
             **attributes(self, "generators"),
         }
-        listed = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
+        lists = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
         return {
             "status": "complete" if self.complete else "undecided",
             **attributes(self, "infinitesimal", "scaling"),
             "group": group,
-            "listed": sum(map(len, listed.values())),
-            **plain(listed),
+            "listed": sum(map(len, lists.values())),
+            **plain(lists),
             **attributes(self, "searched", "undecided"),
         }
 

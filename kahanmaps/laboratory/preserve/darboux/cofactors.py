@@ -30,7 +30,14 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
-from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
+from kahanmaps.laboratory.modular_points import (
+    Exponent,
+    ModularMap,
+    Point,
+    exponents_up_to,
+    gradient_values,
+    monomial_index,
+)
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
     TwoPointBasis,
@@ -234,11 +241,11 @@ def cofactor_space(
     A `model` is the space modulo another prime: only the monomials of its elements are then used. The sample must have
     at least `points_needed` points.
     """
-    places = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.places
-    values, image_values = _evaluate_monomials(sample, product, degree, places)
+    indices = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.indices
+    values, image_values = _evaluate_monomials(sample, product, degree, indices)
     rows = [list(map(sub, image_row, row)) for row, image_row in zip(values, image_values, strict=True)]
-    vectors = null_space(rows, len(places), sample.map.prime)
-    return DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, sample.map.prime, places)
+    vectors = null_space(rows, len(indices), sample.map.prime)
+    return DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, sample.map.prime, indices)
 
 
 def cofactor_spaces(
@@ -250,7 +257,7 @@ def cofactor_spaces(
     cofactors of the sample are known exactly, only c = 1 is tried.
     """
     prime, term_count = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
-    places = sorted({k for model in models for k in model.places}) if models else range(term_count)
+    indices = sorted({k for model in models for k in model.indices}) if models else range(term_count)
     if not sample.up_to_numbers:
         union = DarbouxSpace(sample.map.dim, degree, [v for model in models for v in model.basis]) if models else None
         space = cofactor_space(sample, product, degree, union)
@@ -258,8 +265,8 @@ def cofactor_spaces(
     # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must
     # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
     # usually suffice.
-    size = len(places)
-    values, image_values = _evaluate_monomials(sample, product, degree, places)
+    size = len(indices)
+    values, image_values = _evaluate_monomials(sample, product, degree, indices)
     count_work(size**3 / 500)
     M = matrix(values[:size], prime).solve(matrix(image_values[:size], prime))
     K = matrix(image_values[size:], prime) - multiply(matrix(values[size:], prime), M)
@@ -286,20 +293,20 @@ def cofactor_spaces(
             A_c = [[entry - c * (i == j) for j, entry in enumerate(row)] for i, row in enumerate(integers(action))]
             weights = null_space(list(zip(*A_c, strict=True)), len(basis), prime)
             vectors = combine(weights, basis, prime)
-            spaces.append((c, DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, prime, places)))
+            spaces.append((c, DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, prime, indices)))
     return spaces
 
 
 def _evaluate_monomials(
-    sample: Sample, product: CofactorProduct, degree: int, places: Sequence[int]
+    sample: Sample, product: CofactorProduct, degree: int, indices: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
     """Return C m(x) and m(x~) for all monomials m, both times the denominator of C, as one row for each point."""
-    values, image_values, point_count = [], [], len(places) + _SPARE
-    count_work(point_count * len(places) / 8)
+    values, image_values, point_count = [], [], len(indices) + _SPARE
+    count_work(point_count * len(indices) / 8)
     for (x, image), fraction in zip(sample.pairs[:point_count], sample.values(product, point_count), strict=True):
         monomials_at_x, monomials_at_image = sample.map.monomials_at_both(x, image, degree, fraction)
-        values.append([monomials_at_x[k] for k in places])
-        image_values.append([monomials_at_image[k] for k in places])
+        values.append([monomials_at_x[k] for k in indices])
+        image_values.append([monomials_at_image[k] for k in indices])
     return values, image_values
 
 
@@ -309,8 +316,8 @@ def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
     >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
     (18, 10)
     """
-    places = {k for model in models for k in model.places}
-    return (len(places) if models else len(exponents_up_to(dim, degree))) + _SPARE
+    indices = {k for model in models for k in model.indices}
+    return (len(indices) if models else len(exponents_up_to(dim, degree))) + _SPARE
 
 
 def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofactor]:
@@ -414,7 +421,7 @@ def search_cofactors(
         if budget.is_spent:
             return replace(result, cut=message)
         orbit = relations_on_orbit(map_, degree)
-        relations, places = orbit.vectors, places_of(dim, degree)
+        relations, indices = orbit.vectors, monomial_index(dim, degree)
         if relations:
             joint_relations = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
             rows_by_pivot = dict(zip(pivots(joint_relations), joint_relations, strict=True))
@@ -424,7 +431,7 @@ def search_cofactors(
             ]
             for product in products(denominators, degree)[1:]:
                 denominator = prod(map(pow, polynomials, product.powers), start=context.constant(1))
-                if _is_spanned(denominator, places, rows_by_pivot, prime):
+                if _is_spanned(denominator, indices, rows_by_pivot, prime):
                     candidates.append(replace(product, powers=(*[0] * len(cofactors), *product.powers)))
             count = len(relations) + _SPARE
             sample = Sample.of(map_, all_cofactors, points_needed(dim, degree))
@@ -489,9 +496,9 @@ def search_cofactors(
     return result
 
 
-def _is_spanned(polynomial: nmod_mpoly, places: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
+def _is_spanned(polynomial: nmod_mpoly, indices: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
     """Return whether a polynomial is in the span of the rows of an echelon form; the keys of `rows` are pivots."""
-    remainder = {places[exponents]: int(c) for exponents, c in polynomial.terms()}
+    remainder = {indices[exponents]: int(c) for exponents, c in polynomial.terms()}
     count_work(5 + 2 * len(remainder))
     while remainder:
         pivot = min(remainder)

@@ -75,13 +75,13 @@ class DarbouxSpace:
 
     @classmethod
     def spanned_by(
-        cls, dim: int, degree: int, vectors: Vectors, prime: int, places: Sequence[int] | None = None
+        cls, dim: int, degree: int, vectors: Vectors, prime: int, indices: Sequence[int] | None = None
     ) -> DarbouxSpace:
-        """Return the span of vectors modulo a prime; their entries belong to all monomials, or to those in `places`."""
-        if places is not None:
+        """Return the span of vectors modulo a prime; their entries belong to all monomials or to `indices`."""
+        if indices is not None:
             full_rows = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
             for row, vector in zip(full_rows, vectors, strict=True):
-                for k, entry in zip(places, vector, strict=True):
+                for k, entry in zip(indices, vector, strict=True):
                     row[k] = entry
             vectors = full_rows
         descending_rows = echelon([vector[::-1] for vector in vectors], prime)
@@ -108,10 +108,10 @@ class DarbouxSpace:
     def support(self) -> tuple[tuple[int, ...], ...]:
         """The exponents of the monomials that occur in the space."""
         exponents = exponents_up_to(self.dim, self.degree)
-        return tuple(exponents[k] for k in self.places)
+        return tuple(exponents[k] for k in self.indices)
 
     @property
-    def places(self) -> list[int]:
+    def indices(self) -> list[int]:
         """The indices of the monomials that occur in the space."""
         return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
 

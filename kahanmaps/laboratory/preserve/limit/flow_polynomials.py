@@ -161,26 +161,26 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
 
 @dataclass
 class _Search:
-    """The search for polynomials of one degree with given monomials; `known` has the results so far, by text."""
+    """The search for polynomials of one degree with given monomials; the keys of `known_polynomials` are texts."""
 
     field: PolynomialField
     degree: int
     support: Sequence[int]
     rng: random.Random
-    known: dict[str, fmpq_mpoly]
+    known_polynomials: dict[str, fmpq_mpoly]
 
     def __post_init__(self) -> None:
         exponents = exponents_up_to(self.field.dim, self.degree)
         self.monomials = [exponents[k] for k in self.support]
 
     def run(self, primes: list[int], budget: Budget) -> str:
-        """Add the polynomials to `known`; return why there may be further polynomials, or "" if there are none.
+        """Add the polynomials to the known ones; return why there may be further polynomials, or "" if there are none.
 
         The next search begins with the prime that settles this one: modulo this prime no conjugate polynomials exist
         whose products would reappear in a higher degree.
         """
         reason = "lines modulo primes leave others possible"
-        lifts: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
+        combinations: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
         for prime in list(primes):
             if budget.is_spent:
                 return SPENT
@@ -198,16 +198,16 @@ class _Search:
                         unlifted.append(vector)
             if not is_complete:
                 continue
-            pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in lifts for new in unlifted]
-            lifts = []
-            for residues, modulus, new in pairs[:_MAX_CHOICES]:
-                if new in unlifted and self._try_lift(residues, modulus):
-                    unlifted.remove(new)
-                lifts.append((residues, modulus))
+            pairs = [(chinese(c, m, vector, prime), m * prime, vector) for c, m in combinations for vector in unlifted]
+            combinations = []
+            for residues, modulus, vector in pairs[:_MAX_CHOICES]:
+                if vector in unlifted and self._try_lift(residues, modulus):
+                    unlifted.remove(vector)
+                combinations.append((residues, modulus))
             if not unlifted:
                 primes.sort(key=lambda p: p != prime)
                 return ""
-            lifts = lifts or [(vector, prime) for vector in unlifted]
+            combinations = combinations or [(vector, prime) for vector in unlifted]
             reason = (
                 f"{counted(len(unlifted), 'polynomial')} of degree {self.degree} modulo a prime not lifted to Q "
                 f"(limit: {_PRIMES} primes)"
@@ -218,7 +218,7 @@ class _Search:
         """Return coefficients of monic polynomials modulo the prime of a flow, and whether there are no others."""
         spaces_so_far: list[Vectors] = []
         for k in range(_LINES):
-            spaces = _Line(flow, self.degree, self.support, self.known.values()).spaces()
+            spaces = _Line(flow, self.degree, self.support, self.known_polynomials.values()).spaces()
             if spaces is None or (k and len(spaces_so_far) * len(spaces) > _MAX_CHOICES):
                 break
             if k:
@@ -233,13 +233,13 @@ class _Search:
         return [_monic(space[0], flow.prime) for space in spaces_so_far if len(space) == 1], False
 
     def _try_lift(self, residues: Sequence[int], modulus: int) -> bool:
-        """Lift residues to rational coefficients; add a Darboux polynomial to `known`, and return whether it is one."""
+        """Lift residues to rational coefficients; add a Darboux polynomial to the known ones, and say if it is one."""
         values = rational_vector(residues, modulus)
         if values is None:
             return False
         terms = {monomial: c for monomial, c in zip(self.monomials, values, strict=True) if c}
         P = primitive_part(self.field.rhs[0].context().from_dict(terms))[1]
-        if str(P) in self.known:
+        if str(P) in self.known_polynomials:
             return True
         if darboux_cofactor(self.field, P) is None:
             return False
@@ -254,7 +254,7 @@ class _Search:
                 zeros = [factor for factor, _ in line.restricted(P).factor()[1] if factor.degree() == 1]
                 is_special = bool(line.special(zeros[0])) if zeros else None
         if is_special:
-            self.known[str(P)] = P
+            self.known_polynomials[str(P)] = P
         return is_special
 
     def _lift_to_power(self, vector: Sequence[int], p: int) -> list[int]:
@@ -286,8 +286,8 @@ class _Search:
         if K_coefficients is None:
             return []
         K = combine_polynomials(K_coefficients, cofactor)
-        others = [k for k in range(len(terms)) if k != fixed_index]
-        columns = [*(flow_derivative(terms[k]) - K * terms[k] for k in others), *(-P * k for k in cofactor)]
+        indices = [k for k in range(len(terms)) if k != fixed_index]
+        columns = [*(flow_derivative(terms[k]) - K * terms[k] for k in indices), *(-P * k for k in cofactor)]
         modulus = p
         for _ in range(_PRECISION - 1):
             P = combine_polynomials(P_coefficients, terms)
@@ -298,9 +298,9 @@ class _Search:
             correction = solve(columns, residual / -modulus)
             if correction is None:
                 return []
-            for k, c in zip(others, correction, strict=False):
+            for k, c in zip(indices, correction, strict=False):
                 P_coefficients[k] += c * modulus
-            K_coefficients = [a + c * modulus for a, c in zip(K_coefficients, correction[len(others) :], strict=True)]
+            K_coefficients = [a + c * modulus for a, c in zip(K_coefficients, correction[len(indices) :], strict=True)]
             modulus *= p
         return P_coefficients
 
@@ -338,11 +338,11 @@ class _Line:
     """A random line x = start + t slope, and the special points on it.
 
     A point is special if more polynomials with monomials in the `support` vanish along the solution from the point than
-    along a generic solution. Zeros of the `known` polynomials are left out.
+    along a generic solution. Zeros of the known polynomials are left out.
     """
 
-    def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], known: Iterable[fmpq_mpoly]) -> None:
-        self.flow, self.degree, self.support, self.known = flow, degree, support, known
+    def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], factors: Iterable[fmpq_mpoly]) -> None:
+        self.flow, self.degree, self.support, self.known_polynomials = flow, degree, support, factors
         self.count = len(support)
         self.start, self.slope = flow.random_point(), flow.random_point()
         self._generic_dimensions: dict[int, int] = {}
@@ -399,29 +399,29 @@ class _Line:
             values.append(tuple(map(determinant, minors)))
         minor, other_minor = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
         extactic = minor.gcd(other_minor)
-        for P in self.known:
+        for P in self.known_polynomials:
             factor = self.restricted(P)
             while (common_factor := extactic.gcd(factor)).degree() > 0:
                 extactic = extactic // common_factor
         points = self.special(extactic)
         spaces: list[Vectors] = []
-        choices: list[tuple[int, int, Vectors]] = [(0, 0, [])]
-        tried = 0
-        while choices:
-            first_index, total_degree, space_so_far = choices.pop()
+        partial_choices: list[tuple[int, int, Vectors]] = [(0, 0, [])]
+        choice_count = 0
+        while partial_choices:
+            first_index, total_degree, space_so_far = partial_choices.pop()
             for k in range(first_index, len(points)):
                 degree, space = points[k]
                 if total_degree + degree > self.degree:
                     continue
-                tried += 1
+                choice_count += 1
                 intersection = _intersection(space_so_far, space, p) if total_degree else space
                 if total_degree and len(intersection) <= self._generic_dimension(total_degree + degree):
                     continue
                 if total_degree + degree == self.degree:
                     spaces.append(intersection)
                 else:
-                    choices.append((k + 1, total_degree + degree, intersection))
-            if tried > _MAX_CHOICES:
+                    partial_choices.append((k + 1, total_degree + degree, intersection))
+            if choice_count > _MAX_CHOICES:
                 return None
         return spaces
 

@@ -37,7 +37,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
+from kahanmaps.laboratory.modular_points import IndependentGradients, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, densities_of
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, integrals_of
@@ -138,10 +138,12 @@ class FlowAndMap:
         number = counted(self.count, "integral") if self.count else "no integral"
         number += " free of n" if self.map_search.time_dependent else ""  # time-dependent integrals contain the step n
         if self.lost:
-            lost = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
+            lost_names = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
             verb, degree = "is" if self.lost == 1 else "are", self.map_search.profile.degree
-            statements.append(("measured", f"{lost} {verb} lost up to degree {degree}: the map shows {number}{limits}"))
+            statements.append(
+                ("measured", f"{lost_names} {verb} lost up to degree {degree}: the map shows {number}{limits}")
+            )
         if self.lost < len(self.other_integrals):
             missing_text = f"the limits of {counted(self.without_limit, 'integral')} are not known"
             reason = missing_text if self.without_limit else "its integrals were not counted"
@@ -173,14 +175,14 @@ class FlowAndMap:
             text = f"{time_dependent.name} = {time_dependent.text} is a time-dependent integral of the flow"
             statements.append((str(time_dependent.integral.verdict), text))
         if self.polynomials_degree > 1:
-            lost, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
+            lost_names, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
             degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {lost}Darboux polynomials {degrees} {exceptions} factors of known integrals")
+                ("measured", f"no {lost_names}Darboux polynomials {degrees} {exceptions} factors of known integrals")
             )
         if self.polynomials_reason:
-            lost = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
-            statements.append(("undecided", f"{lost}: {self.polynomials_reason}"))
+            lost_names = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
+            statements.append(("undecided", f"{lost_names}: {self.polynomials_reason}"))
         return statements
 
     def to_json(self) -> dict[str, Any]:
@@ -238,7 +240,7 @@ def flow_and_map(
     progress("Darboux polynomials of the flow")
     darboux_search = laboratory.flow_polynomials(next(budgets))
     limits = _find_limits(search, laboratory) if is_kahan else _find_limits_on_solutions(search, laboratory)
-    independent, dim = Independent(laboratory.maps[0], [limit.leading for limit in limits]), laboratory.map.dim
+    independent, dim = IndependentGradients(laboratory.maps[0], [limit.leading for limit in limits]), laboratory.map.dim
     integral_budget = next(budgets)
     if flow is None and len(limits) < dim - 1:
         flow = integrals_of(laboratory, _MAX_DEGREE.get(dim, 3), integral_budget, progress)
@@ -289,7 +291,7 @@ def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit,
     labels = [integral.name + "(x)" * (integral.name in symbols) for integral in search.integrals]
     formal_field = FunctionField((*labels, *symbols, "eps"), reduces=True)
     map_laboratory = Laboratory(search.file, symbols, None, search.seed)
-    independent = Independent(laboratory.maps[0])
+    independent = IndependentGradients(laboratory.maps[0])
     limits: list[Limit] = []
     # The combinations of integrals that have limits, as functions of x and as formulas in the names of the integrals.
     combinations: list[tuple[Function, Function]] = []
@@ -347,7 +349,7 @@ def _find_limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) ->
     map_gens = [*map_ring.gens()[:n], *map_ring.gens()[search.file.dim :]]
     formal_field = FunctionField([integral.name for integral in search.integrals] + ["eps"], reduces=True)
     function_field = FunctionField(laboratory.map.names, _BUDGET)
-    independent = Independent(laboratory.maps[0])
+    independent = IndependentGradients(laboratory.maps[0])
     limits: list[Limit] = []
     for integral, formula in zip(search.integrals, formal_field.variables, strict=False):
         P, Q = (

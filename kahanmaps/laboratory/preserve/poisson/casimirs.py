@@ -169,14 +169,14 @@ def _find_linear_relations(
     """
     count, degree = len(integrals), max(map(sum, powers))
     all_exponents = exponents_up_to(count, degree)
-    places = [all_exponents.index(exponents) for exponents in powers]
+    indices = [all_exponents.index(exponents) for exponents in powers]
 
     def compute_space(map_: ModularMap) -> DarbouxSpace:
         p, rows = map_.prime, list[list[int]]()
         for _ in range(_SPARE + len(powers)):
             columns_at_point = columns(*_evaluate_fields(map_, tensor, integrals), p)
             rows += [[entry % p for entry in row] for row in zip(*columns_at_point, strict=True)]
-        return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, places)
+        return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, indices)
 
     model = compute_space(laboratory.maps[0])
     if not model.basis:

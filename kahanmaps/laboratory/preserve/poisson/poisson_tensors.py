@@ -38,12 +38,12 @@ from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.defaults import budget_for, tensor_degree
 from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import (
-    Independent,
+    IndependentGradients,
     ModularMap,
     NoPoint,
     Point,
     exponents_up_to,
-    places_of,
+    monomial_index,
     product_of,
     scaled_gradient,
 )
@@ -101,8 +101,8 @@ class FoundTensor(LatexDisplay, ResultPart):
     @property
     def is_liouville_integrable(self) -> bool:
         """Whether enough integrals are known to be in involution for the theorem of Liouville."""
-        is_enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
-        return is_enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
+        has_enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
+        return has_enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
 
     @property
     def statement(self) -> str:
@@ -360,12 +360,12 @@ def _find_tensors(
     # Leave out tensors in the span of earlier tensors and of products of polynomial integrals with tensors.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
-    places, rows = places_of(2 * n, degree), list[list[int]]()
+    indices, rows = monomial_index(2 * n, degree), list[list[int]]()
     for integral in integrals.basis:
         if any(integral[1:]):
-            integral_in_x_and_d = [0] * len(places)
+            integral_in_x_and_d = [0] * len(indices)
             for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
-                integral_in_x_and_d[places[(*exponent, *[0] * n)]] = c
+                integral_in_x_and_d[indices[(*exponent, *[0] * n)]] = c
             products = (product_of(integral_in_x_and_d, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
             rows += [P for P in products if P is not None]
     context, spanned_rank, tensors = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
@@ -405,15 +405,15 @@ def tensor_space(
     Bivectors are polynomials in x and d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
-    places, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
+    indices, pairs = monomial_index(2 * n, degree + 2), list(combinations(range(n), 2))
     unknowns = []  # for each monomial x^a d_i d_j the indices of the monomial, of the pair (i, j) and of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
         for m, exponent in enumerate(exponents_up_to(n, degree)):
             if support is None or (*exponent, *directions) in support:
-                unknowns.append((places[(*exponent, *directions)], p, m))
+                unknowns.append((indices[(*exponent, *directions)], p, m))
 
-    def D_at(x: Point) -> int:
+    def divisor_at(x: Point) -> int:
         """Return the value of `denominator` at a point (None: 1). Raises NoPoint at a pole of this function."""
         if denominator is None:
             return 1
@@ -427,7 +427,7 @@ def tensor_space(
     rows = []
     for x, image in map_.pairs(max(unknowns_by_pair, default=0) + _SPARE_POINTS):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
-        monomials, image_monomials = map_.monomials_at_both(x, image, degree, (D_at(image), D_at(x)))
+        monomials, image_monomials = map_.monomials_at_both(x, image, degree, (divisor_at(image), divisor_at(x)))
         count_work(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
@@ -438,7 +438,7 @@ def tensor_space(
                 ]
             )
     vectors = null_space(rows, len(unknowns), prime)
-    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [place for place, _, _ in unknowns])
+    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [index for index, _, _ in unknowns])
 
 
 def _evaluate(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
@@ -452,7 +452,7 @@ def _add_brackets(
 ) -> FoundTensor:
     """Add to the tensor its Casimirs, and a largest set of integrals in involution."""
     tensor, map_ = found_tensor.tensor, laboratory.maps[0]
-    field, casimir_gradients = GF(map_.prime), Independent(map_)
+    field, casimir_gradients = GF(map_.prime), IndependentGradients(map_)
     P = _evaluate(tensor, map_, casimir_gradients.point)
     rows = [casimir_gradients.gradient(integral.function) for integral in integrals]
     casimirs: list[str] = []
@@ -478,8 +478,8 @@ def _add_brackets(
     ]
     indices = range(min(len(rows), _MAX_INTEGRALS))
     subsets = (subset for size in range(len(indices), 0, -1) for subset in combinations(indices, size))
-    involutive = next((subset for subset in subsets if all(commute[i][j] for i, j in combinations(subset, 2))), ())
-    integrals_in_involution = [integrals[k] for k in involutive]
+    largest_subset = next((subset for subset in subsets if all(commute[i][j] for i, j in combinations(subset, 2))), ())
+    integrals_in_involution = [integrals[k] for k in largest_subset]
     involution = None
     if integrals_in_involution:
         functions = [integral.function for integral in integrals_in_involution]
