@@ -185,7 +185,7 @@ def test_a_curve_that_is_missed_is_said_to_be_one():
 
 @pytest.mark.parametrize("stage", ["_confirm", "degree_growth", "symmetries", "conditions"])
 def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
-    def stop(*_):
+    def stop(*_, **__):
         raise TimeLimit
 
     monkeypatch.setattr(scan_module, stage, stop)
@@ -193,7 +193,7 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
     left_out = {
         "conditions": "all conditions for",
         "_confirm": "the confirmation of",
-        "_measure_growth": "the growth on",
+        "degree_growth": "the growth on",
         "symmetries": "changes of parameters",
     }
     known = list(left_out)
