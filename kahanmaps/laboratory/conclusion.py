@@ -191,10 +191,10 @@ def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
             f"{sense.capitalize()} (proved): {facts.integrals_text}, {clause}; {facts.growth_text}{facts.basis_text}."
         )
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
-    on_curves = orbits_lie_on_curves(result)
-    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
+    is_on_curves = orbits_lie_on_curves(result)
+    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or is_on_curves):
         return None
-    curves_phrase = ", so that orbits lie on curves" if on_curves else ""
+    curves_phrase = ", so that orbits lie on curves" if is_on_curves else ""
     sentence = f"Integrable: {facts.integrals_text}{curves_phrase}; degrees: {facts.growth_text}."
     return _Verdict("integrable", sentence, *_sense_and_ground(facts.liouville))
 
@@ -232,8 +232,8 @@ def _sense_and_ground(liouville: str, ground: Certainty | None = Certainty.MEASU
 
 def _sense_if_not_integrable(result: AnalysisResult) -> str:
     """Return "confining and not integrable" or "not integrable"."""
-    confined = {run.verdict for run in result.singularities} == {CONFINED}
-    return "confining and not integrable" if confined else "not integrable"
+    is_confined = {run.verdict for run in result.singularities} == {CONFINED}
+    return "confining and not integrable" if is_confined else "not integrable"
 
 
 def _capitalize(sentence: str) -> str:
@@ -287,8 +287,8 @@ def doubt_of_heights(result: AnalysisResult) -> str:
     steps = max(len(orbit.growth.heights) for orbit in result.heights.orbits) - 1
     longest = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and longest > steps // 2:
-        too_short = (
+        length_text = (
             f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {longest}"
         )
-        return f"{reason}: {too_short}" if reason else too_short
+        return f"{reason}: {length_text}" if reason else length_text
     return reason

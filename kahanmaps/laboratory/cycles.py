@@ -114,7 +114,7 @@ def cycle_census(
         progress: called with messages.
 
     Returns:
-        A `Census`, exact. A TimeLimit ends the count early: the result is then `stopped`.
+        A `Census`, exact. A TimeLimit ends the count early: the result is then `is_stopped`.
 
     Raises:
         InputError: for a prime, number or dimension out of range; BadPrime if eps or the map has no reduction modulo p.
@@ -138,7 +138,7 @@ def cycle_census(
     vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # zero vectors among them are no points
     initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
     census = replace(census, examined=initial_points.shape[1])
-    step, lengths, stopped = 0, dict[int, int](), False
+    step, lengths, is_stopped = 0, dict[int, int](), False
     indeterminate = [0, 0]  # initial points without image, and points whose orbits end later
     try:
         while step < steps and points.shape[1]:
@@ -153,8 +153,8 @@ def cycle_census(
             is_open = ~(is_indeterminate | is_periodic)
             points, initial_points = points[:, is_open], initial_points[:, is_open]
     except TimeLimit:
-        stopped = True
-    census = replace(census, stopped=stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
+        is_stopped = True
+    census = replace(census, stopped=is_stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
     return replace(census, indeterminate=indeterminate[0], pre_indeterminate=indeterminate[1])
 
 

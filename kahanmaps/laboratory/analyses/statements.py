@@ -105,8 +105,8 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         if functions := list(
             dict.fromkeys(name for relation in result.relations for name in relation.functions_of_eps)
         ):
-            depend = "depends" if len(functions) == 1 else "depend"
-            yield Statement(NOTE, f"{_join_names(functions)} {depend} on eps only")
+            verb = "depends" if len(functions) == 1 else "depend"
+            yield Statement(NOTE, f"{_join_names(functions)} {verb} on eps only")
         if search.reason and profile.nullities:
             yield Statement(NOTE, search.reason)
     if isinstance(result.normal_form, SystemNormalForm):

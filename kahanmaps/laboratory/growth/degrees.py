@@ -472,8 +472,8 @@ class _Search:
         derived_recurrence = self.result(Ended.TERMS, "").derived
         if derived_recurrence is not None:
             longest_pattern = max(patterns.lengths, default=0) if patterns is not None else 0
-            agrees = recurrence is not None and recurrence.characteristic == derived_recurrence.characteristic
-            if (is_confirmed and agrees) or term_count > 2 * longest_pattern + _AGREEING or self.degrees[-1] > _LARGE:
+            is_equal = recurrence is not None and recurrence.characteristic == derived_recurrence.characteristic
+            if (is_confirmed and is_equal) or term_count > 2 * longest_pattern + _AGREEING or self.degrees[-1] > _LARGE:
                 raise Stopped(
                     Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
                 )

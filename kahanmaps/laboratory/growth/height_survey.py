@@ -91,22 +91,22 @@ class HeightSurvey(PrintableResult):
     @property
     def text(self) -> str:
         """A sentence with the kind of growth and the number of orbits of this kind, or with the different kinds."""
-        total, tail = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
+        total, note = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # If the kinds agree for each single eps, they differ only between the eps.
             decided_kinds = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
             cause_text = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
-            return f"heights of exact orbits are undecided: {cause_text} disagree ({', '.join(counts)}){tail}"
+            return f"heights of exact orbits are undecided: {cause_text} disagree ({', '.join(counts)}){note}"
         decided_count = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
-            return f"heights of exact orbits are undecided: {decided_count} of {counted(total, 'orbit')} decided{tail}"
+            return f"heights of exact orbits are undecided: {decided_count} of {counted(total, 'orbit')} decided{note}"
         eps = {orbit.eps for orbit in self.orbits}
         count_text = f"{decided_count} of {total}" if decided_count < total else f"all {total}" if total > 1 else "the"
         eps_text = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
         field_text = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
         orbits = f"{count_text} exact {'orbit' if total == 1 else 'orbits'} tried"
-        return f"{_GROWTH_TEXTS[self.kind]} on {orbits}{eps_text}{field_text}{tail}"
+        return f"{_GROWTH_TEXTS[self.kind]} on {orbits}{eps_text}{field_text}{note}"
 
     def rows(self) -> list[dict[str, str]]:
         """Return a row for each orbit, for example for `pandas.DataFrame(survey.rows())`."""

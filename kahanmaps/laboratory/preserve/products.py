@@ -173,26 +173,26 @@ class _Line:
             x = tuple(c / Z for c in X)
             return x, factor.step(x), int(Z)
 
-        def homogeneous(t: int) -> list[int]:
+        def homogeneous_image(t: int) -> list[int]:
             x, image, Z = step(t)
             denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         # The common factor is removed: its degree would multiply in each further map, and its zeros are no zeros of Z~.
-        undivided = _interpolate(homogeneous, n * map_degree * curve_degree, p)
-        common = reduce(nmod_poly.gcd, undivided)
-        self.image = [entry // common for entry in undivided]
-        self.denominator = self.denominator * undivided[-1]
+        forms = _interpolate(homogeneous_image, n * map_degree * curve_degree, p)
+        common_factor = reduce(nmod_poly.gcd, forms)
+        self.image = [entry // common_factor for entry in forms]
+        self.denominator = self.denominator * forms[-1]
         image_Z = self.image[-1]
 
-        def numerator(t: int) -> list[int]:
+        def numerator_at(t: int) -> list[int]:
             x, image, Z = step(t)
             scale = pow(Z, n * (map_degree - 1), p) * pow(int(image_Z(t)), n, p)
             return [int(det(factor.numerator_matrix(x, image))) * scale % p]
 
         image_degree = max(int(entry.degree()) for entry in self.image)
         self.numerator = (
-            self.numerator * _interpolate(numerator, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
+            self.numerator * _interpolate(numerator_at, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
         )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
@@ -276,8 +276,8 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
         return []
     row_count, column_count = len(rows), len(rows[0])
     count_work(10 + row_count**2 * (row_count + column_count) / 50)
-    augmented = fmpz_mat([[*row, *(int(i == k) for i in range(row_count))] for k, row in enumerate(rows)]).hnf()
-    return [[int(e) for e in row[column_count:]] for row in augmented.tolist() if not any(row[:column_count])]
+    augmented_rows = fmpz_mat([[*row, *(int(i == k) for i in range(row_count))] for k, row in enumerate(rows)]).hnf()
+    return [[int(e) for e in row[column_count:]] for row in augmented_rows.tolist() if not any(row[:column_count])]
 
 
 def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
@@ -342,7 +342,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
     vectors = _reduce_basis(relations(rows), weights)  # entry 0 is the exponent of det dPhi
 
-    def constants(map_: ModularMap) -> list[int]:
+    def evaluate_constants(map_: ModularMap) -> list[int]:
         """Return prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
         p, field_p, products = map_.prime, GF(map_.prime), list[int]()
         parameters = [field_p.convert(c) for c in (*map_.values, map_.eps)]
@@ -360,7 +360,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
             products.append(constant)
         return products
 
-    values = constants_of(laboratory, constants)
+    values = constants_of(laboratory, evaluate_constants)
     vectors_with_constant = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
     def select_vectors(allowed_constants: list[RationalFunction]) -> list[list[int]]:
@@ -398,7 +398,7 @@ def _build_products(
         degree = sum(k * d for k, d in zip(v, degrees, strict=True))
         integrals.append(v if (degree, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
 
-    def product(vector: Sequence[int], constant: RationalFunction) -> Product:
+    def build_product(vector: Sequence[int], constant: RationalFunction) -> Product:
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     def cost(vector: Sequence[int]) -> tuple[int, int, int]:
@@ -415,11 +415,13 @@ def _build_products(
             neighbours = [_linear_combination((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
             best_neighbour = min(neighbours, key=cost, default=vector)
             if cost(best_neighbour) >= cost(vector):
-                density = product(vector, constant)
+                density = build_product(vector, constant)
             vector = best_neighbour
     first_density = densities[0][0]
     return Products(
-        tuple(product(v, first_density) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent)
+        tuple(build_product(v, first_density) for v in integrals),
+        density,
+        tuple(build_product(v, c) for v, c in time_dependent),
     )
 
 

@@ -208,7 +208,7 @@ def repeat_search(
             if pattern in step_branches:
                 candidates = step_branches[pattern].in_order(candidates, map_) or []
             elif len(candidates) > len(model_spaces):
-                candidates = _most_similar(candidates, model_spaces, map_.prime, reference)
+                candidates = _most_similar_spaces(candidates, model_spaces, map_.prime, reference)
             if len(candidates) < len(model_spaces):
                 return None
             ordered_spaces[pattern] = candidates
@@ -232,7 +232,7 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
     return any(len(group_by_pattern(group)) < len(group) for group in result.spaces)
 
 
-def _most_similar(
+def _most_similar_spaces(
     spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
     """Return for each model the space that shares most coefficients with it; conjugate spaces share none of them.

@@ -100,19 +100,19 @@ def points_outside(points: Sequence[Point], components: Iterable[Component], pri
     """Return the points modulo a prime that lie on none of the components."""
     import numpy as np
 
-    outside = np.array(points, dtype=np.int64)
+    outside_points = np.array(points, dtype=np.int64)
     for component in components:
         terms = sum(map(len, component.equations))
-        count_work(10 * terms * (1 + len(outside) / 200))
-        is_on = np.ones(len(outside), dtype=bool)
+        count_work(10 * terms * (1 + len(outside_points) / 200))
+        is_on = np.ones(len(outside_points), dtype=bool)
         for equation in component.equations:
-            total = np.zeros(len(outside), dtype=np.int64)
+            total = np.zeros(len(outside_points), dtype=np.int64)
             for exponents, coefficient in equation.terms():
-                term = np.full(len(outside), int(coefficient.p) % prime)
+                term = np.full(len(outside_points), int(coefficient.p) % prime)
                 for k, exponent in enumerate(exponents):
                     for _ in range(int(exponent)):
-                        term = term * outside[:, k] % prime
+                        term = term * outside_points[:, k] % prime
                 total += term
             is_on &= total % prime == 0
-        outside = outside[~is_on]
-    return [tuple(x) for x in outside.tolist()]
+        outside_points = outside_points[~is_on]
+    return [tuple(x) for x in outside_points.tolist()]

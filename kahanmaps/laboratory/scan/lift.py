@@ -270,8 +270,8 @@ def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits:
     rows = [[modulus, *[0] * (size - 1)]]
     rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(monomial_residues[1:], 1)]
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
-    shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
-    height = max(abs(int(c)) for c in shortest)
+    shortest_row = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
+    height = max(abs(int(c)) for c in shortest_row)
     # Any residues have a relation of a height with (2 height + 1)^size about the modulus; it must be much smaller.
     is_small = (2 * height + 1) ** size << spare_bits <= modulus
-    return [int(c) for c in shortest] if is_small and shortest[-1] else None
+    return [int(c) for c in shortest_row] if is_small and shortest_row[-1] else None

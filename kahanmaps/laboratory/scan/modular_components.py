@@ -120,8 +120,10 @@ def _find_hypersurfaces(
     The first attempt interpolates more points than there are coefficients, and gives the product of all hypersurfaces.
     Further attempts interpolate as many points as determine one hypersurface, if all of them happen to lie on it.
     """
+    dim = points.shape[1]
+    context = nmod_mpoly_ctx.get([f"a{k}" for k in range(dim)], modulus=prime, ordering=Ordering.degrevlex)
     for degree in range(2, _MAX_PRODUCT_DEGREE + 1):
-        coefficient_count = len(exponents_up_to(points.shape[1], degree))
+        coefficient_count = len(exponents_up_to(dim, degree))
         sample_size = int(_SPARE * coefficient_count) + 2
         table = _evaluate_monomials(points, degree, prime)
         for attempt in range(_TRIES if degree == 2 else _TRIES_HIGH_DEGREE if degree <= MAX_DEGREE else 1):
@@ -133,10 +135,17 @@ def _find_hypersurfaces(
             basis = null_space(table[sample].tolist(), coefficient_count, prime)
             if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(sample_size, min_count):
                 continue
-            for factor, factor_degree in _factor_form(basis[0], degree, points.shape[1], prime):
-                is_inside = _evaluate_monomials(points, factor_degree, prime) @ factor % prime == 0
+            terms = {e: c for e, c in zip(exponents_up_to(dim, degree), basis[0], strict=True) if c}
+            count_work(50 + 5 * len(terms))
+            for factor, _ in context.from_dict(terms).factor()[1]:
+                coefficients = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
+                factor_degree = max(map(sum, coefficients))
+                row = [coefficients.get(e, 0) for e in exponents_up_to(dim, factor_degree)]
+                scale = pow(next(c for c in row if c), -1, prime)  # makes the first nonzero coefficient 1
+                form = tuple(c * scale % prime for c in row)
+                is_inside = _evaluate_monomials(points, factor_degree, prime) @ form % prime == 0
                 if is_inside.sum() >= min_count:
-                    yield factor, is_inside
+                    yield form, is_inside
                     points, table = points[~is_inside], table[~is_inside]
 
 
@@ -161,18 +170,3 @@ def _evaluate_monomials(points: Any, degree: int, prime: int) -> Any:
         variable, _, index = divisors_of_monomial[-1]
         table[:, k] = table[:, index] * points[:, variable] % prime
     return table
-
-
-def _factor_form(form: Sequence[int], degree: int, count: int, prime: int) -> list[tuple[Form, int]]:
-    """Return the irreducible factors of a polynomial, scaled to first nonzero coefficient 1, and their degrees."""
-    context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
-    terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
-    factors = []
-    count_work(50 + 5 * len(terms))
-    for factor, _ in context.from_dict(terms).factor()[1]:
-        coefficients = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
-        factor_degree = max(map(sum, coefficients))
-        row = [coefficients.get(e, 0) for e in exponents_up_to(count, factor_degree)]
-        scale = pow(next(c for c in row if c), -1, prime)
-        factors.append((tuple(c * scale % prime for c in row), factor_degree))
-    return factors

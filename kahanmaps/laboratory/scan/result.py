@@ -160,8 +160,8 @@ class Scan(PrintableResult):
     def coverage(self) -> str:
         """A sentence on the members that were measured and on the components that can be found from them."""
         if not self.height:
-            tried = counted(len(self.sweeps), "prime")
-            return f"conditions need members modulo three primes, and those modulo {tried} were tried"
+            primes_text = counted(len(self.sweeps), "prime")
+            return f"conditions need members modulo three primes, and those modulo {primes_text} were tried"
         complete, lines, planes = (
             _abbreviate([str(sweep.prime) for sweep in sweeps]) for sweeps in self._grouped_sweeps
         )

@@ -213,9 +213,11 @@ def scan(
         run.is_interrupted = True
         run.omit(1, "changes of parameters that permute the special members")
     ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
-    generic = sweeps[0].generic if sweeps else ()
+    generic_degrees = sweeps[0].generic if sweeps else ()
     omitted = tuple(run.omitted)
-    return Scan(file, names, exact_eps, seed, generic, tuple(components), sweeps, unassigned, changes, ended, omitted)
+    return Scan(
+        file, names, exact_eps, seed, generic_degrees, tuple(components), sweeps, unassigned, changes, ended, omitted
+    )
 
 
 @dataclass
@@ -478,7 +480,7 @@ def _confirm(
     for _ in range(_CONFIRMING_MEMBERS):
         check()
         degree_sequences.append(family.degrees_on(component.equations, component.degrees, rng))
-    defined = [degrees for degrees in degree_sequences if degrees is not None]
+    sequences = [degrees for degrees in degree_sequences if degrees is not None]
     values = None
     for _ in range(_TRIES):
         point = point_on(component.equations, len(names), QQ, rng)
@@ -489,7 +491,7 @@ def _confirm(
         if not any(other.dimension < component.dimension and other.contains(point) for other in other_components):
             values = dict(zip(names, point, strict=True))
             break
-    return replace(component, tried=len(defined), confirmed=defined.count(component.degrees), values=values)
+    return replace(component, tried=len(sequences), confirmed=sequences.count(component.degrees), values=values)
 
 
 def _count_unassigned(sweep: Sweep, components: Sequence[Component]) -> int:

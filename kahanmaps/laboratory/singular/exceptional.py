@@ -338,7 +338,7 @@ def exceptional_hypersurfaces(
         if i >= _MIN_LINES and all(len({curve.prime for curve in group}) > 1 for group in curves_by_key.values()):
             curves_by_key = dict(sorted(curves_by_key.items()))  # an order that does not depend on random choices
             try:
-                return degree, _patterns(curves_by_key, forms, degree, zeros)
+                return degree, _find_patterns(curves_by_key, forms, degree, zeros)
             except OrbitDataUnknown:
                 continue  # some hypersurface has no points modulo the primes so far
     if limits.budget.is_spent or any(len({curve.prime for curve in group}) < 2 for group in curves_by_key.values()):
@@ -349,7 +349,9 @@ def exceptional_hypersurfaces(
     return degree, _follow(curves_with_functions, [0] * len(curves_by_key), range(len(forms.all)))
 
 
-def _patterns(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
+def _find_patterns(
+    curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int
+) -> list[Hypersurface]:
     """Return the exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
     keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
@@ -420,18 +422,18 @@ def _search_line(
     line = [nmod_poly([x, v], p) for x, v in zip(base, direction, strict=True)]
     image = equation.image(line, nmod_poly([], p), counted_product)
     count_work(sum(gcd_units(len(entry)) for entry in image))
-    common = reduce(nmod_poly.gcd, image)
-    image = [entry // common for entry in image]
+    common_factor = reduce(nmod_poly.gcd, image)
+    image = [entry // common_factor for entry in image]
     degree = max(int(entry.degree()) for entry in image)
     values = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
     image_values = [evaluate(form, map_.field, image) for form in forms.images]
     point_exponents = []  # the exponent of each form in the common factor
     for value in values:
-        quotient, exponent = common, 0
+        quotient, exponent = common_factor, 0
         while value.degree() > 0 and (quotient % value).is_zero():
             quotient, exponent = quotient // value, exponent + 1
         point_exponents.append(exponent)
-    if sum(k * int(value.degree()) for k, value in zip(point_exponents, values, strict=True)) != common.degree():
+    if sum(k * int(value.degree()) for k, value in zip(point_exponents, values, strict=True)) != common_factor.degree():
         raise OrbitDataUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*values, *image_values])
     if product.is_zero():

@@ -282,11 +282,11 @@ class TestCurve:
                 for recurrence in recurrences
             )
             is_cut = not is_complete and not limits.budget.is_spent  # the largest precision did not suffice
-            is_far = len(run) >= min(limits.max_steps, limits.series_steps)
+            is_long = len(run) >= min(limits.max_steps, limits.series_steps)
             if (
                 rows
                 and is_recurrent
-                and (is_far or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
+                and (is_long or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
             ):
                 polynomials = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
                 row_count = max(_CONSTANT, *(2 * int(polynomial.degree()) for polynomial in polynomials))

@@ -45,13 +45,9 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
     ('proved', 'refuted')
     """
     claim, certified_objects = "the Kahan maps of f and g commute", {"system": f, "commute": g}
-    for factor, reason in (
-        (1, "g = f"),
-        (-1, "g = -f, and its map is the inverse"),
-        (0, "g = 0, and its map is x -> x"),
-    ):
+    for factor, text in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
         if g == f.scaled(factor):
-            evidence = Evidence(theorems.METHOD, reason)
+            evidence = Evidence(theorems.METHOD, text)
             return Finding(claim, theorems.PROVED, evidence, formula=_FORMULA, certified=certified_objects)
     count_work(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))

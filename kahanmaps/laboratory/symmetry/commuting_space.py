@@ -227,8 +227,8 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                 fields = [system_of(f.variables, combination(fields, w, fmpq(0))) for w in combinations]
                 matrices = [combination_of(w, matrices) for w in combinations] if matrices else []
             # Replace one member of the basis by f, and move f to the front.
-            flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
-            (relation,) = nullspace(QQ, flat)
+            flat_matrix = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
+            (relation,) = nullspace(QQ, flat_matrix)
             replaced_index = max(k for k in range(len(fields)) if relation[k] != 0)
             other_indices = [k for k in range(len(fields)) if k != replaced_index]
             identity = [QQ.identity(n)] if matrices else []

@@ -204,16 +204,16 @@ def linear_symmetries(
     symmetries = Symmetries(system)
     on_result(symmetries)
     progress("infinitesimal symmetries")
-    _add_infinitesimal(symmetries)
+    _add_lie_algebra(symmetries)
     progress("signed permutations")
-    _add_signed(symmetries, budget)
+    _add_signed_permutations(symmetries, budget)
     if system.dim <= MAX_GENERAL:
         progress("all matrices")
-        _add_general(symmetries, budget)
+        _add_matrices(symmetries, budget)
     return symmetries
 
 
-def _add_infinitesimal(symmetries: Symmetries) -> None:
+def _add_lie_algebra(symmetries: Symmetries) -> None:
     f = symmetries.system
     n = f.dim
     if n > MAX_LINEAR:
@@ -251,7 +251,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
     symmetries.searched.append("affine infinitesimal symmetries and scalings: all")
 
 
-def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
+def _add_signed_permutations(symmetries: Symmetries, budget: Budget) -> None:
     f = symmetries.system
     if f.dim > MAX_SIGNED:
         symmetries.undecided.append(
@@ -319,7 +319,7 @@ def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]
     return group
 
 
-def _add_general(symmetries: Symmetries, budget: Budget) -> None:
+def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
     """Add all rational S with f(S x) = sign S f(x), from the polynomial equations of S."""
     f = symmetries.system
     n = f.dim

@@ -177,13 +177,13 @@ def _candidate_frames(f: QuadraticSystem, search: FixedPointSearch) -> Iterator[
 
     yield QQ.identity(n)
     normals = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
-    yield from itertools.islice(_invertible(normals, n), MAX_FRAMES)
+    yield from itertools.islice(_bases_among(normals, n), MAX_FRAMES)
     lines = [component for component in search.found if component.dimension == 1 and not component.equations]
     directions = [[sum(linear_coefficients(value), fmpq(0)) for value in line.coordinates] for line in lines]
-    yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
+    yield from (columns.transpose().inv() for columns in itertools.islice(_bases_among(directions, n), MAX_FRAMES))
 
 
-def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
+def _bases_among(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
     """Yield the invertible matrices whose rows are n of the vectors."""
     matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
     return (matrix for matrix in matrices if matrix.det() != 0)

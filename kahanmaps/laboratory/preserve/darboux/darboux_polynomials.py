@@ -186,10 +186,10 @@ def darboux_polynomials(
                 spaces_by_C[C] = DarbouxSpace(space.dim, space.degree, basis)
         # Different products of cofactors may be the same function, and have equal spaces. If products of elements span
         # one of these spaces, all of them are left out.
-        seen = [space for C, space in spaces_by_C.items() if _is_spanned_by_products(spaces_by_C, C, map_.prime)]
+        seen_spaces = [space for C, space in spaces_by_C.items() if _is_spanned_by_products(spaces_by_C, C, map_.prime)]
         for C, space in spaces_by_C.items():
-            if space not in seen:
-                seen.append(space)
+            if space not in seen_spaces:
+                seen_spaces.append(space)
                 scaled_spaces = [other_space for key, other_space in all_spaces.items() if key[0] == C[0] and key != C]
                 result = _find_formulas(laboratory, cofactors, C[0], [all_spaces[C], *scaled_spaces], budget)
                 if isinstance(result, str):

@@ -153,7 +153,9 @@ def darboux_spaces(
     # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = complement + multiples.
     size = len(complement) + len(multiples)
     upper_positions = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    values, image_values = _values(map_, [*complement, *multiples], degree, len(upper_positions) + _SPARE)
+    values, image_values = _evaluate_at_random_points(
+        map_, [*complement, *multiples], degree, len(upper_positions) + _SPARE
+    )
     count_work(len(upper_positions) ** 2 / 2)
     rows = []
     for x, y in zip(integers(values), integers(image_values), strict=True):
@@ -173,7 +175,7 @@ def darboux_spaces(
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
-def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
+def _evaluate_at_random_points(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
     """Return the values of the polynomials at random points and at the images of these, one row for each point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
@@ -186,7 +188,7 @@ def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[
 
 def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
     """Return whether all ratios of the polynomials are conserved at random points."""
-    u, v = _values(map_, basis, degree, 6)
+    u, v = _evaluate_at_random_points(map_, basis, degree, 6)
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
@@ -387,7 +389,7 @@ class TwoPointMap(ModularMap):
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.two_point_basis = base.rng, base.map, two_point_basis
 
-    def _values(self, x: Point, y: Point) -> list[int]:
+    def _bilinear_values(self, x: Point, y: Point) -> list[int]:
         p, sign, X, Y = self.prime, self.two_point_basis.sign, (1, *x), (1, *y)
         count_work(len(pairs_of(self.dim)) / 2)
         # The Wronskian that stands for a square is 0. Random numbers replace it, so that no relation contains it.
@@ -403,7 +405,7 @@ class TwoPointMap(ModularMap):
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         is_closed = len(points) < count + shift
         shifted_points = points[shift % len(points) :] + (points[: shift % len(points)] if is_closed else [])
-        rows = [self._values(x, y) for x, y in zip(points, shifted_points, strict=False)]
+        rows = [self._bilinear_values(x, y) for x, y in zip(points, shifted_points, strict=False)]
         supported_rows = rows if support is None else [[row[k] for k in support] for row in rows]
         return supported_rows, points[0], len(points) if is_closed else None
 
@@ -417,7 +419,7 @@ class TwoPointMap(ModularMap):
             if next_point is None:
                 raise NoPoint("an iterate of a random point modulo a prime is an indeterminacy point")
             points.append(next_point)
-        at_point, at_image = (self._values(points[k], points[k + self.two_point_basis.shift]) for k in (0, 1))
+        at_point, at_image = (self._bilinear_values(points[k], points[k + self.two_point_basis.shift]) for k in (0, 1))
         return [factors[0] * value for value in at_point], [factors[1] * value for value in at_image]
 
 

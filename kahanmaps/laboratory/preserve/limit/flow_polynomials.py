@@ -222,15 +222,15 @@ class _Search:
             if spaces is None or (k and len(spaces_so_far) * len(spaces) > _MAX_CHOICES):
                 break
             if k:
-                intersections = (_intersection(A, B, flow.prime) for A in spaces_so_far for B in spaces)
+                intersections = (_intersect(A, B, flow.prime) for A in spaces_so_far for B in spaces)
                 distinct_spaces = dict.fromkeys(tuple(map(tuple, space)) for space in intersections if space)
                 spaces = [list(map(list, key)) for key in distinct_spaces]
             spaces_so_far = spaces
             if all(len(space) == 1 for space in spaces_so_far):
-                return [_monic(vector, flow.prime) for [vector] in spaces_so_far], True
+                return [_make_monic(vector, flow.prime) for [vector] in spaces_so_far], True
             if budget.is_spent:
                 break
-        return [_monic(space[0], flow.prime) for space in spaces_so_far if len(space) == 1], False
+        return [_make_monic(space[0], flow.prime) for space in spaces_so_far if len(space) == 1], False
 
     def _try_lift(self, residues: Sequence[int], modulus: int) -> bool:
         """Lift residues to rational coefficients; add a Darboux polynomial to the known ones, and say if it is one."""
@@ -320,15 +320,15 @@ def _is_irrational(residue: int, modulus: int) -> bool:
         rows = [[modulus, *[0] * degree]]
         rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
         count_work(50 * degree**3)
-        shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
+        shortest_vector = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
         # For a random residue the entries of the shortest vector have about 1/(degree + 1) of the bits of the modulus.
-        if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
-            factors = [factor for factor, _ in fmpz_poly(shortest).factor()[1] if factor(residue) % modulus == 0]
+        if max(map(abs, shortest_vector)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
+            factors = [factor for factor, _ in fmpz_poly(shortest_vector).factor()[1] if factor(residue) % modulus == 0]
             return bool(factors) and all(factor.degree() > 1 for factor in factors)
     return False
 
 
-def _monic(vector: Sequence[int], prime: int) -> list[int]:
+def _make_monic(vector: Sequence[int], prime: int) -> list[int]:
     """Scale a vector modulo a prime so that its first nonzero entry is 1."""
     inverse = pow(next(c for c in vector if c), -1, prime)
     return [c * inverse % prime for c in vector]
@@ -414,7 +414,7 @@ class _Line:
                 if total_degree + degree > self.degree:
                     continue
                 choice_count += 1
-                intersection = _intersection(space_so_far, space, p) if total_degree else space
+                intersection = _intersect(space_so_far, space, p) if total_degree else space
                 if total_degree and len(intersection) <= self._generic_dimension(total_degree + degree):
                     continue
                 if total_degree + degree == self.degree:
@@ -456,7 +456,7 @@ class _Line:
         return interpolated(nodes, [int(evaluate(P, field_p, x)) for x in points], self.flow.prime)
 
 
-def _intersection(A: Vectors, B: Vectors, prime: int) -> Vectors:
+def _intersect(A: Vectors, B: Vectors, prime: int) -> Vectors:
     """Return a basis of the intersection of the spans of two bases."""
     kernel = null_space(list(zip(*A, *B, strict=True)), len(A) + len(B), prime)
     return combine([weights[: len(A)] for weights in kernel], A, prime)

@@ -177,12 +177,12 @@ class _ModularPlane:
         count_work(500 + 60 * degree**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
             [form**k for k in range(degree + 1)]
-            for form in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
+            for form in (x * self._draw() + y * self._draw() + self._draw() for _ in "xyz")
         )
         P, Q = (sum((X[i] * Y[j] * Z[degree - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
         curves: list[nmod_mpoly] = []  # the components through three random points
         for _ in range(3):
-            point = [self._random(), self._random()]
+            point = [self._draw(), self._draw()]
             member = P * int(Q(*point)) - Q * int(P(*point))
             _require(not member.is_zero())
             through_point = [(C, e) for C, e in member.factor()[1] if not int(C(*point))]
@@ -203,7 +203,7 @@ class _ModularPlane:
         )
         return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - genus_drop, tuple(points))
 
-    def _random(self) -> int:
+    def _draw(self) -> int:
         return self._rng.randrange(1, self.prime)
 
     def _find_points(self, C: nmod_mpoly, D: nmod_mpoly, d: int) -> None:
@@ -213,10 +213,10 @@ class _ModularPlane:
         _require(eliminant[-1] != 0)
         for factor, intersection in nmod_poly(eliminant, self.prime).factor()[1]:
             if intersection < 4:  # less than 2^2: a simple point, followed by simple points infinitely near to it
-                self._add_simple(int(factor.degree()), int(intersection), near=False)
+                self._add_simple(int(factor.degree()), int(intersection), is_near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
-            a = _root(K, [K(int(c)) for c in factor.coeffs()])
+            a = _find_root(K, [K(int(c)) for c in factor.coeffs()])
             polynomials_on_line = list[Any]()  # F(a, y) as polynomials over K
             for F in (C, D):
                 coefficients = [K(0)] * (int(F.total_degree()) + 1)
@@ -238,16 +238,17 @@ class _ModularPlane:
                 )
                 for F in (C, D)
             )
-            self._resolve(K, f, g, max_intersection, exact=True, near=False)
+            self._resolve(K, f, g, max_intersection, is_exact=True, is_near=False)
 
-    def _add_simple(self, conjugates: int, chain: int, near: bool) -> None:
-        self.points[1, near] += conjugates
-        self.points[1, True] += conjugates * (chain - 1)
+    def _add_simple(self, conjugate_count: int, chain_length: int, is_near: bool) -> None:
+        self.points[1, is_near] += conjugate_count
+        self.points[1, True] += conjugate_count * (chain_length - 1)
 
-    def _resolve(self, K: Any, f: _Series, g: _Series, max_intersection: int, *, exact: bool, near: bool) -> None:
+    def _resolve(self, K: Any, f: _Series, g: _Series, max_intersection: int, *, is_exact: bool, is_near: bool) -> None:
         """Count the origin and the points infinitely near to it, as far as they are common points of two curves over K.
 
-        The intersection number is at most `max_intersection`, and equal to it if `exact`; it bounds the degrees needed.
+        The intersection number is at most `max_intersection`, and equal to it if `is_exact`; it bounds the degrees of
+        the terms that matter.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())
@@ -255,13 +256,13 @@ class _ModularPlane:
         _require(m == min(map(sum, g), default=max_intersection + 1) and m * m <= max_intersection)
         if m == 0:
             return
-        if m == 1 and exact:
-            self._add_simple(K.degree(), max_intersection, near)
+        if m == 1 and is_exact:
+            self._add_simple(K.degree(), max_intersection, is_near)
             return
-        self.points[m, near] += K.degree()
+        self.points[m, is_near] += K.degree()
         if m * m == max_intersection:
             return
-        shear = K(self._random())  # afterwards x = 0 is tangent to neither curve
+        shear = K(self._draw())  # afterwards x = 0 is tangent to neither curve
         f, g = (  # F(x + s y, y)
             _collect_terms(((i - k, j + k), c * comb(i, k) * shear**k) for (i, j), c in F.items() for k in range(i + 1))
             for F in (f, g)
@@ -273,24 +274,24 @@ class _ModularPlane:
             k = int(direction.degree())
             L = fq_default_ctx(self.prime, K.degree() * k)
             embed = _embedding(K, L)
-            slope = _root(L, [embed(c) for c in direction.coeffs()])
-            direction_bound = (max_intersection - m * m) // (k if len(directions) == 1 else 1)
+            slope = _find_root(L, [embed(c) for c in direction.coeffs()])
+            bound = (max_intersection - m * m) // (k if len(directions) == 1 else 1)
             f_blown_up, g_blown_up = (  # F(x, x (y + slope))/x^m without terms of a degree above `bound`
                 _collect_terms(
                     ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
                     for (i, j), c in ((exponents, embed(c)) for exponents, c in F.items())
-                    for k in range(min(j, direction_bound - (i + j - m)) + 1)
+                    for k in range(min(j, bound - (i + j - m)) + 1)
                 )
                 for F in (f, g)
             )
-            self._resolve(L, f_blown_up, g_blown_up, direction_bound, exact=exact and len(directions) == 1, near=True)
+            self._resolve(L, f_blown_up, g_blown_up, bound, is_exact=is_exact and len(directions) == 1, is_near=True)
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
     return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub does not allow lists
 
 
-def _root(K: Any, coefficients: list[Any]) -> Any:
+def _find_root(K: Any, coefficients: list[Any]) -> Any:
     return _polynomial(K, coefficients).roots()[0][0]
 
 
@@ -298,7 +299,7 @@ def _embedding(K: Any, L: Any) -> Any:
     """Return an embedding of the finite field K into L."""
     if K.degree() == L.degree():
         return lambda c: c
-    generator = _root(L, [L(int(c)) for c in K.modulus().coeffs()])
+    generator = _find_root(L, [L(int(c)) for c in K.modulus().coeffs()])
     powers = [generator**k for k in range(K.degree())]
     return lambda c: sum((power * L(int(a)) for a, power in zip(c.to_list(), powers, strict=False)), L(0))
 

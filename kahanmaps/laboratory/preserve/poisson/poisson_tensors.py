@@ -473,12 +473,12 @@ def _add_brackets(
                 add_casimir(name, function, row)
     # The first largest set of integrals whose brackets with each other vanish at the point.
     hamiltonian_fields = [(P * field.column(row)).entries() for row in rows]
-    commute = [
+    is_zero = [
         [sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in hamiltonian_fields] for row in rows
     ]
     indices = range(min(len(rows), _MAX_INTEGRALS))
     subsets = (subset for size in range(len(indices), 0, -1) for subset in combinations(indices, size))
-    largest_subset = next((subset for subset in subsets if all(commute[i][j] for i, j in combinations(subset, 2))), ())
+    largest_subset = next((subset for subset in subsets if all(is_zero[i][j] for i, j in combinations(subset, 2))), ())
     integrals_in_involution = [integrals[k] for k in largest_subset]
     involution = None
     if integrals_in_involution:
