@@ -152,18 +152,18 @@ class Line:
     def _image_by_series(self, equation: Equation, length: int) -> list[nmod_poly] | None:
         """Return the image from power series with `length` terms, or None if these are too few to be certain."""
         X = [entry.truncate(length) for entry in self._X]
-        values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
+        monomials = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
         count_work(row_units(equation, length))
         try:
-            rows = equation.rows(values, nmod_poly([0], self.prime))
+            rows = equation.rows(monomials, nmod_poly([0], self.prime))
             *x, denominator = kernel(rows, 1, length, [], self._require_budget)
         except PrecisionTooLow:
             raise ZeroDivisionError("the point t = 0 of the line has no image") from None
         if not int(denominator[0]):
             raise ZeroDivisionError("the point t = 0 of the line has no image")
         count_work(series_units(length) + len(x) * product_units(length, length))
-        inverse = denominator.inverse_series_trunc(length)
-        x = [entry.mul_low(inverse, length) for entry in x]
+        reciprocal = denominator.inverse_series_trunc(length)
+        x = [entry.mul_low(reciprocal, length) for entry in x]
         # The polynomials (X : Z) with X/Z = x.
         for _ in range(2):
             numerator_series, denominator_series = (

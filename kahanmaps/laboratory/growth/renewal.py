@@ -90,8 +90,8 @@ def degree_series(
             entries[k + 1 :] = [(pivot[k] * e - factor * p) // previous_pivot for e, p in pairs]
         previous_pivot = pivot[k]
     denominator, numerator = cleared_rows[-1][-2], -cleared_rows[-1][-1]
-    common_denominator = numerator.gcd(denominator)
-    numerator, denominator = numerator // common_denominator, denominator // common_denominator
+    common_factor = numerator.gcd(denominator)
+    numerator, denominator = numerator // common_factor, denominator // common_factor
     sign = 1 if denominator[0] > 0 else -1
     return numerator * sign, denominator * sign
 

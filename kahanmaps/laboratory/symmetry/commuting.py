@@ -310,7 +310,7 @@ class _Search:
         self.on_result(replace(result, **copied_lists, undecided=[*result.undecided, UNFINISHED]))
 
     def _solve(self, region: SolutionComponent, order_index: int) -> None:
-        """Solve the equations of order `ORDERS[level]` on a part of the space."""
+        """Solve the equations of order `ORDERS[order_index]` on a region of the space."""
         order, result = ORDERS[order_index], self.result
         self.settings.progress(f"equations at eps^{order}, {len(region.free)} unknowns")
         result.order = max(result.order, order)

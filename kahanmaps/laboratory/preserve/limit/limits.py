@@ -175,14 +175,14 @@ class FlowAndMap:
             text = f"{time_dependent.name} = {time_dependent.text} is a time-dependent integral of the flow"
             statements.append((str(time_dependent.integral.verdict), text))
         if self.polynomials_degree > 1:
-            lost_names, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
+            other_text, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
             degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {lost_names}Darboux polynomials {degrees} {exceptions} factors of known integrals")
+                ("measured", f"no {other_text}Darboux polynomials {degrees} {exceptions} factors of known integrals")
             )
         if self.polynomials_reason:
-            lost_names = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
-            statements.append(("undecided", f"{lost_names}: {self.polynomials_reason}"))
+            subject_text = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
+            statements.append(("undecided", f"{subject_text}: {self.polynomials_reason}"))
         return statements
 
     def to_json(self) -> dict[str, Any]:
