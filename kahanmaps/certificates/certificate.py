@@ -42,7 +42,7 @@ from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.laboratory import Separated, separated
+from kahanmaps.laboratory.laboratory import SeparatedSystem, separate_planes
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
@@ -347,7 +347,7 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = 
 
     claims: list[Claim] = []
     given = [data.with_rows(map_.rows) for map_ in maps]
-    separate = separated(file.system) if file.is_quadratic else None
+    separate = separate_planes(file.system) if file.is_quadratic else None
     if separate is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
         T, zero = separate.T, [fmpq(0)] * file.dim
         moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
@@ -415,11 +415,11 @@ class _Planes:
     data: MapData
 
     @cached_property
-    def separate(self) -> tuple[Separated, AffineSymmetry] | None:
+    def separate(self) -> tuple[SeparatedSystem, AffineSymmetry] | None:
         """The system in the coordinates z if it is shorter, and the claim that T takes its map to the given map."""
         file, n = self.file, self.data.dim
         has_symbols = len(self.data.names) > n + 1
-        separate = None if file.member is None or has_symbols else separated(file.system)
+        separate = None if file.member is None or has_symbols else separate_planes(file.system)
         if separate is None:
             return None
         in_planes = self.data.with_rows(as_map(separate.system).rows)
