@@ -76,8 +76,8 @@ class NpyFile:
     def _header(self, rows: int) -> bytes:
         """Return the header; numpy pads it so that its length is the same for any number of rows."""
         stream = io.BytesIO()
-        what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
-        np.lib.format.write_array_header_1_0(stream, what)
+        header_fields = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
+        np.lib.format.write_array_header_1_0(stream, header_fields)
         return stream.getvalue()
 
     def __enter__(self) -> NpyFile:

@@ -26,7 +26,7 @@ class _Divisor(Exception):
         super().__init__()
 
 
-class _Torsion:
+class _TorsionPoints:
     """Points (X, y Y) of y^2 = c = x^3 + A x + B with X and Y modulo f."""
 
     def __init__(self, f: Poly, c: Poly, A: Any) -> None:
@@ -34,9 +34,9 @@ class _Torsion:
 
     def inverse(self, value: Poly) -> Poly:
         """Return 1/value modulo f. Raises _Divisor."""
-        common, inverse, _ = value.xgcd(self.f)
-        if common.degree() > 0:
-            raise _Divisor(common)
+        common_factor, inverse, _ = value.xgcd(self.f)
+        if common_factor.degree() > 0:
+            raise _Divisor(common_factor)
         return inverse % self.f
 
     def add(self, P: Point, Q: Point) -> Point:
@@ -81,7 +81,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             continue
         f, residue = division_polynomials[prime], None
         while residue is None:
-            torsion = _Torsion(f, c, A)  # find the trace that satisfies the equation on the points with f = 0
+            torsion = _TorsionPoints(f, c, A)  # find the trace that satisfies the equation on the points with f = 0
             try:
                 frobenius = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 frobenius_squared = (pow(frobenius[0], q, f), frobenius[1] * pow(frobenius[1], q, f) % f)
@@ -96,8 +96,8 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
                     if target is not None:
                         raise AssertionError("no trace of Frobenius fits: please report this")
                     residue = 0
-            except _Divisor as smaller:
-                f = smaller.divisor
+            except _Divisor as error:
+                f = error.divisor
         trace += modulus * ((residue - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
@@ -109,7 +109,7 @@ class _DivisionPolynomials:
     def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
         xx = x * x
         xxx = xx * x
-        self._square = 16 * c * c
+        self._16_c_squared = 16 * c * c
         self._values: dict[int, Poly] = {
             -1: 0 * x - 1,
             0: 0 * x,
@@ -122,16 +122,16 @@ class _DivisionPolynomials:
 
     def __getitem__(self, n: int) -> Poly:
         if n not in self._values:
-            m, odd = divmod(n, 2)
+            m, is_odd = divmod(n, 2)
             # psi_n with an even n is stored without its factor 2 y. In the recurrence for an odd index, one of the two
             # products contains four such factors, 16 y^4 = 16 c^2.
-            if odd:
+            if is_odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
                 self._values[n] = (
-                    first_product - second_product * self._square
+                    first_product - second_product * self._16_c_squared
                     if m % 2
-                    else first_product * self._square - second_product
+                    else first_product * self._16_c_squared - second_product
                 )
             else:
                 bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]

@@ -16,14 +16,13 @@ and the multiples n T are different from 0 as long as W(n) is not 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle, islice
+from itertools import cycle, islice, product
 from typing import NamedTuple
 
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import from_residues
-from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import ElementaryMap, Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
@@ -71,7 +70,7 @@ def elliptic_steps(
             search = _Search(period, start_point, stride)
             try:
                 numbers = search.numbers(max_primes)
-                exact_curves = None if numbers is None else _Exact(search, numbers)
+                exact_curves = None if numbers is None else _ExactCurves(search, numbers)
             except ArithmeticError:
                 is_special = True
                 continue
@@ -109,8 +108,20 @@ class _Search:
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(factor.integer_steps.is_triangular for factor in factors):
             # Each coordinate must be a copy of a new coordinate some steps before; coordinates must not only permute.
-            earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
-            ungrouped = [(k, i) for k in range(stride) for i in range(n)]
+            earlier: list[list[int | None]] = [[None] * n for _ in range(stride)]
+            for k, copied_coordinates in enumerate(earlier):
+                # The index of the equal coordinate of the point, for each coordinate of the image that is a copy.
+                equation = factors[(k - 1) % len(factors)].equation
+                for row in equation.terms:
+                    unknowns = [j for j in range(n) if row[j]]
+                    if len(unknowns) == 1 and len(row[unknowns[0]]) == len(row[n]) == 1:
+                        ((left, a),), ((right, b),) = row[unknowns[0]], row[n]  # indices of monomials, coefficients
+                        exponent_pairs = zip(equation.exponents[left], equation.exponents[right], strict=True)
+                        exponent_change = [y - x for x, y in exponent_pairs]
+                        is_copy = sorted(exponent_change) == [-1] + [0] * (n - 1) + [1] and exponent_change[n] == -1
+                        if a == -b and is_copy:
+                            copied_coordinates[unknowns[0]] = exponent_change.index(1)
+            ungrouped = list(product(range(stride), range(n)))
             for _ in range(stride * n):
                 ungrouped = [((k - 1) % stride, g) for k, i in ungrouped if (g := earlier[k][i]) is not None]
             if not ungrouped:
@@ -120,7 +131,7 @@ class _Search:
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
         """Return the numbers of all new groups; None if no curves exist or the numbers are too long."""
-        residues = from_residues(self._modulo, max_primes)
+        residues = from_residues(self._numbers_modulo, max_primes)
         if residues is None:
             return None
         rows = [
@@ -139,7 +150,7 @@ class _Search:
         copied = self.earlier[k][group]
         return self.sections[k, group].degree if copied is None else self.degree((k - 1) % self.stride, copied)
 
-    def _modulo(self, prime: int) -> list[list[int]] | None:
+    def _numbers_modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
         for point_count in (
             [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
@@ -168,20 +179,6 @@ class _Search:
         return None
 
 
-def _copies(equation: Equation) -> list[int | None]:
-    """Return for each coordinate of the image the equal coordinate of the point; None for a new coordinate."""
-    n = equation.dim
-    copies: list[int | None] = [None] * n
-    for row in equation.terms:
-        unknowns = [j for j in range(n) if row[j]]
-        if len(unknowns) == 1 and len(row[unknowns[0]]) == len(row[n]) == 1:
-            ((k, a),), ((m, b),) = row[unknowns[0]], row[n]
-            change = [y - x for x, y in zip(equation.exponents[k], equation.exponents[m], strict=True)]
-            if a == -b and sorted(change) == [-1] + [0] * (n - 1) + [1] and change[n] == -1:
-                copies[unknowns[0]] = change.index(1)
-    return copies
-
-
 def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
     """Return whether the forms agree with the orbit at more steps than their degree, and hence at all steps."""
     factors, stride = search.factors, search.stride
@@ -208,7 +205,7 @@ def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bo
     return all(steps.multiples.integer(n) != 0 for n in range(1, search.first // stride + max_degree + 2))
 
 
-class _Exact:
+class _ExactCurves:
     """The sequences and forms over Q, constructed from the numbers of each group."""
 
     def __init__(self, search: _Search, numbers: dict[tuple[int, int], Numbers]) -> None:
@@ -218,14 +215,14 @@ class _Exact:
             key: fmpz_mat(size, search.sections[key].degree, primitive_integers(numbers_of_key.coefficients))
             for key, numbers_of_key in numbers.items()
         }
-        first_of_sequences = {
+        initial_terms = {
             key: first_terms(numbers_of_key.H, numbers_of_key.y, numbers_of_key.z)
             for key, numbers_of_key in numbers.items()
         }
-        self._W, *others = (W for W, _ in first_of_sequences.values())
-        if any(other != self._W for other in others):
+        self._W, *other_sequences = (W for W, _ in initial_terms.values())
+        if any(sequence != self._W for sequence in other_sequences):
             raise ArithmeticError("the curves differ")
-        self._U = {key: U for key, (_, U) in first_of_sequences.items()}
+        self._U = {key: U for key, (_, U) in initial_terms.items()}
         terms_at_0 = [around(U, 0, self._W)[0] for U in self._U.values()]
         if 0 in terms_at_0:
             raise ArithmeticError("the initial point is special")
