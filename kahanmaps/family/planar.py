@@ -237,12 +237,12 @@ class NormalForm(HtmlDisplay, ResultPart):
         S_transposed, tensors = self.S.transpose(), third_derivatives(self.H)
         for i, column in enumerate(S_transposed.tolist()):
             bilinear_form = S_transposed * combination_of(column, tensors) * self.S
-            expected = [
+            expected_form = [
                 expected_values[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m]
                 for j in range(n)
                 for k in range(n)
             ]
-            if bilinear_form != fmpq_mat(n, n, expected):
+            if bilinear_form != fmpq_mat(n, n, expected_form):
                 raise AssertionError("normal form: H(S z) is not l(h)")
 
     def _functional_of_powers(self, element: fmpq_poly, count: int) -> list[fmpq]:
@@ -314,11 +314,11 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
         for j in range(i + 1, i + n):
             if rank == m:
                 break
-            sums = [v + c * _unit_vector(n, j % n) for c in multiples]
-            ranks = [_krylov_matrix(t, w).rank() for w in sums]
+            candidates = [v + c * _unit_vector(n, j % n) for c in multiples]
+            ranks = [_krylov_matrix(t, w).rank() for w in candidates]
             if max(ranks) > rank:
                 rank = max(ranks)
-                v = sums[ranks.index(rank)]
+                v = candidates[ranks.index(rank)]
         yield v
 
 

@@ -356,10 +356,10 @@ def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> I
         return
     a = fmpq(-polynomial[d - 1] / d + fmpq(1, 2)).floor()
     X, polynomial = X - E * a, polynomial(fmpq_poly([a, 1]))
-    common = fmpz(0)
+    gcd = fmpz(0)
     for k in range(d):
-        common = common.gcd(polynomial[k].p)
-    for b, _ in common.factor(trial_limit=_TRIAL_DIVISION):
+        gcd = gcd.gcd(polynomial[k].p)
+    for b, _ in gcd.factor(trial_limit=_TRIAL_DIVISION):
         while b > 1 and all(polynomial[d - k].p % b**k == 0 for k in range(1, d + 1)):
             X, polynomial = X / b, fmpq_poly([polynomial[d - k] / b**k for k in range(d, -1, -1)])
     yield X, polynomial

@@ -49,18 +49,18 @@ def defects(A: fmpq_mat) -> list[str]:
     if n != A.ncols() or n % 2 or n == 0:
         return [f"A is {n} x {A.ncols()}, expected a square matrix of even size 2m"]
     m, J = n // 2, standard_structure(n)
-    expected = -(J * A.transpose() * J)  # equal to A if and only if A^T J = J A
+    expected_matrix = -(J * A.transpose() * J)  # equal to A if and only if A^T J = J A
     skew_rule = "block must be skew"
     messages = []
-    for rule, top, left in (
+    for rule, top_row, left_column in (
         ("lower right block must be the transpose of the upper left one", m, m),
         (f"upper right {skew_rule}", 0, m),
         (f"lower left {skew_rule}", m, 0),
     ):
         for i in range(m):
-            for j in range(0 if top == left else i, m):
-                row, column = top + j, left + i
-                expected_entry = fmpq(0) if top != left and i == j else expected[row, column]
+            for j in range(0 if top_row == left_column else i, m):
+                row, column = top_row + j, left_column + i
+                expected_entry = fmpq(0) if top_row != left_column and i == j else expected_matrix[row, column]
                 if A[row, column] != expected_entry:
                     position = f"entry ({row + 1},{column + 1})"
                     texts = _short_text(A[row, column]), _short_text(expected_entry)
@@ -88,8 +88,8 @@ def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
     _, pairs = A.charpoly().factor()
     factors = []
     for polynomial, multiplicity in pairs:
-        monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
-        factors.append(Factor(monic, multiplicity // 2))
+        monic_polynomial = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
+        factors.append(Factor(monic_polynomial, multiplicity // 2))
 
     def sort_key(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
         return factor.degree, (-factor.polynomial[0],) if factor.degree == 1 else tuple(factor.polynomial.coeffs())

@@ -216,8 +216,8 @@ def components(
     component_terms: list[dict[tuple[int, ...], fmpq]] = [{} for _ in range(m)]
     for exponent, coefficient in remainder.terms():
         component_terms[exponent[-1]][tuple(exponent[:-1])] = coefficient
-    target = ring(names)
-    return [target.from_dict(terms) for terms in component_terms]
+    target_ring = ring(names)
+    return [target_ring.from_dict(terms) for terms in component_terms]
 
 
 def _as_matrices(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:

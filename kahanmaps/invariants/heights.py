@@ -308,7 +308,7 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     increases: list[Fraction] = [
         width * _leading_coefficient(heights[offset + j * width : offset + (j + 1) * width + 1], 1) for j in range(4)
     ]
-    differences = [after - before for before, after in pairwise(increases)]
+    differences = [later - earlier for earlier, later in pairwise(increases)]
     text = f"four quarters raise them by {', '.join(decimal_text(increase, 4) for increase in increases)} bits"
     if min(differences) > 0 and sum(differences) >= 2 * _NOISE:
         e1, e2, e3 = differences

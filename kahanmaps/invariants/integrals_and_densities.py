@@ -395,10 +395,10 @@ def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequ
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerators = [
-        det(factor.numerator_matrix(before, after))
-        for factor, before, after in zip(factors, points, (*points[1:], image), strict=True)
+        det(factor.numerator_matrix(point, next_point))
+        for factor, point, next_point in zip(factors, points, (*points[1:], image), strict=True)
     ]
-    denominators = [factor.determinant(before) for factor, before in zip(factors, points, strict=True)]
+    denominators = [factor.determinant(point) for factor, point in zip(factors, points, strict=True)]
     with map_at_eps.field.working():
         return reduce(mul, numerators), reduce(mul, denominators)
 
@@ -422,9 +422,9 @@ class Normalized:
 
     def combination(self, name: str) -> str:
         """Return the integral as a formula in I (called `name`), the symbols and eps, e.g. "(F1 - 1)/eps^2"."""
-        target = ring([name, *(variable for variable in self.function.names if variable != name)])
-        alpha, beta, gamma = (coefficient.project_to_context(target) for coefficient in self.coefficients)
-        return format_rational_function(RationalFunction(alpha * target.gen(0) + beta, gamma))
+        target_ring = ring([name, *(variable for variable in self.function.names if variable != name)])
+        alpha, beta, gamma = (coefficient.project_to_context(target_ring) for coefficient in self.coefficients)
+        return format_rational_function(RationalFunction(alpha * target_ring.gen(0) + beta, gamma))
 
 
 def normalized(function: RationalFunction, dim: int) -> Normalized:

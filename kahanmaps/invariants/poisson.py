@@ -175,8 +175,8 @@ class MatrixPoissonTensor(PoissonTensor):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
             arguments = (*point, field.convert(eps))
-            upper = {pair: entry.value(field, arguments) for pair, entry in self._upper_entries.items()}
-            return None if None in upper.values() else self._matrix(field, upper)
+            upper_entries = {pair: entry.value(field, arguments) for pair, entry in self._upper_entries.items()}
+            return None if None in upper_entries.values() else self._matrix(field, upper_entries)
 
     def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         with field.working():
@@ -190,14 +190,14 @@ class MatrixPoissonTensor(PoissonTensor):
                 ]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
-            upper = {}
+            upper_entries = {}
             for pair, entry in self._upper_entries.items():
                 numerator, denominator = self._gradients[pair]
                 N, D = evaluate(entry.numerator, field, arguments), evaluate(entry.denominator, field, arguments)
-                upper[pair] = directional_derivative(numerator) / D
+                upper_entries[pair] = directional_derivative(numerator) / D
                 if not entry.is_polynomial:
-                    upper[pair] = upper[pair] - N * directional_derivative(denominator) / (D * D)
-            return self._matrix(field, upper)
+                    upper_entries[pair] = upper_entries[pair] - N * directional_derivative(denominator) / (D * D)
+            return self._matrix(field, upper_entries)
 
     @cached_property
     def _upper_entries(self) -> dict[tuple[int, int], RationalFunction]:
@@ -212,10 +212,14 @@ class MatrixPoissonTensor(PoissonTensor):
     def _gradients(self) -> dict[tuple[int, int], tuple[Any, Any]]:
         return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper_entries.items()}
 
-    def _matrix(self, field: Field, upper: Mapping[tuple[int, int], Any]) -> Any:
+    def _matrix(self, field: Field, upper_entries: Mapping[tuple[int, int], Any]) -> Any:
         n, zero = self.dim, field.zero
         entries = [
-            upper[i, j] if (i, j) in upper else -upper[j, i] if (j, i) in upper else zero
+            upper_entries[i, j]
+            if (i, j) in upper_entries
+            else -upper_entries[j, i]
+            if (j, i) in upper_entries
+            else zero
             for i in range(n)
             for j in range(n)
         ]

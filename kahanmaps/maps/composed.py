@@ -214,10 +214,10 @@ def composed_map(
     requested_factors: list[MapFactor] = []
     for k, (map_, power) in enumerate(powers):
         functions = symbols_as_functions | dict(values[k]) if values else symbols_as_functions
-        missing = next((name for name in map_.symbols if name not in functions), None)
-        if missing is not None:
+        missing_symbol = next((name for name in map_.symbols if name not in functions), None)
+        if missing_symbol is not None:
             raise InputError(
-                f"found a map with the symbol {missing}: give its value, or make it a symbol of the composition"
+                f"found a map with the symbol {missing_symbol}: give its value, or make it a symbol of the composition"
             )
         requested_factors += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
     if not requested_factors:

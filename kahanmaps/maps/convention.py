@@ -23,10 +23,10 @@ NO_EPS = "the map does not depend on eps"
 
 def either(hint: str = "", **arguments: Any) -> Any:
     """Return the argument that is given under one of several names, or None. Raises InputError if two are given."""
-    given = {name: value for name, value in arguments.items() if value is not None}
-    if len(given) > 1:
-        raise InputError(f"found {' and '.join(given)}, expected one of them{hint}")
-    return next(iter(given.values()), None)
+    given_values = {name: value for name, value in arguments.items() if value is not None}
+    if len(given_values) > 1:
+        raise InputError(f"found {' and '.join(given_values)}, expected one of them{hint}")
+    return next(iter(given_values.values()), None)
 
 
 def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:

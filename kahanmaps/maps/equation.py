@@ -125,9 +125,9 @@ class Equation:
             context = nmod_mpoly_ctx.get(names, modulus=self.over.prime, ordering=Ordering.degrevlex)
         else:
             context = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
-        scalar = int if isinstance(self.over, PrimeField) else fmpq
+        coefficient_type = int if isinstance(self.over, PrimeField) else fmpq
         return [
-            [context.from_dict({self.exponents[k]: scalar(value) for k, value in entry}) for entry in row]
+            [context.from_dict({self.exponents[k]: coefficient_type(value) for k, value in entry}) for entry in row]
             for row in self.terms
         ]
 

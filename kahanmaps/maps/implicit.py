@@ -167,8 +167,10 @@ class Map(LatexDisplay):
             return NotImplemented
         if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
             return False
-        mine, theirs = ([(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other))
-        return mine == theirs
+        own_equations, other_equations = (
+            [(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other)
+        )
+        return own_equations == other_equations
 
     def __hash__(self) -> int:
         return hash((self.dim, self.variables))

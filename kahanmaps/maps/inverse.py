@@ -140,7 +140,7 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
     return bool(total == 0)
 
 
-def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], is_on_graph: Callable[[Any], bool]) -> Solution:
     """Solve for the unknowns as functions of the other variables, from polynomials that vanish on the graph."""
     if not unknowns:
         return {}
@@ -150,7 +150,7 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
             continue
         if len(polynomial) > _MAX_TERMS:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
-        factor = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
+        factor = next((factor for factor, _ in polynomial.factor()[1] if is_on_graph(factor)), None)
         if factor is None:
             raise TooLarge("the elimination found no inverse of this map: give it as well")
         if factor not in relations:
@@ -163,8 +163,8 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
             candidates, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
         )
         constant, factor = _coefficients_in(relation, u)  # constant + factor x_u = 0
-        remaining = [_substitute_quotient(p, u, -constant, factor) for p in relations if p is not relation]
-        solution = _solve(remaining, [v for v in unknowns if v != u], on_graph)
+        remaining_relations = [_substitute_quotient(p, u, -constant, factor) for p in relations if p is not relation]
+        solution = _solve(remaining_relations, [v for v in unknowns if v != u], is_on_graph)
         (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-constant, factor))
         return solution | {u: _in_lowest_terms(a * d, b * c)}
     # If no equation is linear in an unknown, resultants eliminate an unknown.
@@ -181,12 +181,12 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
         if len(pivot) * len(p) * (pivot.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
         relations_without_u.append(pivot.resultant(p, name))
-    solution = _solve(relations_without_u, [v for v in unknowns if v != u], on_graph)
+    solution = _solve(relations_without_u, [v for v in unknowns if v != u], is_on_graph)
     gcd = None
     for p in relations_with_u:
         numerator, _ = _substitute_solution(p, solution)
         gcd = numerator if gcd is None else gcd.gcd(numerator)
-    return solution | _solve([gcd], [u], on_graph)
+    return solution | _solve([gcd], [u], is_on_graph)
 
 
 def _coefficients_in(polynomial: Any, u: int) -> list[Any]:

@@ -90,9 +90,9 @@ class KahanMap(ElementaryMap):
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
             self._system_eps = self.eps if inside is None else inside
-            remaining = iter(self.values)
+            remaining_values = iter(self.values)
             self.local = system.over(
-                field, [self._system_eps if x == "eps" else next(remaining) for x in system.symbols]
+                field, [self._system_eps if x == "eps" else next(remaining_values) for x in system.symbols]
             )
             self._arguments = (system, field, self.values, self._system_eps)
         self.field, self.dim = self.local.field, self.local.dim
@@ -196,10 +196,15 @@ class KahanFamily(MapFamily):
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> KahanMap:
         """Return the map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime if it has no reduction."""
-        cached = self._cached_map
-        if cached is None or cached.field is not over or cached.eps is not eps or cached.values != tuple(values):
-            self._cached_map = cached = KahanMap(self.system, eps, over, values)
-        return cached
+        cached_map = self._cached_map
+        if (
+            cached_map is None
+            or cached_map.field is not over
+            or cached_map.eps is not eps
+            or cached_map.values != tuple(values)
+        ):
+            self._cached_map = cached_map = KahanMap(self.system, eps, over, values)
+        return cached_map
 
     @cached_property
     def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # read only

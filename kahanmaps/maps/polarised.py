@@ -69,7 +69,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     backward = [unit_row((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
     for i, f in enumerate(rhs):
         # `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term.
-        linear, constant = [zero] * n, zero
+        linear_coefficients, constant = [zero] * n, zero
         for monomial, coefficient in f.terms():
             indices: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
             indices += [None] * (degree - len(indices))
@@ -84,10 +84,10 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
                 if j is None:
                     constant = constant + product
                 else:
-                    linear[j] = linear[j] + product
+                    linear_coefficients[j] = linear_coefficients[j] + product
         deltas = [context.constant(int(i == j)) for j in range(n)]
-        new_row = [delta - entry for delta, entry in zip(deltas, linear, strict=True)]
-        old_row = [delta + entry for delta, entry in zip(deltas, linear, strict=True)]
+        new_row = [delta - entry for delta, entry in zip(deltas, linear_coefficients, strict=True)]
+        old_row = [delta + entry for delta, entry in zip(deltas, linear_coefficients, strict=True)]
         forward.append((*zeros, *new_row, -points[0][i] - constant))
         backward.append((*old_row, *zeros, -points[-1][i] + constant))
     field = PolynomialField(tuple(substitute(f, {parameters[-1]: fmpq(0)}) for f in rhs), parameters[:-1])

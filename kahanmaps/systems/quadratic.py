@@ -100,8 +100,8 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     @cached_property
     def B(self) -> fmpq_mat:
         """The matrix of the linear part; only for systems without symbols."""
-        linear: fmpq_mat = self._over_rationals.B
-        return linear
+        matrix: fmpq_mat = self._over_rationals.B
+        return matrix
 
     @cached_property
     def c(self) -> tuple[fmpq, ...]:
@@ -219,7 +219,7 @@ class SystemOver:
         Raises BadPrime if the prime divides the denominator of a coefficient.
         """
         n, zero = system.dim, field.zero
-        tensor, linear, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
+        tensor, linear_entries, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
 
         def add(entries: list[Any], index: int, value: Any) -> None:
             entries[index] = value if entries[index] is zero else entries[index] + value
@@ -241,10 +241,10 @@ class SystemOver:
                         if j != k:
                             add(tensor, (i * n + k) * n + j, value)
                     elif len(indices) == 1:
-                        add(linear, i * n + indices[0], value)
+                        add(linear_entries, i * n + indices[0], value)
                     else:
                         add(constants, i, value)
-            matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
+            matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear_entries), field.column(constants)
         return cls(field, *matrices, None if system.symbols else system)
 
     @property

@@ -71,7 +71,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees)
     assert orbit.relations is not None
     search = elliptic._Search(map_over.factors, expected[0], stride)
     assert search.numbers() is not None
-    assert [search.sections[place].degree for place in search.new] == degrees
+    assert [search.sections[place].degree for place in search.new_groups] == degrees
 
 
 @pytest.mark.parametrize("name", ["euler_top", "planar_cubic_hamiltonian", "todd", "mcmillan"])

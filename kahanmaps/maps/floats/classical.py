@@ -100,8 +100,8 @@ def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
     >>> work("midpoint", 100), work("midpoint", 100, 1)
     ((300, 300), (309, 309))
     """
-    properties, stages = METHODS[method], len(_IMPLICIT[method][1]) if repeated else 0
-    evaluations = properties.evaluations * steps + repeated * (1 + stages * _CAREFUL_ITERATIONS)
+    properties, stage_count = METHODS[method], len(_IMPLICIT[method][1]) if repeated else 0
+    evaluations = properties.evaluations * steps + repeated * (1 + stage_count * _CAREFUL_ITERATIONS)
     return evaluations, properties.systems * steps + repeated * (1 + _CAREFUL_ITERATIONS)
 
 
@@ -156,12 +156,37 @@ def method_step(
         family = KahanFamily(system)
         return map_step([factor for part in parts for factor in family.at(eps * part).factors])
     field, h = FieldProgram(system), to_float(2 * eps)
+    if method in _IMPLICIT:
+        return FloatStep(system.dim, _implicit_writer(field, h, *_IMPLICIT[method]))
     if method in SEPARABLE and halves is not None:
-        write = _split_writer(field, h, halves, method)
-    elif method in _TABLEAUS:
-        write = _explicit_writer(field, h, *_TABLEAUS[method])
+        # Change positions and momenta in turn: positions by h first, or momenta by h/2 before and after them.
+        positions, momenta = halves
+        substeps = [(positions, h), (momenta, h)]
+        if method == "stormer-verlet":
+            substeps = [(momenta, h / 2), (positions, h), (momenta, h / 2)]
+
+        def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+            state = list(x)
+            for group, duration in substeps:
+                slopes = field(state)
+                state = [y + duration * slopes[i] if i in group else y for i, y in enumerate(state)]
+            return state
+
     else:
-        write = _implicit_writer(field, h, *_IMPLICIT[method])
+        rows, weights = _TABLEAUS[method]
+
+        def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+            slopes: list[list[Any]] = []
+
+            def stage_point(factors: Sequence[float]) -> list[Any]:
+                return [
+                    y + _sum(h * a * k[i] for a, k in zip(factors, slopes, strict=True) if a) for i, y in enumerate(x)
+                ]
+
+            for row in rows:
+                slopes.append(field(stage_point(row)))
+            return stage_point(weights)
+
     return FloatStep(system.dim, write)
 
 
@@ -198,36 +223,6 @@ class FieldProgram:
 
 def _sum(values: Any) -> Any:
     return reduce(lambda a, b: a + b, values, 0.0)
-
-
-def _explicit_writer(field: FieldProgram, h: float, rows: list[list[float]], weights: list[float]) -> Write:
-    def stage_point(x: Sequence[Any], factors: Sequence[float], slopes: Sequence[Sequence[Any]]) -> list[Any]:
-        return [x[i] + _sum(h * a * k[i] for a, k in zip(factors, slopes, strict=True) if a) for i in range(len(x))]
-
-    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        slopes: list[list[Any]] = []
-        for row in rows:
-            slopes.append(field(stage_point(x, row, slopes)))
-        return stage_point(x, weights, slopes)
-
-    return write
-
-
-def _split_writer(field: FieldProgram, h: float, halves: tuple[frozenset[int], frozenset[int]], method: str) -> Write:
-    """Change positions and momenta in turn: positions by h first, or momenta by h/2 before and after them."""
-    positions, momenta = halves
-    substeps = [(positions, h), (momenta, h)]
-    if method == "stormer-verlet":
-        substeps = [(momenta, h / 2), (positions, h), (momenta, h / 2)]
-
-    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        state = list(x)
-        for group, duration in substeps:
-            slopes = field(state)
-            state = [y + duration * slopes[i] if i in group else y for i, y in enumerate(state)]
-        return state
-
-    return write
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:

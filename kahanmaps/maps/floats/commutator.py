@@ -46,8 +46,10 @@ class Commutator:
         if self.by_eps and self.slope is None:
             lines.append("measured\tat n = 1 it is rounding for all eps")
         elif self.slope is not None:
-            first, last = self.by_eps[0], self.by_eps[-1]
-            text = f"{first[1]:.2g} at eps = {format_number(first[0])} to {last[1]:.2g} at {format_number(last[0])}"
+            (first_eps, first_size), (last_eps, last_size) = self.by_eps[0], self.by_eps[-1]
+            text = (
+                f"{first_size:.2g} at eps = {format_number(first_eps)} to {last_size:.2g} at {format_number(last_eps)}"
+            )
             lines.append(f"measured\tat n = 1 it is of order eps^{self.slope:.2f}: {text}")
         return lines + [f"measured\t{self.message}"] * bool(self.message)
 

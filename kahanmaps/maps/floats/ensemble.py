@@ -83,7 +83,9 @@ def distribution(values: NDArray[Any]) -> dict[str, float]:
     quantiles = np.quantile(values, _QUANTILES, method="inverted_cdf").tolist()
     with np.errstate(over="ignore"):
         mean = float(values.mean())
-    quantiles_by_name = {f"{100 * share:g}%": float(value) for share, value in zip(_QUANTILES, quantiles, strict=True)}
+    quantiles_by_name = {
+        f"{100 * probability:g}%": float(value) for probability, value in zip(_QUANTILES, quantiles, strict=True)
+    }
     return {"min": float(values.min()), **quantiles_by_name, "max": float(values.max()), "mean": mean}
 
 
@@ -183,7 +185,7 @@ class FloatEnsemble(AttributeHints):
         self._escaped_to = np.full(shape, np.nan)
         self.backward = backward
         self.step = 0
-        self._note_escapes(0, self._starts[None])
+        self._record_escapes(0, self._starts[None])
 
     def _build_step(self) -> None:
         self._step = map_step(self._factors) if self._blocks is None else planar_step(self._blocks)
@@ -198,8 +200,8 @@ class FloatEnsemble(AttributeHints):
         self._build_step()
 
     def __repr__(self) -> str:
-        alive = int((self._batch.status == RUNNING).sum())
-        return f"<FloatEnsemble: {self.n} orbits after {counted(self.step, 'step')}, {alive} completed>"
+        running_count = int((self._batch.status == RUNNING).sum())
+        return f"<FloatEnsemble: {self.n} orbits after {counted(self.step, 'step')}, {running_count} completed>"
 
     @property
     def n(self) -> int:
@@ -252,8 +254,8 @@ class FloatEnsemble(AttributeHints):
         The drift is over the orbits that completed their steps, by the name of the integral. If a radius is given,
         "escape step" is the distribution of `escaped_at` over the orbits that escaped. See `distribution`.
         """
-        completed = self._batch.status == RUNNING
-        results = {drift.name: distribution(drift.largest[completed]) for drift in self.drift}
+        is_complete = self._batch.status == RUNNING
+        results = {drift.name: distribution(drift.largest[is_complete]) for drift in self.drift}
         if self._radius is not None:
             results["escape step"] = distribution(self._escaped_at[self._escaped_at >= 0])
         return results
@@ -316,23 +318,23 @@ class FloatEnsemble(AttributeHints):
                 x = self._points_of(record)
                 if self._radius is not None:
                     first_step = self.step - len(x) + 1
-                    self._note_escapes(first_step, x)
+                    self._record_escapes(first_step, x)
                     x = x[-first_step % every :: every]
                 for watched in self._watched_functions:
                     watched.observe(x)
                 if len(x):
                     yield x
 
-    def _note_escapes(self, first_step: int, x: FloatArray) -> None:
+    def _record_escapes(self, first_step: int, x: FloatArray) -> None:
         """Store for each orbit the first point outside the radius among the steps first_step, first_step + 1, ..."""
         if self._radius is None:
             return
-        inside = np.flatnonzero(self._escaped_at < 0)
+        inside_orbits = np.flatnonzero(self._escaped_at < 0)
         with np.errstate(invalid="ignore"):
-            is_outside = np.abs(x[:, inside]).max(axis=2) > self._radius
+            is_outside = np.abs(x[:, inside_orbits]).max(axis=2) > self._radius
         escaping = np.flatnonzero(is_outside.any(axis=0))
         indices = is_outside[:, escaping].argmax(axis=0)
-        orbits = inside[escaping]
+        orbits = inside_orbits[escaping]
         self._escaped_at[orbits], self._escaped_to[orbits] = first_step + indices, x[indices, orbits]
 
     def _record_steps(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
@@ -356,25 +358,29 @@ class FloatEnsemble(AttributeHints):
         chunk_size = self.n if self._threads == 1 else -(-self.n // (self._threads * _CHUNKS_PER_THREAD * 64)) * 64
         chunk_starts = range(0, self.n, chunk_size)
         while self.step < last_step:
-            first, count = self.step, min(portion_steps, last_step - self.step)
+            first_step, count = self.step, min(portion_steps, last_step - self.step)
             tables = []
             for interval in intervals:
-                record_count = (first + count) // interval - first // interval if interval else 0
+                record_count = (first_step + count) // interval - first_step // interval if interval else 0
                 tables.append(RecordTable(interval, np.empty((record_count, rows, self.n))))
-            nonempty = [table for table in tables if len(table.states)]
+            nonempty_tables = [table for table in tables if len(table.states)]
             if self._is_compiled:
 
-                def advance(start: int, first: int = first, count: int = count, nonempty: Any = nonempty) -> None:
-                    self._machine_code.advance(batch, start, min(self.n, start + chunk_size), first, count, nonempty)
+                def advance(
+                    start: int, first_step: int = first_step, count: int = count, nonempty_tables: Any = nonempty_tables
+                ) -> None:
+                    self._machine_code.advance(
+                        batch, start, min(self.n, start + chunk_size), first_step, count, nonempty_tables
+                    )
 
                 with ThreadPoolExecutor(self._threads) if len(chunk_starts) > 1 else nullcontext() as pool:
                     list(map(advance, chunk_starts) if pool is None else pool.map(advance, chunk_starts))
             else:
-                advance_by_numpy(self._step, batch, first, count, nonempty)
-            self.step = first + count
+                advance_by_numpy(self._step, batch, first_step, count, nonempty_tables)
+            self.step = first_step + count
             for interval, states in tables:  # states after the end of an orbit become NaN
                 if len(states) and (batch.status != RUNNING).any():
-                    recorded_steps = (first // interval + 1 + np.arange(len(states))) * interval
+                    recorded_steps = (first_step // interval + 1 + np.arange(len(states))) * interval
                     after_end = (batch.failed_at >= 0) & (recorded_steps[:, None] >= batch.failed_at)
                     states.transpose(0, 2, 1)[after_end] = np.nan
             if self._blocks is not None and len(tables[1].states):

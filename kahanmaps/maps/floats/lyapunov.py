@@ -186,10 +186,10 @@ def lyapunov_exponents(
             progress(f"step {orbits.step} of {phase_ends[-1]}")
             phase_end = next(phase_end for phase_end in phase_ends if phase_end > orbits.step)
             count = min(phase_end - orbits.step, _MAX_PORTION_STEPS, max(1, _PORTION_ENTRIES // (len(x) * n * n)))
-            previous = orbits.x[None]
+            previous_points = orbits.x[None]
             new_points = np.concatenate(list(orbits.records(count, 1)))[-count:]
             is_running &= ~np.isnan(new_points).any(axis=(0, 2))
-            points = np.concatenate([previous, new_points])[:, is_running]
+            points = np.concatenate([previous_points, new_points])[:, is_running]
             with np.errstate(all="ignore"):
                 maps, log_dets = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
                 maps, log_dets = maps.reshape(count, -1, n, n), log_dets.reshape(count, -1)

@@ -185,8 +185,8 @@ class MachineCode:
                 f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
             )
 
-        fast, (*fast_image, good) = translate(step.fast_code, "f")
-        careful, (*careful_image, near, singular, overflow) = translate(step.careful_code, "c")
+        fast_code, (*fast_image, good) = translate(step.fast_code, "f")
+        careful_code, (*careful_image, near, singular, overflow) = translate(step.careful_code, "c")
         sections = {
             "load": f"%record = mul i64 %n, {step.rows}\n"
             + repeat_for_rows(
@@ -196,8 +196,8 @@ class MachineCode:
                 "%z{i} = call $v @llvm.masked.load.$s.p0(ptr %z{i}.p, i32 8, $m %there, $v zeroinitializer)",
             ),
             "states": repeat_for_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
-            "fast": fast,
-            "careful": careful,
+            "fast": fast_code,
+            "careful": careful_code,
             "choose": repeat_for_rows(
                 "%k{i} = select $m %fine, $v {fast}, $v {careful}",
                 "%e{i} = select $m %ended, $v zeroinitializer, $v %k{i}",
@@ -235,11 +235,11 @@ def _compile(text: str) -> tuple[Any, Any]:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
-    machine = llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
+    target_machine = llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
     module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.triple, module.data_layout = target_machine.triple, str(target_machine.target_data)
     module.verify()
-    engine = llvm.create_mcjit_compiler(module, machine)  # the engine takes ownership of the target machine
+    engine = llvm.create_mcjit_compiler(module, target_machine)  # the engine takes ownership of the target machine
     engine.finalize_object()
     types = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
     return engine, ctypes.CFUNCTYPE(None, *types)(engine.get_function_address("advance"))

@@ -77,6 +77,8 @@ def _equidistant_values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArr
         raise InputError(f"found {quoted(digits)} points, expected 2 to {MAX_NUMBERS // dim} in dimension {dim}")
     to_float(low), to_float(high)  # raise the error for numbers that are too large for doubles
     denominator = int(low.q) * int(high.q)
-    first, last = int(low.p) * int(high.q), int(high.p) * int(low.q)
+    low_numerator, high_numerator = int(low.p) * int(high.q), int(high.p) * int(low.q)
     intervals = point_count - 1  # a quotient of Python integers is rounded correctly
-    return np.array([(first * (intervals - k) + last * k) / (denominator * intervals) for k in range(point_count)])
+    return np.array(
+        [(low_numerator * (intervals - k) + high_numerator * k) / (denominator * intervals) for k in range(point_count)]
+    )

@@ -211,11 +211,11 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
 
 def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple[Any, ...]:
     """Take a careful step with partial pivoting in numpy arrays, for maps of many variables."""
-    near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
+    is_near, is_singular, is_finite = (np.full(x[0].shape, value) for value in (False, False, True))
     image: Any = np.array(x)
     for equation in equations:
         n, y = len(x), equation.monomials(image)
-        M = np.zeros((n, n + 2, len(near)))
+        M = np.zeros((n, n + 2, len(is_near)))
         M[:, :-1] = np.array(equation.constants)[:, :, None]
         for i, entries in enumerate(equation.terms):
             for j, terms in enumerate(entries):
@@ -223,11 +223,11 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
                     M[i, j] += c * y[k]
         M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # the sizes of the rows
         pivots = eliminate(M, n, 1)
-        near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
-        singular |= finite & (pivots == 0.0).any(axis=0)
+        is_near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+        is_singular |= is_finite & (pivots == 0.0).any(axis=0)
         image = M[:, n]
-        finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
-    return *image, near & finite & ~singular, singular, ~finite & ~singular
+        is_finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
+    return *image, is_near & is_finite & ~is_singular, is_singular, ~is_finite & ~is_singular
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
@@ -298,13 +298,13 @@ class BatchState(NamedTuple):
     def note(self, orbits: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
         """Record the results of a careful step from `index`, for the orbits `orbits`; return which of these ended."""
         near, singular, overflow = (np.broadcast_to(x, orbits.shape) for x in (near, singular, overflow))
-        ended = singular | overflow
-        self.status[orbits[ended]] = np.where(singular[ended], SINGULAR, OVERFLOW)
-        self.failed_at[orbits[ended]] = index + 1
-        near_orbits = orbits[near & ~ended]
+        has_ended = singular | overflow
+        self.status[orbits[has_ended]] = np.where(singular[has_ended], SINGULAR, OVERFLOW)
+        self.failed_at[orbits[has_ended]] = index + 1
+        near_orbits = orbits[near & ~has_ended]
         self.near_at[near_orbits] = np.where(self.near[near_orbits] == 0, index, self.near_at[near_orbits])
         self.near[near_orbits] += 1
-        return ended
+        return has_ended
 
 
 class RecordTable(NamedTuple):
@@ -332,27 +332,27 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
             for index in range(first, first + steps):
                 try:
                     if step.fast_code is None:
-                        image, good = x, False
+                        image, is_good = x, False
                     elif is_single:
-                        *image, good = step.fast_on_floats(*x)
-                        if not good and step.careful_code is not None:
-                            *image, near, singular, overflow = step.careful_on_floats(*x)
-                            good = not (near or singular or overflow)
+                        *image, is_good = step.fast_on_floats(*x)
+                        if not is_good and step.careful_code is not None:
+                            *image, is_near, is_singular, is_overflow = step.careful_on_floats(*x)
+                            is_good = not (is_near or is_singular or is_overflow)
                     else:
-                        *image, good = step.fast(*x)
+                        *image, is_good = step.fast(*x)
                 except ZeroDivisionError:  # in arrays the result would be infinite
-                    image, good = x, False
+                    image, is_good = x, False
                 # Orbits in which the fast step is not valid repeat it as a careful step.
-                if good is not True and not np.all(good | has_ended):
-                    repeated_orbits = np.flatnonzero(~(good | has_ended))
+                if is_good is not True and not np.all(is_good | has_ended):
+                    repeated_orbits = np.flatnonzero(~(is_good | has_ended))
                     points_before, points_after = (
                         np.array([np.broadcast_to(row, has_ended.shape) for row in state]) for state in (x, image)
                     )
-                    *careful_image, near, singular, overflow = step.careful(*points_before[:, repeated_orbits])
-                    ended = batch.note(start + repeated_orbits, index, near, singular, overflow)
+                    *careful_image, is_near, is_singular, is_overflow = step.careful(*points_before[:, repeated_orbits])
+                    ends_now = batch.note(start + repeated_orbits, index, is_near, is_singular, is_overflow)
                     for row, values in zip(points_after, careful_image, strict=True):
-                        row[repeated_orbits] = np.where(ended, 0.0, values)
-                    has_ended[repeated_orbits] |= ended
+                        row[repeated_orbits] = np.where(ends_now, 0.0, values)
+                    has_ended[repeated_orbits] |= ends_now
                     image = points_after[:, 0].tolist() if is_single else list(points_after)
                 x = image
                 for buffer, (interval, states) in zip(buffers, tables, strict=True):

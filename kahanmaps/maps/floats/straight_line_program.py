@@ -126,8 +126,8 @@ class Value:
         self.code, self.number = code, number
 
     def __neg__(self) -> Any:
-        positive = _operand_of_negation(self)
-        return self.code.emit("neg", self) if positive is None else positive
+        operand = _operand_of_negation(self)
+        return self.code.emit("neg", self) if operand is None else operand
 
     def __add__(self, other: Any) -> Any:
         if is_zero(other):
@@ -170,8 +170,8 @@ class Value:
         return 0.0 if is_zero(other) else self.code.emit("div", other, self)
 
     def __abs__(self) -> Any:
-        positive = _operand_of_negation(self)
-        return self.code.emit("abs", self if positive is None else positive)
+        operand = _operand_of_negation(self)
+        return self.code.emit("abs", self if operand is None else operand)
 
     def __gt__(self, other: Any) -> Any:
         return self.code.emit("gt", self, other)
@@ -295,8 +295,8 @@ class StepChecks:
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
-        fails = singular | _negation(self.finite)
-        return [self.near & _negation(fails), singular, fails & _negation(singular)]
+        has_failed = singular | _negation(self.finite)
+        return [self.near & _negation(has_failed), singular, has_failed & _negation(singular)]
 
 
 def _negation(x: Any) -> Any:
@@ -418,22 +418,22 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
     return solution
 
 
-def _choose_pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
+def _choose_pivots(nonzero_columns: list[set[int]]) -> list[tuple[int, int]]:
     """Return row and column of each pivot, on the diagonal if possible, with little fill-in (Markowitz).
 
     The result has fewer pivots than rows if the positions of the zeros make the matrix singular.
     """
-    rows, pivots = {i: set(row) for i, row in enumerate(pattern)}, []
+    rows, pivots = {i: set(row) for i, row in enumerate(nonzero_columns)}, []
     while rows:
-        counts: dict[int, int] = {}
+        column_counts: dict[int, int] = {}
         for row in rows.values():
             for j in row:
-                counts[j] = counts.get(j, 0) + 1
+                column_counts[j] = column_counts.get(j, 0) + 1
         candidates = [(i, j) for i, row in rows.items() for j in row]
         candidates = [(i, j) for i, j in candidates if i == j] or candidates
         if not candidates:
             break
-        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (counts[entry[1]] - 1), entry))
+        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (column_counts[entry[1]] - 1), entry))
         pivot_row = rows.pop(i)
         pivots.append((i, j))
         for row in rows.values():

@@ -41,10 +41,10 @@ class PeriodicLevels:
     @cached_property
     def primitive(self) -> fmpz_poly:
         """The primitive part of psi_N, without the factors that it shares with psi_d for proper divisors d of N."""
-        polynomial, table = self.psi, division_polynomials(self.period)
+        polynomial, psi = self.psi, division_polynomials(self.period)
         for d in range(1, self.period):
             if self.period % d == 0:
-                while (common_factor := polynomial.gcd(table[d])).degree() > 0:
+                while (common_factor := polynomial.gcd(psi[d])).degree() > 0:
                     polynomial = polynomial / common_factor
         return polynomial / polynomial.content()
 

@@ -108,12 +108,13 @@ class PlaneGeometry:
         if self.j is None or self.point is None or self.bad_primes is None:
             return lines
         order = "infinite order" if self.order is None else f"order {self.order}"
-        minimal = self.bad_primes.minimal_discriminant
+        minimal_discriminant = self.bad_primes.minimal_discriminant
         lines += [
             f"  k^3\t{_text(self.delta)}",
             f"  Weierstrass model\tY^2 = x^3 + (9 + 3 g) x^2 + 48 g x + 64 g^2, g = 1 - k^3 = {_text(self.gamma)}",
             f"  j-invariant\t{_text(self.j)}",
-            f"  discriminant\t{_text(self.discriminant)}" + ("" if minimal is None else f", minimal {minimal}"),
+            f"  discriminant\t{_text(self.discriminant)}"
+            + ("" if minimal_discriminant is None else f", minimal {minimal_discriminant}"),
             f"  bad primes\t{self.bad_primes.text}" + (" (the primes of Q below them)" if self.degree > 1 else ""),
             f"  translation\t({', '.join(map(_text, self.point))}), {order} (proved: {self.reason})",
         ]
@@ -272,7 +273,7 @@ def geometry(
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
     """Return the geometry for a system whose normal form is given; see `geometry`."""
     planes = []
-    for plane, triple, kind, gamma, rotations in _levels(normal_form, eps, start):
+    for plane, triple, kind, gamma, rotations in _plane_levels(normal_form, eps, start):
         if kind is not PeriodKind.SMOOTH:
             planes.append(PlaneGeometry(plane.name, kind, degree=plane.degree))
             continue
@@ -312,10 +313,12 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 
     Raises PrecisionLost if a level is almost singular.
     """
-    return {rotation.root: rotation for *_, rotations in _levels(normal_form, eps, start) for rotation in rotations}
+    return {
+        rotation.root: rotation for *_, rotations in _plane_levels(normal_form, eps, start) for rotation in rotations
+    }
 
 
-def _levels(
+def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
     """Yield for each plane the point, the kind of its level curve, gamma, and the rotations if the level is smooth."""

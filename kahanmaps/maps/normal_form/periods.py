@@ -201,14 +201,16 @@ def plane_period(
     order = translation_order(gamma, q, context)
     # With a pole as zero of the group, T is the image of the pole, and the orbit meets the pole if and only if the
     # point is a multiple of T.
-    answers: list[bool | None] = []
+    pole_answers: list[bool | None] = []
     for pole in poles_of_block:
-        answers.append(LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q))
-        if answers[-1]:
+        pole_answers.append(
+            LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q)
+        )
+        if pole_answers[-1]:
             break
     else:
-        answers.append(_meets_pole_by_iteration(block, point, order) if None in answers else False)
-    return PlanePeriod(name, q, kind, "periodic", order, answers[-1])
+        pole_answers.append(_meets_pole_by_iteration(block, point, order) if None in pole_answers else False)
+    return PlanePeriod(name, q, kind, "periodic", order, pole_answers[-1])
 
 
 def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:

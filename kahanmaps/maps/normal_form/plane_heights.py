@@ -58,9 +58,9 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     def uncertain_part(Q: Any) -> fmpz:
         """Return the part of the norm of R at the primes at which doubling Q cancels factors; 1 if there are none."""
         # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
-        uncancelled = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
-        cancelled = uncancelled / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
-        return split_by_primes(norm, cancelled.p)[1]
+        full_norm = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
+        cancelled_norm = full_norm / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
+        return split_by_primes(norm, cancelled_norm.p)[1]
 
     multiples, Q = list[tuple[fmpz, int, Any]](), T
     while len(multiples) < _MULTIPLES and (not multiples or multiples[-1][0] > 1):
@@ -110,11 +110,11 @@ def _is_integral(element: Any) -> bool:
 
 def _denominator(elements: Any) -> int:
     """Return an integer such that the products of these elements of Q[t]/g with it are integral."""
-    common = fmpz(1)
+    denominator = fmpz(1)
     for element in elements:
-        common = common.lcm(element.polynomial.denom())
+        denominator = denominator.lcm(element.polynomial.denom())
     field = elements[0].field
-    return int(common * field.chi.denom() ** (field.degree - 1))
+    return int(denominator * field.chi.denom() ** (field.degree - 1))
 
 
 def _archimedean_height(x: Any, b: Any, resultant: Any) -> arb:

@@ -109,25 +109,29 @@ class OrbitInPlanes:
         The value is None if it was not computed or if step n is a pole.
         """
         step = max(1, min(self._last_reachable_step, n - 1))
-        target = n if self._numbers_stay_short else _halve_above(n, step)
+        target_step = n if self._numbers_stay_short else _halve_above(n, step)
         previous: tuple[int, int] | None = None
         while True:
             try:
-                value = self._point(target)
+                value = self._point(target_step)
             except SingularStep:
-                return target, None, 0
+                return target_step, None, 0
             bits = value.exceeding(self._limit)
-            if target == n or bits:
-                return target, value, bits
-            current = target, value.bits
+            if target_step == n or bits:
+                return target_step, value, bits
+            current = target_step, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # Linear extrapolation, up to four times the budget, where the budget is certainly exceeded.
                 surely_exceeded_after = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
-                if surely_exceeded_after <= min(n - target, _MAX_MODULAR_STEPS):
-                    return target + surely_exceeded_after, None, None
+                if surely_exceeded_after <= min(n - target_step, _MAX_MODULAR_STEPS):
+                    return target_step + surely_exceeded_after, None, None
             previous = current
             # Heights may grow like n^2: the step is doubled only if four times the height is within the budget.
-            target = _halve_above(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
+            target_step = (
+                _halve_above(n, target_step)
+                if 4 * current[1] <= self._limit
+                else min(n, target_step + target_step // 2)
+            )
 
     def _point(self, n: int) -> PlanesPoint:
         """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""

@@ -85,15 +85,17 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             try:
                 frobenius = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 frobenius_squared = (pow(frobenius[0], q, f), frobenius[1] * pow(frobenius[1], q, f) % f)
-                target = torsion.add(frobenius_squared, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
+                target_point = torsion.add(
+                    frobenius_squared, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1))
+                )
                 image: Point = None
-                for t in range(1, prime // 2 + 1) if target else ():
+                for t in range(1, prime // 2 + 1) if target_point else ():
                     image = torsion.add(image, frobenius)
-                    if image is not None and target is not None and image[0] == target[0]:
-                        residue = t if image[1] == target[1] else prime - t
+                    if image is not None and target_point is not None and image[0] == target_point[0]:
+                        residue = t if image[1] == target_point[1] else prime - t
                         break
                 else:
-                    if target is not None:
+                    if target_point is not None:
                         raise AssertionError("no trace of Frobenius fits: please report this")
                     residue = 0
             except _Divisor as error:
@@ -107,17 +109,16 @@ class _DivisionPolynomials:
     """The polynomials psi_n for odd n, and psi_n / (2y) for even n, as polynomials in x."""
 
     def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
-        xx = x * x
-        xxx = xx * x
-        self._16_c_squared = 16 * c * c
+        x2 = x * x
+        x3 = x2 * x
+        self._sixteen_c_squared = 16 * c * c
         self._values: dict[int, Poly] = {
             -1: 0 * x - 1,
             0: 0 * x,
             1: 0 * x + 1,
             2: 0 * x + 1,
-            3: 3 * xx * xx + 6 * A * xx + 12 * B * x - A * A,
-            4: 2
-            * (xxx * xxx + 5 * A * xx * xx + 20 * B * xxx - 5 * A * A * xx - 4 * A * B * x - 8 * B * B - A * A * A),
+            3: 3 * x2 * x2 + 6 * A * x2 + 12 * B * x - A * A,
+            4: 2 * (x3 * x3 + 5 * A * x2 * x2 + 20 * B * x3 - 5 * A * A * x2 - 4 * A * B * x - 8 * B * B - A * A * A),
         }
 
     def __getitem__(self, n: int) -> Poly:
@@ -129,9 +130,9 @@ class _DivisionPolynomials:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
                 self._values[n] = (
-                    first_product - second_product * self._16_c_squared
+                    first_product - second_product * self._sixteen_c_squared
                     if m % 2
-                    else first_product * self._16_c_squared - second_product
+                    else first_product * self._sixteen_c_squared - second_product
                 )
             else:
                 bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]

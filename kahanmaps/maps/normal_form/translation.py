@@ -73,14 +73,14 @@ def iterate(
     gamma = 1 - block.discriminant * level * level
     if is_zero(gamma):  # three lines, permuted by Psi: P_n, P_{n+3}, ... are on the same line
         points = _first_points(block, points, n % 3 + 10, is_zero)
-        return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
+        return _point_along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
     # The formulas divide by values that are zero at special points: in that case the next base point is tried.
     for base in range(3, _MAX_BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
-            point = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
+            point = _point_by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
         else:
-            point = _by_doublings(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
+            point = _point_by_doublings(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
         if point is not None:
             return point
     raise NoTranslation
@@ -117,7 +117,7 @@ def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: 
     return points
 
 
-def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
+def _point_along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
     """Return the n-th point of an orbit of a projective map of a line, from its first four points."""
     P, Q = points[0], points[1]
     if same_point(P, Q):
@@ -150,7 +150,7 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     return (x * P[0] + y * Q[0], x * P[1] + y * Q[1], x * P[2] + y * Q[2])
 
 
-def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
+def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
     """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor is zero."""
     P = dict(zip(range(-2, 3), points, strict=False))
     chi = first_chi(P, range(-1, 3))
@@ -219,7 +219,7 @@ def _digits(n: int) -> list[tuple[int, int]]:
     return digits[::-1]
 
 
-def _by_doublings(
+def _point_by_doublings(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
     """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor is zero."""

@@ -22,7 +22,7 @@ class _Row:
     """A row of the equation: the exponents of p_k and q_k in each monomial, and the coefficients of the entries."""
 
     unknown: int
-    known: tuple[int, ...]
+    known_unknowns: tuple[int, ...]
     powers: tuple[tuple[tuple[int, int, int], ...], ...]
     entries: fmpz_mat  # rows: coefficients of the unknown and of the solved coordinates, then the right-hand side
     divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row
@@ -40,7 +40,7 @@ class _Row:
         if denominator_form == 0 or any(point[x][0] == 0 for x in self.divisors):
             return None
         denominator = fmpz(1)
-        for k, entry in zip(self.known, known_entries, strict=True):
+        for k, entry in zip(self.known_unknowns, known_entries, strict=True):
             # Compute numerator/denominator - entry p/q with gcds of short numbers only.
             p, q = solved_coordinates[k]
             gcd = entry.gcd(q)
@@ -76,8 +76,8 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
 
     `forms` has one row of coefficients for each entry of (M | r), and one column for each monomial in `exponents`.
     """
-    table = forms.tolist()
-    rows = [table[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
+    form_rows = forms.tolist()
+    rows = [form_rows[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     solved_rows: list[_Row] = []
     remaining_rows = list(range(n))
     # The first row with a single new unknown is always a good choice: a row that can be solved now can be solved later.

@@ -98,8 +98,8 @@ def _gcd_with_product(numerators: Sequence[fmpz], W: fmpz) -> fmpz:
     return W.gcd(product)
 
 
-def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common: fmpz) -> list[Fraction]:
-    return [(entry // g, W // g) for entry in numerators for g in [common.gcd(entry % common)]]
+def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common_factors: fmpz) -> list[Fraction]:
+    return [(entry // g, W // g) for entry in numerators for g in [common_factors.gcd(entry % common_factors)]]
 
 
 class UnreducedPoint(IntegerPoint):
@@ -111,10 +111,10 @@ class UnreducedPoint(IntegerPoint):
     become `_LONGER` times as long, or when coordinates are read. After a long common factor all points are reduced.
     """
 
-    def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:
+    def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous_point: IntegerPoint) -> None:
         if denominator < 0:
             numerators, denominator = [-entry for entry in numerators], -denominator
-        self._previous_state = previous.has_long_factors, previous.reduced_bits
+        self._previous_state = previous_point.has_long_factors, previous_point.reduced_bits
         self._integers = numerators, denominator
         self._common_factor_multiple: fmpz | None = None  # a multiple of the common factor, if known
         bits = self._bits_with_factors
@@ -176,8 +176,8 @@ class UnreducedPoint(IntegerPoint):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, IntegerPoint):
             return NotImplemented
-        (numerators, W), (others, V) = self._integers, other.integers
-        return all(x * V == y * W for x, y in zip(numerators, others, strict=True))
+        (numerators, W), (other_numerators, V) = self._integers, other.integers
+        return all(x * V == y * W for x, y in zip(numerators, other_numerators, strict=True))
 
     __hash__ = IntegerPoint.__hash__
 

@@ -207,8 +207,10 @@ class ConstantRows:
         self._other_rows = [i for i in range(n) if i not in self._rows]
         self._free_columns = [j for j in range(n) if j not in self._eliminated_columns]
         inverse = fmpq_mat([[A[i, j] for j in self._eliminated_columns] for i in row_indices]).inv()
-        augmented = [[*inverse.tolist()[i], *(echelon_form[i, j] for j in self._free_columns)] for i in row_indices]
-        integers, self._denominator = fmpq_mat(augmented).numer_denom()
+        augmented_rows = [
+            [*inverse.tolist()[i], *(echelon_form[i, j] for j in self._free_columns)] for i in row_indices
+        ]
+        integers, self._denominator = fmpq_mat(augmented_rows).numer_denom()
         self._A_inverse = _submatrix(integers, row_indices, row_indices)
         self._free_part = _submatrix(integers, row_indices, range(len(row_indices), n))
 

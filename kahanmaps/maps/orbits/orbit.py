@@ -245,11 +245,11 @@ class Trajectory(HtmlDisplay):
     """
 
     def __init__(
-        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, chosen: Method, remark: str = ""
+        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, method: Method, remark: str = ""
     ) -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
-        self.method, self._why = chosen.name, chosen.text
+        self.method, self._why = method.name, method.text
         self.variables: tuple[str, ...] = request.map.variables
         self.integrals: Mapping[str, Any] = {}
         self._request, self._remark = request, remark
@@ -494,19 +494,20 @@ class Trajectory(HtmlDisplay):
             raise InputError("found copy=False, expected copy=None: the array of an orbit is created on demand")
         prime = self.arithmetic.number if self.arithmetic.kind == "mod" else 0
         rows: list[list[Any]] = [[int(x) if prime else x for x in point.x] for point in self.points]
-        default = np.float64 if not prime else np.int64 if prime < 2**63 else object
-        kind = np.dtype(default if dtype is None else dtype)
-        if kind.kind == "O":
+        default_dtype = np.float64 if not prime else np.int64 if prime < 2**63 else object
+        array_dtype = np.dtype(default_dtype if dtype is None else dtype)
+        if array_dtype.kind == "O":
             table = np.empty((len(rows), len(self.variables)), dtype=object)
             for index in np.ndindex(table.shape):
                 table[index] = rows[index[0]][index[1]]
             return table
         if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
             raise InputError(
-                f'{self.arithmetic} arithmetic has no values of dtype {kind}: use arithmetic="float" or dtype=object'
+                f'{self.arithmetic} arithmetic has no values of dtype {array_dtype}: use arithmetic="float" or '
+                "dtype=object"
             )
-        if kind.kind in "iu":
-            limits = np.iinfo(kind)
+        if array_dtype.kind in "iu":
+            limits = np.iinfo(array_dtype)
             for row in rows:
                 for k, x in enumerate(row):
                     number = fmpq(*x.as_integer_ratio()) if isinstance(x, float) and math.isfinite(x) else x
@@ -515,17 +516,19 @@ class Trajectory(HtmlDisplay):
                         text = str(x)
                         raise InputError(
                             f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers "
-                            f"from {limits.min} to {limits.max} for {kind}: use dtype=object, which keeps all numbers "
-                            "unchanged, or dtype=float"
+                            f"from {limits.min} to {limits.max} for {array_dtype}: use dtype=object, which keeps all "
+                            "numbers unchanged, or dtype=float"
                         )
-            return np.array(rows, dtype=kind)
-        if kind.kind not in "fc":
-            raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
-        if prime > 2 ** (np.finfo(kind).nmant + 1):
-            raise InputError(f"found {kind}, which rounds residues modulo {prime}, expected dtype=int or dtype=object")
+            return np.array(rows, dtype=array_dtype)
+        if array_dtype.kind not in "fc":
+            raise InputError(f"found the dtype {array_dtype}, expected one of floats or integers, or object")
+        if prime > 2 ** (np.finfo(array_dtype).nmant + 1):
+            raise InputError(
+                f"found {array_dtype}, which rounds residues modulo {prime}, expected dtype=int or dtype=object"
+            )
         from kahanmaps.maps.floats.float_conversion import to_float
 
-        return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
+        return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=array_dtype)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # This is a generator, since `list` calls __len__, which computes the points, before it reads the first point.

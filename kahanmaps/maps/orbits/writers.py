@@ -265,8 +265,8 @@ class Npz(Writer):
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
             if any(None in row for row in self._values):  # poles become empty text, since these types have no NaN
-                filled = [["" if x is None else x for x in row] for row in self._values]
-                self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled]
+                filled_rows = [["" if x is None else x for x in row] for row in self._values]
+                self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled_rows]
             arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
         save: Any = np.savez_compressed
         archive = io.BytesIO()  # zip archives need a seekable stream

@@ -25,10 +25,10 @@ def _compiled() -> Any:
 
     from kahanmaps.maps.numba_cache import compiled
 
-    module, inner = globals(), numba.njit(nogil=True)
+    module, jit = globals(), numba.njit(nogil=True)
     names = "reduce add_product clear copy trimmed_length subtract inverse_of_last gcd divide entries minors "
     for name in f"{names} divide_by_common_factor".split():
-        module[f"_{name}"] = inner(module[f"_{name}"])
+        module[f"_{name}"] = jit(module[f"_{name}"])
     return compiled(walk, nogil=True)
 
 
@@ -182,9 +182,11 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
     return minor_length
 
 
-def _divide_by_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
+def _divide_by_common_factor(
+    X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, buffers: Any
+) -> int:
     """Divide the polynomials of the curve by their gcd, in place; return their length, 0 if all are zero."""
-    a, b, c, common_factor = work[0], work[1], work[2], work[3]
+    a, b, c, common_factor = buffers[0], buffers[1], buffers[2], buffers[3]
     count = X.shape[0]
     _clear(a, length)
     _clear(b, length)
@@ -228,7 +230,7 @@ def walk(
     X = np.zeros((n + 1, 2, max_length))
     M = np.zeros((n, n + 1, 2, max_length))
     minors = np.zeros((1 << (n + 1), 2, max_length))
-    work = np.zeros((4, 2, max_length))
+    buffers = np.zeros((4, 2, max_length))
     all_columns = (1 << (n + 1)) - 1
     one = np.zeros((2, 1))
     one[0, 0] = 1.0
@@ -245,7 +247,7 @@ def walk(
                 _clear(X[j], minor_length)
                 _add_product(X[j], one, 1, minors[all_columns ^ 1 << j], minor_length, 1.0 - 2.0 * (j % 2), nu)
                 _reduce(X[j], minor_length, p)
-            length = _divide_by_common_factor(X, minor_length, weights[step], p, nu, inverses, work)
+            length = _divide_by_common_factor(X, minor_length, weights[step], p, nu, inverses, buffers)
             degrees[m, step] = length - 1
             if length == 0:
                 degrees[m, step:] = -1

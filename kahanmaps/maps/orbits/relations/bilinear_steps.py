@@ -102,7 +102,7 @@ class _Search:
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
-        images, points_at_n, points_before, earliest = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
+        images, points_at_n, points_before, earliest_points = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
         values = [
             [x[i] * y[j] % prime for i, j in self.products] for x, y in zip(points_at_n, points_before, strict=True)
         ]
@@ -114,7 +114,7 @@ class _Search:
         # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
         unknowns = len(values[0])
         zeros, rows = [0] * unknowns, []
-        for row, *outer_points in zip(values, images, earliest, strict=True):
+        for row, *outer_points in zip(values, images, earliest_points, strict=True):
             g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in outer_points)
             rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
             rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])

@@ -121,12 +121,14 @@ class _Search:
                         is_copy = sorted(exponent_change) == [-1] + [0] * (n - 1) + [1] and exponent_change[n] == -1
                         if a == -b and is_copy:
                             copied_coordinates[unknowns[0]] = exponent_change.index(1)
-            ungrouped = list(product(range(stride), range(n)))
+            unresolved = list(product(range(stride), range(n)))
             for _ in range(stride * n):
-                ungrouped = [((k - 1) % stride, g) for k, i in ungrouped if (g := earlier[k][i]) is not None]
-            if not ungrouped:
+                unresolved = [((k - 1) % stride, g) for k, i in unresolved if (g := earlier[k][i]) is not None]
+            if not unresolved:
                 self.groups, self.earlier = [(i,) for i in range(n)], earlier
-        self.new = [(k, g) for k, row in enumerate(self.earlier) for g, copied in enumerate(row) if copied is None]
+        self.new_groups = [
+            (k, g) for k, row in enumerate(self.earlier) for g, copied_group in enumerate(row) if copied_group is None
+        ]
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
@@ -138,7 +140,7 @@ class _Search:
             Numbers(residues[k][0], residues[k + 1][0], residues[k + 2][0], residues[k + 3])
             for k in range(0, len(residues), 4)
         ]
-        return dict(zip(self.new, rows, strict=True))
+        return dict(zip(self.new_groups, rows, strict=True))
 
     @property
     def first(self) -> int:
@@ -147,8 +149,10 @@ class _Search:
 
     def degree(self, k: int, group: int) -> int:
         """Return the degree of a group of coordinates on a curve."""
-        copied = self.earlier[k][group]
-        return self.sections[k, group].degree if copied is None else self.degree((k - 1) % self.stride, copied)
+        copied_group = self.earlier[k][group]
+        return (
+            self.sections[k, group].degree if copied_group is None else self.degree((k - 1) % self.stride, copied_group)
+        )
 
     def _numbers_modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
@@ -164,7 +168,7 @@ class _Search:
                 point = factor.integer_steps.image_modulo(point, prime)
             curves: dict[tuple[int, int], Curve] = {}
             try:
-                for k, g in self.new:
+                for k, g in self.new_groups:
                     coordinates = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
                     curve_of_group = curve(coordinates, prime, known_sections.get((k, g)))
                     if curve_of_group is None:
@@ -238,12 +242,12 @@ class _ExactCurves:
         """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
-        new = {
+        new_coordinates = {
             key: Coordinates(sections[key].degree, self._tables[key], W, Terms(U, numbers, W), self._all_primes[key])
             for key, U in self._U.items()
         }
         rows = [
-            [new[k, g] if copied is None else copied for g, copied in enumerate(row)]
+            [new_coordinates[k, g] if copied_group is None else copied_group for g, copied_group in enumerate(row)]
             for k, row in enumerate(self._search.earlier)
         ]
         return EllipticSteps(map_over, rows, self._search.first, skipped)

@@ -116,20 +116,22 @@ def _section_basis(points: Rows, sections: Sections, prime: int) -> Rows | None:
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
     # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
-    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g. `checks` annihilate this span.
+    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g.
     all_products = _products_of_coordinates(points, coordinates, count, lag, prime)
     values = [[row[k] for k in sections.products] for row in all_products]
-    sums = matrix(values[: sections.rows], prime)
-    checks = kernel(*sums.transpose().rref())
+    product_matrix = matrix(values[: sections.rows], prime)
+    annihilators = kernel(*product_matrix.transpose().rref())  # of this span
     factors = [
         [(1, sum((j + 2) ** 3 * x for j, x in enumerate(point))) for point in points_before]
         for _, *points_before in _points_at_lags(points, count, lag)[: sections.rows]
     ]
-    weighted_checks = []
+    weighted_annihilators = []
     for choices in list(product((0, 1), repeat=count - 1))[1:]:
         g = [prod(pair[i] for pair, i in zip(pairs, choices, strict=True)) % prime for pairs in factors]
-        weighted_checks += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
-    kernel_rows = kernel(*(matrix(weighted_checks, prime) * sums).rref())
+        weighted_annihilators += [
+            [c and c * x % prime for c, x in zip(annihilator, g, strict=True)] for annihilator in annihilators
+        ]
+    kernel_rows = kernel(*(matrix(weighted_annihilators, prime) * product_matrix).rref())
     if len(kernel_rows) != sections.degree:
         return None
     return integers(matrix(values, prime) * matrix(kernel_rows, prime).transpose())
@@ -167,15 +169,15 @@ def _numbers_of_curve(points: Rows, sections: Sections, values: Rows, prime: int
     first_of_W, first_of_U = first_terms(H, y[2], y[3])
     W, U = around(first_of_W, length + 2), around(first_of_U, length + 2, first_of_W)
     # The coefficients of the coordinates, up to a common factor.
-    last, rows = len(points[0]) - 1, []
+    last_column, rows = len(points[0]) - 1, []
     for n, point in zip(range(2, length), points[2:], strict=False):
         value = [int(entry) for entry in forms(degree, W, U, n)]
-        for i in range(last):
-            row = [0] * ((last + 1) * degree)
+        for i in range(last_column):
+            row = [0] * ((last_column + 1) * degree)
             row[i * degree : (i + 1) * degree] = value
-            row[last * degree :] = [-point[i] * entry % prime for entry in value]
+            row[last_column * degree :] = [-point[i] * entry % prime for entry in value]
             rows.append(row)
-    kernel = null_space(rows, (last + 1) * degree, prime)
+    kernel = null_space(rows, (last_column + 1) * degree, prime)
     return [[int(H)], [int(y[2])], [int(y[3])], kernel[0]] if len(kernel) == 1 else None
 
 

@@ -117,9 +117,12 @@ class Coordinates:
     def at(self, n: int) -> list[fmpz]:
         """Return numerators and denominator in lowest terms, n >= 2. Raises ArithmeticError if the denominator is 0."""
         W, U = self.W, self._U
-        mixed, own = U.mixed_quotient(n), W.own_quotient(n)
+        mixed_quotient, own_quotient = U.mixed_quotient(n), W.own_quotient(n)
         weights = primitive_integers(
-            tuple(g * mixed**k * own**j for g, (k, _, j) in zip(self._contents, self._exponents, strict=True))
+            tuple(
+                g * mixed_quotient**k * own_quotient**j
+                for g, (k, _, j) in zip(self._contents, self._exponents, strict=True)
+            )
         )
         product0, product1 = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
         term, (square, neighbour_product) = W.integer(n), W.pair(n)

@@ -229,10 +229,18 @@ def orbit_curve(
         raise InputError(
             f"the orbit ends: the map is not defined at step {len(orbit) - 2}; choose another initial point"
         )
-    if map_over.dim == 2 and family is not None:
-        level = _on_level_curve(map_over, [entry.rationals() for entry in orbit if entry], family, integrals)
-        if level is not None:
-            return level
+    points = [entry.rationals() for entry in orbit if entry]
+    if map_over.dim == 2 and family is not None and len(points) > 2 and points[2] != points[0]:
+        # The level curves of integrals, if their genus is 1: an automorphism over Q of such a curve is a translation
+        # unless its square is the identity.
+        for integral in integrals:
+            curve_and_polynomial = level_curve(integral, map_over.eps, points[:_MAX_LEVEL_POINTS])
+            if curve_and_polynomial is not None and is_conserved(family, map_over.eps, integral):
+                level, translation, F = curve_and_polynomial
+                # The degree of single coordinates, or of coordinates with a common denominator, as in the search.
+                is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
+                degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
+                return OrbitCurve(1, 1, *level.short_model(translation), degree)
     if curve is not None:
         return curve
     if orbit[-1] == point and len(orbit) > 1:
@@ -328,27 +336,6 @@ def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | Non
         if image == start:
             break
     return points
-
-
-def _on_level_curve(
-    map_over: Map, points: Sequence[tuple[fmpq, ...]], family: MapFamily, integrals: Sequence[RationalFunction]
-) -> OrbitCurve | None:
-    """Return the geometry of an orbit in the plane on the level curve of an integral; None unless the genus is 1.
-
-    An automorphism over Q of a curve of genus 1 is a translation unless its square is the identity.
-    """
-    if len(points) < 3 or points[2] == points[0]:
-        return None
-    for integral in integrals:
-        curve_and_polynomial = level_curve(integral, map_over.eps, points[:_MAX_LEVEL_POINTS])
-        if curve_and_polynomial is not None and is_conserved(family, map_over.eps, integral):
-            level, translation, F = curve_and_polynomial
-            curve, point = level.short_model(translation)
-            # The degree of single coordinates, or of coordinates with a common denominator, as in the search.
-            is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
-            degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
-            return OrbitCurve(1, 1, curve, point, degree)
-    return None
 
 
 def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
