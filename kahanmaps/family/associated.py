@@ -117,10 +117,10 @@ class FamilyMember(HtmlDisplay, ResultPart):
         if not self.signs:
             object.__setattr__(self, "signs", (1,) * count)
         if len(self.signs) != count or any(sign not in (1, -1) for sign in self.signs):
-            factor_texts = ", ".join(f"({factor})" for factor in self.factors)
+            factors_text = ", ".join(f"({factor})" for factor in self.factors)
             raise HypothesisError(
                 f"found the signs {list(self.signs)}, expected {count} numbers 1 or -1: "
-                f"one for each irreducible factor of chi, here {factor_texts}"
+                f"one for each irreducible factor of chi, here {factors_text}"
             )
 
     @property
@@ -213,8 +213,8 @@ class FamilyMember(HtmlDisplay, ResultPart):
     @property
     def text(self) -> str:
         """The factors of chi and the signs, as a phrase."""
-        factors = "".join(f"({factor})" for factor in self.factors)
-        return f"m = {self.m}, roots of {factors}, signs {self.chosen.label}"
+        chi_text = "".join(f"({factor})" for factor in self.factors)
+        return f"m = {self.m}, roots of {chi_text}, signs {self.chosen.label}"
 
     @property
     def system(self) -> QuadraticSystem:

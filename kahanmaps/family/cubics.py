@@ -58,7 +58,7 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     row_entries = [[(k, A[i, k]) for k in range(n) if A[i, k] != 0] for i in range(n)]
     zero = fmpq(0)
     coefficients: list[fmpq] = []
-    equations = 0
+    equation_count = 0
     # The matrix A Hess - Hess A^T is skew and linear in x: it gives one equation for each i < j and each variable x_l.
     for i in range(n):
         for j in range(i + 1, n):
@@ -71,8 +71,8 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
                     indices = tuple(sorted((i, k, l)))
                     row[column[indices]] -= value * weights[indices]
                 coefficients += row
-                equations += 1
-    solutions = nullspace(QQ, fmpq_mat(equations, len(exponents), coefficients))
+                equation_count += 1
+    solutions = nullspace(QQ, fmpq_mat(equation_count, len(exponents), coefficients))
     basis = tuple(
         context.from_dict({exponents[k]: fmpq(c) for k, c in enumerate(primitive_integers(vector)) if c != 0})
         for vector in solutions

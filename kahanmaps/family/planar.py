@@ -270,9 +270,9 @@ def normal_form(member: FamilyMember) -> NormalForm:
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
     if not member.is_generic:
-        repeated_factors = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
+        repeated_text = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
         raise HypothesisError(
-            f"chi has the repeated factor {repeated_factors}, expected a member whose chi has no repeated roots: "
+            f"chi has the repeated factor {repeated_text}, expected a member whose chi has no repeated roots: "
             "the normal form over K = Q[t]/chi is for generic A"
         )
     H = member.H if all(sign > 0 for sign in member.signs) else member.chosen.K

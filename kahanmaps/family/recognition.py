@@ -79,9 +79,11 @@ class FamilyStructure(ResultPart):
     def text(self) -> str:
         """A sentence that describes the structure."""
         factors = self.member.factors
-        chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
+        chi_text = " ".join(
+            f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors
+        )
         if self.member.m == 1:
-            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
+            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi_text}"
         else:
             beginning = "H splits: A"
             if len(factors) == 1:
@@ -91,7 +93,7 @@ class FamilyStructure(ResultPart):
                     if is_nonlinear
                     else "H does not split: A, not scalar,"
                 )
-            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi_text}"
         return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 

@@ -188,9 +188,9 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
     """Return whether Q^n is free over Q[C]: tested by the dimension of the kernel of p(C) for each factor p of chi."""
-    copies, remainder = divmod(C.nrows(), int(chi.degree()))
+    rank, remainder = divmod(C.nrows(), int(chi.degree()))
     return remainder == 0 and all(
-        C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]
+        C.nrows() - evaluate_at_matrix(p, C).rank() == rank * p.degree() for p, _ in chi.factor()[1]
     )
 
 

@@ -325,8 +325,8 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     low, high = min(heights[:middle]), max(heights[:middle])
     if low <= min(heights[middle:]) and max(heights[middle:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
-    least_rise, spread = min(increases), max(increases) - min(increases)
-    if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
+    least_increase, spread = min(increases), max(increases) - min(increases)
+    if least_increase > 0 and spread <= least_increase / 4 and (spread <= _NOISE or spread <= least_increase / 32):
         return Growth.LINEAR, f"{text}, about the same each time"
     return Growth.UNDECIDED, f"{text}, which fits no rule; more steps may decide"
 

@@ -213,17 +213,8 @@ class MatrixPoissonTensor(PoissonTensor):
         return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper_entries.items()}
 
     def _matrix(self, field: Field, upper_entries: Mapping[tuple[int, int], Any]) -> Any:
-        n, zero = self.dim, field.zero
-        entries = [
-            upper_entries[i, j]
-            if (i, j) in upper_entries
-            else -upper_entries[j, i]
-            if (j, i) in upper_entries
-            else zero
-            for i in range(n)
-            for j in range(n)
-        ]
-        return field.matrix(n, n, entries)
+        n, entries = self.dim, {**upper_entries, **{(j, i): -entry for (i, j), entry in upper_entries.items()}}
+        return field.matrix(n, n, [entries.get((i, j), field.zero) for i in range(n) for j in range(n)])
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:

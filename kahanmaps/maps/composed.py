@@ -235,12 +235,12 @@ def composed_map(
     first_map = requested_factors[0].map
     factors = factors or [*requested_factors[:1], *_invert_factors(requested_factors[:1])]
     if any(factor.map.dim != first_map.dim for factor in factors):
-        dimensions = ", ".join(str(factor.map.dim) for factor in factors)
-        raise InputError(f"the maps must have the same dimension: got {dimensions}")
+        dimensions_text = ", ".join(str(factor.map.dim) for factor in factors)
+        raise InputError(f"the maps must have the same dimension: got {dimensions_text}")
     for factor in factors:
         if set(factor.map.variables) == set(first_map.variables) and factor.map.variables != first_map.variables:
-            orders = f"{', '.join(first_map.variables)} and {', '.join(factor.map.variables)}"
-            raise InputError(f"the maps must have their variables in the same order: got {orders}")
+            orders_text = f"{', '.join(first_map.variables)} and {', '.join(factor.map.variables)}"
+            raise InputError(f"the maps must have their variables in the same order: got {orders_text}")
         if factor.is_inverse:
             _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # raises InputError if there is none
     variables = first_map.variables if variables is None else tuple(variables)
@@ -256,7 +256,7 @@ def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 def is_involution(map_: MapFamily) -> bool:
     """Return whether Phi(Phi(x)) = x at random points modulo primes; the probability of an error is below 2^-40."""
-    rng, successes = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
+    rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in map_.variables)
@@ -266,8 +266,8 @@ def is_involution(map_: MapFamily) -> bool:
                 return False
         except (BadPrime, SingularStep):
             continue
-        successes += 1
-        if successes == 3:
+        success_count += 1
+        if success_count == 3:
             return True
     return False
 

@@ -232,12 +232,12 @@ class Map(LatexDisplay):
             return reduce(lambda product, jacobian: jacobian * product, jacobians)
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
-        coordinates = ",".join(self.field.format(entry) for entry in point)
-        if len(coordinates) > 200:
-            coordinates = f"{coordinates[:100]}...{coordinates[-80:]}"
+        coordinates_text = ",".join(self.field.format(entry) for entry in point)
+        if len(coordinates_text) > 200:
+            coordinates_text = f"{coordinates_text[:100]}...{coordinates_text[-80:]}"
         at_eps = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates}{at_eps}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{at_eps}: "
             "the map is not defined there",
             point,
             self.eps,
@@ -591,8 +591,8 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     modulo which it exists are used.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
-    passed_points = 0
-    while passed_points < 3:
+    passed_count = 0
+    while passed_count < 3:
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in range(map_.dim))
         try:
@@ -606,7 +606,7 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
             continue
         except SingularStep:
             return "the map is not defined at random points: the equations do not determine the new point"
-        passed_points += 1
+        passed_count += 1
         if preimage != x:
             return "the given inverse is not the inverse of the map: it does not map the images of random points back"
     return "" if map_.backward is not None else why_not_birational(map_.rows)

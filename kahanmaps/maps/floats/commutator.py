@@ -39,10 +39,10 @@ class Commutator:
 
     def lines(self) -> list[str]:
         """Return the result as sentences, which say that the numbers are measured."""
-        sizes = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
+        sizes_text = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
         if not self.by_step:
             return [f"measured\t{self.message}"]
-        lines = [f"measured\t|Phi_g Phi_f^n x - Phi_f^n Phi_g x|: {sizes}; largest {self.largest:.2g}"]
+        lines = [f"measured\t|Phi_g Phi_f^n x - Phi_f^n Phi_g x|: {sizes_text}; largest {self.largest:.2g}"]
         if self.by_eps and self.slope is None:
             lines.append("measured\tat n = 1 it is rounding for all eps")
         elif self.slope is not None:

@@ -161,8 +161,8 @@ class FloatEnsemble(AttributeHints):
             require_same_system(form, map_)
             self._blocks = planar_blocks(form, -epsilon if backward else epsilon)
             state = _multiply(self._blocks.x_to_state, state)
-            self._initial = self._blocks.integrals(state)
-            self._largest_drift = np.zeros(self._initial.shape)
+            self._initial_values = self._blocks.integrals(state)
+            self._largest_drift = np.zeros(self._initial_values.shape)
         self._factors = (map_over.inverse if backward else map_over).factors
         self._build_step()
         self._batch = BatchState.of(state)
@@ -265,15 +265,15 @@ class FloatEnsemble(AttributeHints):
         """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
-            current = self._blocks.distances(self._batch.z, self._initial)
-            current[:, self._batch.status != RUNNING] = np.nan
-            largest = np.fmax(self._largest_drift, current)
+            current_drift = self._blocks.distances(self._batch.z, self._initial_values)
+            current_drift[:, self._batch.status != RUNNING] = np.nan
+            largest = np.fmax(self._largest_drift, current_drift)
             for r, label in enumerate(self._blocks.labels):
                 initial: NDArray[Any] = (
-                    self._initial[r].copy() if r >= self._blocks.reals else self._initial[r].real.copy()
+                    self._initial_values[r].copy() if r >= self._blocks.reals else self._initial_values[r].real.copy()
                 )
-                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current[r]))
-        return (*drifts, *(watched.drift for watched in self._watched_functions))
+                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current_drift[r]))
+        return (*drifts, *(function.drift for function in self._watched_functions))
 
     def end(self, orbit: int) -> OrbitEnd:
         """Return how one orbit has ended."""
@@ -308,8 +308,8 @@ class FloatEnsemble(AttributeHints):
         require_steps(steps)
         require_every(every)
         if self.step == 0:
-            for watched in self._watched_functions:
-                watched.observe(self._starts[None])
+            for function in self._watched_functions:
+                function.observe(self._starts[None])
             yield self._starts[None].copy()
         else:
             yield np.empty((0, self.n, self.system.dim))
@@ -320,8 +320,8 @@ class FloatEnsemble(AttributeHints):
                     first_step = self.step - len(x) + 1
                     self._record_escapes(first_step, x)
                     x = x[-first_step % every :: every]
-                for watched in self._watched_functions:
-                    watched.observe(x)
+                for function in self._watched_functions:
+                    function.observe(x)
                 if len(x):
                     yield x
 
@@ -332,9 +332,9 @@ class FloatEnsemble(AttributeHints):
         inside_orbits = np.flatnonzero(self._escaped_at < 0)
         with np.errstate(invalid="ignore"):
             is_outside = np.abs(x[:, inside_orbits]).max(axis=2) > self._radius
-        escaping = np.flatnonzero(is_outside.any(axis=0))
-        indices = is_outside[:, escaping].argmax(axis=0)
-        orbits = inside_orbits[escaping]
+        escaping_indices = np.flatnonzero(is_outside.any(axis=0))
+        indices = is_outside[:, escaping_indices].argmax(axis=0)
+        orbits = inside_orbits[escaping_indices]
         self._escaped_at[orbits], self._escaped_to[orbits] = first_step + indices, x[indices, orbits]
 
     def _record_steps(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
@@ -385,7 +385,7 @@ class FloatEnsemble(AttributeHints):
                     states.transpose(0, 2, 1)[after_end] = np.nan
             if self._blocks is not None and len(tables[1].states):
                 states = tables[1].states.transpose(1, 0, 2)
-                distances = self._blocks.distances(states, self._initial[:, None])
+                distances = self._blocks.distances(states, self._initial_values[:, None])
                 distances[:, np.isnan(states).any(axis=0)] = 0.0
                 np.maximum(self._largest_drift, distances.max(axis=1), out=self._largest_drift)
             yield tables[0].states

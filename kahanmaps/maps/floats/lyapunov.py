@@ -80,8 +80,8 @@ class Lyapunov(ResultPart):
         return self.text
 
     def __repr__(self) -> str:
-        exponents = ", ".join(f"{x:.6g}" for x in self.mean)
-        return f"<Lyapunov: {exponents} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
+        exponents_text = ", ".join(f"{x:.6g}" for x in self.mean)
+        return f"<Lyapunov: {exponents_text} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
 
     @property
     def mean(self) -> FloatArray:

@@ -78,7 +78,10 @@ def _equidistant_values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArr
     to_float(low), to_float(high)  # raise the error for numbers that are too large for doubles
     denominator = int(low.q) * int(high.q)
     low_numerator, high_numerator = int(low.p) * int(high.q), int(high.p) * int(low.q)
-    intervals = point_count - 1  # a quotient of Python integers is rounded correctly
+    interval_count = point_count - 1  # a quotient of Python integers is rounded correctly
     return np.array(
-        [(low_numerator * (intervals - k) + high_numerator * k) / (denominator * intervals) for k in range(point_count)]
+        [
+            (low_numerator * (interval_count - k) + high_numerator * k) / (denominator * interval_count)
+            for k in range(point_count)
+        ]
     )

@@ -83,8 +83,8 @@ class FloatStep:
         return self.careful if self.careful_code is None else self.careful_code.function(float)
 
     def _build_program(self, careful: bool) -> StraightLineProgram | None:
-        limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
-        code, checks = StraightLineProgram(self.rows, limit), StepChecks(careful)
+        max_operations = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
+        code, checks = StraightLineProgram(self.rows, max_operations), StepChecks(careful)
         try:
             image = self._write(code.arguments, checks)
             for x in image:
@@ -211,11 +211,11 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
 
 def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple[Any, ...]:
     """Take a careful step with partial pivoting in numpy arrays, for maps of many variables."""
-    is_near, is_singular, is_finite = (np.full(x[0].shape, value) for value in (False, False, True))
+    is_near_singular, is_singular, is_finite = (np.full(x[0].shape, value) for value in (False, False, True))
     image: Any = np.array(x)
     for equation in equations:
         n, y = len(x), equation.monomials(image)
-        M = np.zeros((n, n + 2, len(is_near)))
+        M = np.zeros((n, n + 2, len(is_near_singular)))
         M[:, :-1] = np.array(equation.constants)[:, :, None]
         for i, entries in enumerate(equation.terms):
             for j, terms in enumerate(entries):
@@ -223,11 +223,11 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
                     M[i, j] += c * y[k]
         M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # the sizes of the rows
         pivots = eliminate(M, n, 1)
-        is_near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+        is_near_singular |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
         is_singular |= is_finite & (pivots == 0.0).any(axis=0)
         image = M[:, n]
         is_finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
-    return *image, is_near & is_finite & ~is_singular, is_singular, ~is_finite & ~is_singular
+    return *image, is_near_singular & is_finite & ~is_singular, is_singular, ~is_finite & ~is_singular
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
@@ -336,8 +336,8 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                     elif is_single:
                         *image, is_good = step.fast_on_floats(*x)
                         if not is_good and step.careful_code is not None:
-                            *image, is_near, is_singular, is_overflow = step.careful_on_floats(*x)
-                            is_good = not (is_near or is_singular or is_overflow)
+                            *image, is_near_singular, is_singular, is_overflow = step.careful_on_floats(*x)
+                            is_good = not (is_near_singular or is_singular or is_overflow)
                     else:
                         *image, is_good = step.fast(*x)
                 except ZeroDivisionError:  # in arrays the result would be infinite
@@ -348,8 +348,10 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                     points_before, points_after = (
                         np.array([np.broadcast_to(row, has_ended.shape) for row in state]) for state in (x, image)
                     )
-                    *careful_image, is_near, is_singular, is_overflow = step.careful(*points_before[:, repeated_orbits])
-                    ends_now = batch.note(start + repeated_orbits, index, is_near, is_singular, is_overflow)
+                    *careful_image, is_near_singular, is_singular, is_overflow = step.careful(
+                        *points_before[:, repeated_orbits]
+                    )
+                    ends_now = batch.note(start + repeated_orbits, index, is_near_singular, is_singular, is_overflow)
                     for row, values in zip(points_after, careful_image, strict=True):
                         row[repeated_orbits] = np.where(ends_now, 0.0, values)
                     has_ended[repeated_orbits] |= ends_now

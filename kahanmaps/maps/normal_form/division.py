@@ -77,8 +77,8 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
 
     def term(n: int, indices: tuple[int, ...]) -> fmpz_poly:
         """Return the product of psi at these indices; three superfluous cube roots give a factor gamma."""
-        cube_roots = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
-        value = _GAMMA ** (cube_roots // 3)
+        cube_root_count = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
+        value = _GAMMA ** (cube_root_count // 3)
         for k in indices:
             value = value * psi[k]
         return value

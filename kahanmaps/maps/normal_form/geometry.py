@@ -107,7 +107,7 @@ class PlaneGeometry:
         lines = [f"plane {self.name}\t{self.kind}"]
         if self.j is None or self.point is None or self.bad_primes is None:
             return lines
-        order = "infinite order" if self.order is None else f"order {self.order}"
+        order_text = "infinite order" if self.order is None else f"order {self.order}"
         minimal_discriminant = self.bad_primes.minimal_discriminant
         lines += [
             f"  k^3\t{_text(self.delta)}",
@@ -116,7 +116,7 @@ class PlaneGeometry:
             f"  discriminant\t{_text(self.discriminant)}"
             + ("" if minimal_discriminant is None else f", minimal {minimal_discriminant}"),
             f"  bad primes\t{self.bad_primes.text}" + (" (the primes of Q below them)" if self.degree > 1 else ""),
-            f"  translation\t({', '.join(map(_text, self.point))}), {order} (proved: {self.reason})",
+            f"  translation\t({', '.join(map(_text, self.point))}), {order_text} (proved: {self.reason})",
         ]
         if self.height is not None:
             is_accurate = self.height_error <= _HEIGHT_ACCURACY
@@ -126,8 +126,8 @@ class PlaneGeometry:
             note = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
             if len(rotation.numbers) == 2:
                 note = ", on a connected torus of real dimension 2"
-            numbers = ", ".join(x.str(12) for x in rotation.numbers)
-            lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{note}")
+            numbers_text = ", ".join(x.str(12) for x in rotation.numbers)
+            lines.append(f"  rotation number\t{numbers_text} at t = {rotation.root}{note}")
             if rotation.component is not None:
                 lines.append(f"    initial point\ton the {rotation.component} component")
             if rotation.flow is not None:

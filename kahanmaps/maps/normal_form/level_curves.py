@@ -69,15 +69,15 @@ def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int
 
     m is written as i (2b + 1) - j with |j| <= b: b baby steps of `modulus` T, and giant steps of (2b + 1) `modulus` T.
     """
-    baby_steps, step = isqrt(radius) + 2, curve.multiple(modulus, curve.T)
+    baby_step_count, step = isqrt(radius) + 2, curve.multiple(modulus, curve.T)
     index: dict[Any, tuple[int, Any]] = {}
     point = step
-    for j in range(1, baby_steps + 1):
+    for j in range(1, baby_step_count + 1):
         if point is None:
             return modulus * j
         index.setdefault(point[0], (modulus * j, point[1]))
         point = curve.add(point, step)
-    stride = (2 * baby_steps + 1) * modulus
+    stride = (2 * baby_step_count + 1) * modulus
     giant_step, upper_multiple = curve.multiple(stride, curve.T), curve.multiple(center, curve.T)
     negative_giant_step, lower_multiple = curve.negative(giant_step), upper_multiple
     for i in range(radius * modulus // stride + 3):

@@ -93,20 +93,24 @@ def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     a positive integer, and no pole otherwise. r is a rational function of the values of r^2 at the start and its image.
     """
 
-    def square(point: Triple) -> Any:
+    def squared_ratio(point: Triple) -> Any:
         U, V, W = point
-        p, q, r = block.D
-        denominator = p * (U * U) + q * (U * V) + r * (V * V)
+        a, b, c = block.D
+        denominator = a * (U * U) + b * (U * V) + c * (V * V)
         return None if denominator == 0 else -(W * W) / denominator
 
-    square_at_start = square(start)
-    return None if square_at_start is None else (square_at_start - square(block.image(start)) + 1) / 2
+    squared_ratio_at_start = squared_ratio(start)
+    return (
+        None if squared_ratio_at_start is None else (squared_ratio_at_start - squared_ratio(block.image(start)) + 1) / 2
+    )
 
 
-def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
+def _first_points(
+    block: PlanarBlock, points: list[Triple], last_index: int, is_zero: Callable[[Any], bool]
+) -> list[Triple]:
     """Return P_0, P_1, ..., P_last, as natural lifts from the second point on. Raises SingularStep at a pole."""
     points = list(points)
-    for k in range(len(points) - 1, last):
+    for k in range(len(points) - 1, last_index):
         U, V, W = block.image(points[k])
         if is_zero(W):
             raise SingularStep(f"the map is not defined at step {k}")
@@ -162,7 +166,7 @@ def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Calla
     odd_multiples = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
     odd_multiples |= {-k: (x, -y) for k, (x, y) in odd_multiples.items()}
     nT: tuple[Any, Any] | None = None
-    for digit, zeros in _digits(n):
+    for digit, zero_count in _digits(n):
         x, y = odd_multiples[digit]
         if nT is None:
             nT = x, y
@@ -173,7 +177,7 @@ def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Calla
             x_sum = chord_slope * chord_slope - nT[0] - x
             nT = x_sum, chord_slope * (x - x_sum) - y
         if nT is not None:
-            nT = _times_power(*nT, c, zeros)
+            nT = _times_power(*nT, c, zero_count)
     if nT is None:
         return P[0]
     x, Y = nT[0] - shift, nT[1]
@@ -211,8 +215,8 @@ def _digits(n: int) -> list[tuple[int, int]]:
     """
     digits, zeros_after = [], 0
     while n:
-        zeros = (n & -n).bit_length() - 1
-        n, zeros_after = n >> zeros, zeros
+        zero_count = (n & -n).bit_length() - 1
+        n, zeros_after = n >> zero_count, zero_count
         digit = (n + 4) % 8 - 4
         digits.append((digit, zeros_after))
         n -= digit

@@ -183,9 +183,9 @@ def _arrow_texts(column: Any) -> Any:
 
     texts, size = arrow.array(column).cast(arrow.string()), np.abs(column)
     # Numbers for which pyarrow writes 2, 0.00001, 1e-9, 1e+10 instead of 2.0, 1e-05, 1e-09, 10000000000.0.
-    differs = (column == np.rint(column)) | ((size > 9e-11) & (size < 1e-4)) | ((size >= 1e10) & (size < 1e16))
-    if differs.any():
-        texts = compute.replace_with_mask(texts, differs, arrow.array(list(map(repr, column[differs].tolist()))))
+    mask = (column == np.rint(column)) | ((size > 9e-11) & (size < 1e-4)) | ((size >= 1e10) & (size < 1e16))
+    if mask.any():
+        texts = compute.replace_with_mask(texts, mask, arrow.array(list(map(repr, column[mask].tolist()))))
     return texts
 
 
@@ -363,8 +363,8 @@ def form_of(path: str | Path) -> str:
     if suffix in _TEXT_SUFFIXES:
         return "text"
     if suffix[1:] not in FORMATS:
-        endings = ", ".join(f".{form}" for form in FORMATS[1:])
-        raise InputError(f"found the ending {suffix} of {path}, expected .txt, {endings}, or --format")
+        suffixes_text = ", ".join(f".{form}" for form in FORMATS[1:])
+        raise InputError(f"found the ending {suffix} of {path}, expected .txt, {suffixes_text}, or --format")
     return suffix[1:]
 
 

@@ -95,10 +95,10 @@ class _Search:
 
     def modulo(self, prime: int) -> list[list[int]] | None:
         """Return the coefficients of the forms modulo a prime; None if no forms exist or they are not unique."""
-        lag, unknowns = self._lag, len(self.products)
-        length = 3 * unknowns // 2 + _EXTRA_POINTS
+        lag, unknown_count = self._lag, len(self.products)
+        length = 3 * unknown_count // 2 + _EXTRA_POINTS
         if self._nonzero_unknowns is not None:
-            length = max(unknowns, len(self._nonzero_unknowns) // 2) + _EXTRA_POINTS
+            length = max(unknown_count, len(self._nonzero_unknowns) // 2) + _EXTRA_POINTS
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
@@ -112,23 +112,23 @@ class _Search:
             values = [[row[k] for k in independent_columns] for row in values]
         # f = f_n, for points with last coordinate 1: f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
         # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
-        unknowns = len(values[0])
-        zeros, rows = [0] * unknowns, []
+        unknown_count = len(values[0])
+        zeros, rows = [0] * unknown_count, []
         for row, *outer_points in zip(values, images, earliest_points, strict=True):
             g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in outer_points)
             rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
             rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
-        columns = list(range(3 * unknowns)) if self._nonzero_unknowns is None else self._nonzero_unknowns
+        columns = list(range(3 * unknown_count)) if self._nonzero_unknowns is None else self._nonzero_unknowns
         relations = kernel(*matrix([[row[k] for k in columns] for row in rows], prime).rref())
         if len(relations) != 1:
             return None
         weights = dict(zip(columns, relations[0], strict=True))
         self._nonzero_unknowns = [k for k, weight in weights.items() if weight]
-        factors = [sum(weights.get(2 * unknowns + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
+        factors = [sum(weights.get(2 * unknown_count + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
         # The combinations of the columns that are f_n times the coordinates of the next point:
         right_sides = [[f * x % prime for x in coordinates] for f, coordinates in zip(factors, images, strict=True)]
         try:
-            solution = matrix(values[:unknowns], prime).solve(matrix(right_sides[:unknowns], prime))
+            solution = matrix(values[:unknown_count], prime).solve(matrix(right_sides[:unknown_count], prime))
         except ZeroDivisionError:
             return None
         if matrix(values, prime) * solution != matrix(right_sides, prime):

@@ -157,7 +157,9 @@ class _Search:
     def _numbers_modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
         for point_count in (
-            [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
+            [max(sections.points_used for sections in known_sections.values())]
+            if known_sections
+            else points_needed(size)
         ):
             points: Rows = []  # the initial point, then one point for each step of a factor
             point = self._start.residues(prime)
@@ -175,8 +177,8 @@ class _Search:
                         break
                     curves[k, g] = curve_of_group
                 else:
-                    self.sections = {key: factor.sections for key, factor in curves.items()}
-                    return [group for factor in curves.values() for group in factor.numbers]
+                    self.sections = {key: curve_of_key.sections for key, curve_of_key in curves.items()}
+                    return [numbers for curve_of_key in curves.values() for numbers in curve_of_key.numbers]
             except ArithmeticError:
                 if known_sections or point_count == points_needed(size)[-1]:
                     raise
@@ -215,7 +217,7 @@ class _ExactCurves:
     def __init__(self, search: _Search, numbers: dict[tuple[int, int], Numbers]) -> None:
         self._search = search
         size = len(search.groups[0]) + 1
-        self._tables = {
+        self._coefficient_matrices = {
             key: fmpz_mat(size, search.sections[key].degree, primitive_integers(numbers_of_key.coefficients))
             for key, numbers_of_key in numbers.items()
         }
@@ -235,15 +237,17 @@ class _ExactCurves:
             self._primes = self._primes.lcm(number.p).lcm(number.q)
         self._all_primes = {}
         for key, U in self._U.items():
-            bound = common_primes(search.sections[key].degree, self._tables[key], self._W, U)
-            self._all_primes[key] = self._primes.lcm(bound.p).lcm(bound.q)
+            common_number = common_primes(search.sections[key].degree, self._coefficient_matrices[key], self._W, U)
+            self._all_primes[key] = self._primes.lcm(common_number.p).lcm(common_number.q)
 
     def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
         """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
         new_coordinates = {
-            key: Coordinates(sections[key].degree, self._tables[key], W, Terms(U, numbers, W), self._all_primes[key])
+            key: Coordinates(
+                sections[key].degree, self._coefficient_matrices[key], W, Terms(U, numbers, W), self._all_primes[key]
+            )
             for key, U in self._U.items()
         }
         rows = [

@@ -60,8 +60,8 @@ class Sections:
     @property
     def rows(self) -> int:
         """The number of points from which the sections are computed."""
-        unknowns, combinations = len(self.products), (1 << (self.points - 1)) - 1
-        return unknowns + (unknowns + _EXTRA_POINTS) // combinations + 1
+        unknown_count, combinations = len(self.products), (1 << (self.points - 1)) - 1
+        return unknown_count + (unknown_count + _EXTRA_POINTS) // combinations + 1
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,8 @@ def _numbers_of_curve(points: Rows, sections: Sections, values: Rows, prime: int
     for u in range(min(y), 2, -1):
         y[u - 1] = H / (y[u + 1] * y[u] * (1 - y[u]))
     length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _EXTRA_POINTS
-    first_of_W, first_of_U = first_terms(H, y[2], y[3])
-    W, U = around(first_of_W, length + 2), around(first_of_U, length + 2, first_of_W)
+    initial_W, initial_U = first_terms(H, y[2], y[3])
+    W, U = around(initial_W, length + 2), around(initial_U, length + 2, initial_W)
     # The coefficients of the coordinates, up to a common factor.
     last_column, rows = len(points[0]) - 1, []
     for n, point in zip(range(2, length), points[2:], strict=False):

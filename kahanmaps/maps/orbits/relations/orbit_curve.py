@@ -391,12 +391,12 @@ def _are_forms(z: Sequence[fmpq], rows: Sequence[Sequence[fmpq]], degree: int) -
     Unique forms have no common factor: otherwise another factor could replace it.
     """
     width = degree + 1
-    unknowns, equations = len(rows[0]) * width, []
+    unknown_count, equations = len(rows[0]) * width, []
     for value, row in zip(z, rows, strict=True):
         monomials = [value**k for k in range(width)]
         for i in range(1, len(row)):
-            equation = [fmpq(0)] * unknowns
+            equation = [fmpq(0)] * unknown_count
             equation[:width] = [row[i] * x for x in monomials]
             equation[i * width : (i + 1) * width] = [-row[0] * x for x in monomials]
             equations.append(equation)
-    return len(nullspace(QQ, fmpq_mat(len(equations), unknowns, [x for row in equations for x in row]))) == 1
+    return len(nullspace(QQ, fmpq_mat(len(equations), unknown_count, [x for row in equations for x in row]))) == 1
