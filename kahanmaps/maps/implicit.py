@@ -485,7 +485,7 @@ class ImplicitMap(MapFamily):
     time_steps: int = 0
     backward: Rows | None = None
     of_field: PolynomialField | None = None
-    _cached_map: list[tuple[Field, Any, ElementaryMap]] = field(default_factory=list, init=False, repr=False)
+    _cached_maps: list[tuple[Field, Any, ElementaryMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, names = len(self.variables), self.names
@@ -554,7 +554,7 @@ class ImplicitMap(MapFamily):
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
         """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction."""
         eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        for cached_field, cached_eps, map_at_eps in self._cached_map:
+        for cached_field, cached_eps, map_at_eps in self._cached_maps:
             if cached_field is over and cached_eps is eps_element:
                 return map_at_eps
         point = (*values, eps_element)
@@ -563,7 +563,7 @@ class ImplicitMap(MapFamily):
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
         map_at_eps = ElementaryMap(equation, eps_element, backward, self.variables)
         map_at_eps.has_eps = self.has_eps
-        self._cached_map[:] = [] if values else [(over, eps_element, map_at_eps)]  # maps with symbols are not cached
+        self._cached_maps[:] = [] if values else [(over, eps_element, map_at_eps)]  # maps with symbols are not cached
         return map_at_eps
 
     def __repr__(self) -> str:

@@ -160,8 +160,8 @@ class Terms:
     def own_quotient(self, n: int) -> Any:
         """Return s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
         if n not in self._own_quotients:
-            at_n_minus_1, at_n, at_n_plus_1 = (self._scale(k, n <= _MAX_DIRECT_INDEX) for k in (n - 1, n, n + 1))
-            quotient = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
+            scale_before, scale_n, scale_after = (self._scale(k, n <= _MAX_DIRECT_INDEX) for k in (n - 1, n, n + 1))
+            quotient = scale_after * scale_before / (scale_n * scale_n)
             if n > _MAX_DIRECT_INDEX:
                 k = n // 2
                 root = self.mixed_quotient(k + 1) * self._W.own_quotient(k) if n % 2 else 1 / self.mixed_quotient(k)

@@ -279,22 +279,22 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
             continue
         delta = 1 - gamma
         order, reason = torsion_order(gamma)
-        height: arb | None = None
+        height_ball: arb | None = None
         is_rational = isinstance(gamma, fmpq)
         bits = gamma.height_bits() if is_rational else max(x.height_bits() for x in gamma.coefficients)
         if order is not None:
-            height = arb(0)
+            height_ball = arb(0)
         elif bits <= _LONGEST_HEIGHT and is_rational:
             curve = Jacobian(gamma)
-            height = canonical_height(curve, curve.T)
+            height_ball = canonical_height(curve, curve.T)
         elif bits <= _LONGEST_HEIGHT and plane.degree <= _MAX_HEIGHT_DEGREE:
-            height = plane_height(plane.block, triple)
+            height_ball = plane_height(plane.block, triple)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
-        height_value = None if height is None else float(height.mid())
-        height_error = _HEIGHT_ACCURACY if height is None else max(_HEIGHT_ACCURACY, float(height.rad()))
+        height_value = None if height_ball is None else float(height_ball.mid())
+        height_error = _HEIGHT_ACCURACY if height_ball is None else max(_HEIGHT_ACCURACY, float(height_ball.rad()))
         bad_primes = bad_primes_of_plane(gamma)
-        numbers = rotations, height_error, plane.degree, bad_primes
-        planes.append(PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, height_value, *numbers))
+        last_fields = rotations, height_error, plane.degree, bad_primes
+        planes.append(PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, height_value, *last_fields))
     # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
     moving_planes = [plane for plane in planes if plane.kind is not PeriodKind.FIXED]
     height_constant, orbit_closure = None, None

@@ -52,8 +52,8 @@ class AlgebraBlock(LevelBlock):
         numbers += [e.polynomial.denom() for e in (cubic.a, cubic.b, cubic.c, cubic.d, disc, *self.start)]
         if disc != 0:
             numbers.append(self.algebra.norm(disc).p)
-        image = [self.algebra.norm(entry) for entry in self.lifts[2]]
-        numbers += [content(norm.p for norm in image), *(norm.q for norm in image)]
+        image_norms = [self.algebra.norm(entry) for entry in self.lifts[2]]
+        numbers += [content(norm.p for norm in image_norms), *(norm.q for norm in image_norms)]
         return radical(*numbers)
 
     @cached_property

@@ -52,20 +52,20 @@ class BilinearForms:
     def point(self, number: int) -> IntegerPoint | None:
         """Return None: a point is computed only from the points before it."""
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point after the points in `last`; None if the forms do not give it."""
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+        """Return the point after the points in `last_points`; None if the forms do not give it."""
         last_coordinates, lagged_coordinates, divisor_coordinates = (
-            [*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag)
+            [*last_points[k].numerators, last_points[k].denominator] for k in (-1, -self.lag, -1 - self.lag)
         )
         products = [last_coordinates[i] * lagged_coordinates[j] for i, j in self.products]
         column = fmpz_mat(len(products), 1, products)
         values: list[fmpz] = (self.coefficients * column).entries()
         quotients = [self._multiple * value // divisor_coordinates[-1] for value in values]
         image = lowest(quotients[:-1], quotients[-1])
-        if image is not None and self._steps.is_image(last[-1], image):
+        if image is not None and self._steps.is_image(last_points[-1], image):
             return image
         image = lowest(values[:-1], values[-1])
-        if image is None or not self._steps.is_image(last[-1], image):
+        if image is None or not self._steps.is_image(last_points[-1], image):
             return None
         self._multiple = self._multiple.lcm(fmpq(values[-1], image.denominator * divisor_coordinates[-1]).q)
         return image

@@ -55,7 +55,7 @@ class EllipticSteps:
         """The largest degree of coordinates that are computed together on one curve."""
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, after the previous one was computed or skipped; None if undetermined."""
         return self.point(number) if self.skip(number) else None
 

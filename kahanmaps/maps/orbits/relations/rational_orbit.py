@@ -29,7 +29,7 @@ class Relations(Protocol):
     @property
     def name(self) -> str: ...
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, given the last points; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
