@@ -57,9 +57,9 @@ class NpyFile:
             raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file can hold")
         with named(self.path):
             self._stream.seek(0, io.SEEK_END)
-            remaining = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-            while remaining:  # one call of write may write only a part
-                remaining = remaining[self._stream.write(remaining) :]
+            remaining_bytes = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
+            while remaining_bytes:  # one call of write may write only a part
+                remaining_bytes = remaining_bytes[self._stream.write(remaining_bytes) :]
             self._stream.seek(0)
             self._stream.write(header)
         self.rows += len(rows)
@@ -76,8 +76,8 @@ class NpyFile:
     def _header(self, rows: int) -> bytes:
         """Return the header; numpy pads it so that its length is the same for any number of rows."""
         stream = io.BytesIO()
-        what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
-        np.lib.format.write_array_header_1_0(stream, what)
+        header_fields = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
+        np.lib.format.write_array_header_1_0(stream, header_fields)
         return stream.getvalue()
 
     def __enter__(self) -> NpyFile:
