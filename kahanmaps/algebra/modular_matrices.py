@@ -18,7 +18,7 @@ def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
     return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat(rows, prime)
 
 
-def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
+def reduced_echelon_form(A: nmod_mat) -> tuple[nmod_mat, int]:
     """Return the reduced echelon form of a matrix modulo a prime, and its rank."""
     _count_elimination(A)
     form, rank = A.rref()
@@ -51,7 +51,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
     """Return the reduced echelon basis of the null space of the matrix with these rows, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
-    form, rank = reduced(matrix([row[::-1] for row in rows], prime))
+    form, rank = reduced_echelon_form(matrix([row[::-1] for row in rows], prime))
     return [vector[::-1] for vector in reversed(kernel(form, rank))]
 
 
@@ -94,7 +94,7 @@ def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """Return the reduced echelon basis of the span of vectors modulo a prime."""
     if not vectors:
         return []
-    form, rank = reduced(matrix(vectors, prime))
+    form, rank = reduced_echelon_form(matrix(vectors, prime))
     return integers(form)[:rank]
 
 

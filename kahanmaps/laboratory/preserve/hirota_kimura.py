@@ -33,7 +33,7 @@ from kahanmaps.algebra.modular_matrices import (
     multiply,
     null_space,
     rank,
-    reduced,
+    reduced_echelon_form,
     split_columns,
 )
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
@@ -149,7 +149,7 @@ def relations_on_orbit(
     rank_bound = len(support) if rank_bound is None else min(rank_bound, len(support))
     selected = support if len(support) < len(exponents) else None
     rows, point, period = map_.along_orbit(degree, rank_bound + _SPARE, selected)
-    form, independent = reduced(matrix(rows, map_.prime))
+    form, independent = reduced_echelon_form(matrix(rows, map_.prime))
     pivot_columns, free = split_columns(form, independent)
     new_leading = frozenset(exponents[support[k]] for k in free)
     if independent > rank_bound or not leading <= new_leading:

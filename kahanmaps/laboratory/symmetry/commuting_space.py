@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.small_systems import independent
+from kahanmaps.algebra.small_systems import echelon_basis
 from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -100,7 +100,7 @@ def commutator_equations(
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
         left, right = of_f.step(of_g.step(x)), of_g.step(of_f.step(x))
         new = [a - b for u, v in zip(left, right, strict=True) for a, b in zip(u, v, strict=True)]
-        spanned = independent([*equations, *(p for p in new if isinstance(p, fmpq_mpoly))])
+        spanned = echelon_basis([*equations, *(p for p in new if isinstance(p, fmpq_mpoly))])
         idle = idle + 1 if len(spanned) == len(equations) else 0
         equations = spanned
     return equations

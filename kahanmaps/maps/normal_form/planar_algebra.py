@@ -23,10 +23,10 @@ from kahanmaps.algebra.integers import (
     SMALL_PRIMES,
     common_part,
     content,
+    coprime_part,
     over_common_denominator,
     radical,
     split_by_primes,
-    without,
 )
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
@@ -254,7 +254,7 @@ class ShortElements:
         for signs in _signs(degree):
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
             short = self._algebra.convert(fmpq_poly(row))
-            if without(self._algebra.norm(short).p, self._power) in (1, -1):
+            if coprime_part(self._algebra.norm(short).p, self._power) in (1, -1):
                 return short * fmpq(denominator, bad_part)
         return None if denominator == 1 else self._algebra.convert(denominator)
 

@@ -19,7 +19,7 @@ from typing import Any
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_common_denominator, radical
+from kahanmaps.algebra.integers import content, divide_exactly, has_full_multiplicity, over_common_denominator, radical
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -185,7 +185,7 @@ class PlanesPoint:
             power = modulus
             while common != 1:
                 numerator, denominator = numerator // common, denominator // common
-                if is_all(common, power):
+                if has_full_multiplicity(common, power):
                     break
                 power = power * power  # a prime may occur with a high exponent
                 common = _common_part(numerator, denominator, power)
