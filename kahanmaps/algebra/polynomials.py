@@ -360,11 +360,6 @@ def _make_polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[in
     return fmpq_mpoly_ctx.get(names, Ordering[ordering]).from_dict(terms)
 
 
-def _reduce_ball(x: arb) -> tuple[Any, ...]:
-    """Return midpoint and radius as exact integers times powers of 2, independent of the current precision."""
-    return arb, tuple(end.man_exp() if end.is_finite() else float(end) for end in (x.mid(), x.rad()))
-
-
 def _make_residue(value: int, modulus: int) -> fmpz_mod:
     return fmpz_mod_ctx(modulus)(value)
 
@@ -384,7 +379,8 @@ copyreg.pickle(fmpz_poly, _reduce_univariate)
 copyreg.pickle(
     fmpq_mpoly, lambda P: (_make_polynomial, (P.context().names(), P.context().ordering().name, P.to_dict()))
 )
-copyreg.pickle(arb, _reduce_ball)
+# Midpoint and radius are exact integers times powers of 2, independent of the current precision.
+copyreg.pickle(arb, lambda x: (arb, tuple(y.man_exp() if y.is_finite() else float(y) for y in (x.mid(), x.rad()))))
 copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
 copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
 # fmpz_mod has no method that returns its modulus p: the residue 0 x - 1 is p - 1.

@@ -73,8 +73,8 @@ def certify(
         if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
     elif not control:
-        expanded = try_expand(identity, decision, settings.seed)
-        verdict, evidence, witness = expanded.verdict, expanded.evidence, expanded.witness
+        expanded_decision = try_expand(identity, decision, settings.seed)
+        verdict, evidence, witness = expanded_decision.verdict, expanded_decision.evidence, expanded_decision.witness
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
@@ -129,12 +129,12 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
             raise NotEqual("the two sides, expanded, are different rational functions")
     except BudgetExceeded:
         return None
-    scope = " of x, multiplied out"
+    scope_text = " of x, multiplied out"
     if identity.has_eps:
-        scope = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
+        scope_text = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
     return Evidence(
         METHOD,
-        f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope}",
+        f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope_text}",
         {"products_of_terms": budget - field.budget, "eps": "every" if identity.eps is None else str(identity.eps)},
     )
 
@@ -144,7 +144,7 @@ def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | 
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:
-        expanded = expansion(identity, budget)
+        expansion_evidence = expansion(identity, budget)
     except NotEqual as error:
         return fails_over_Q(identity, seed) or Decision(Certainty.REFUTED, Evidence(METHOD, str(error)))
-    return decision if expanded is None else Decision(Certainty.PROVED, expanded)
+    return decision if expansion_evidence is None else Decision(Certainty.PROVED, expansion_evidence)

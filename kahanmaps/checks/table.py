@@ -62,7 +62,7 @@ class Check:
         return report
 
 
-def _tensor(file: SystemFile, path: str) -> Any:
+def _read_tensor(file: SystemFile, path: str) -> Any:
     from kahanmaps.invariants.poisson import MatrixPoissonTensor
 
     return MatrixPoissonTensor.read(path, file.variables, file.parameters)
@@ -155,7 +155,7 @@ _CHECKS = [
             "--tensor",
             "FILE",
             "A claimed tensor P: a section [poisson] with rows of functions, as find-poisson --toml prints it.",
-            _tensor,
+            _read_tensor,
         ),
         for_batch="Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?",
     ),
