@@ -40,8 +40,8 @@ class CoefficientSize:
         return CoefficientSize(self.degree + other.degree, self.bits + other.bits)
 
     def __add__(self, other: CoefficientSize) -> CoefficientSize:
-        low, high = sorted((self.bits, other.bits))
-        bits = high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9
+        min_bits, max_bits = sorted((self.bits, other.bits))
+        bits = max_bits + math.log2(1 + 2 ** (min_bits - max_bits)) if max_bits - min_bits < 200 else max_bits + 1e-9
         return CoefficientSize(max(self.degree, other.degree), bits)
 
     def __pow__(self, exponent: int) -> CoefficientSize:

@@ -90,8 +90,8 @@ class EllipticCurve:
         A, B, x, y = self.a4 - self.a2 * shift, (2 * shift * shift - self.a4) * shift + self.a6, P[0] + shift, P[1]
         u = A.q.lcm(B.q)
         A, B, scale = A * u**4, B * u**6, fmpq(u)
-        common = (A.p**3).gcd(B.p**2)
-        for factor in _candidate_factors(common):
+        gcd = (A.p**3).gcd(B.p**2)
+        for factor in _candidate_factors(gcd):
             while A.p % factor**4 == 0 and B.p % factor**6 == 0:
                 A, B, scale = A / factor**4, B / factor**6, scale / factor
         return EllipticCurve(fmpq(0), A, B), (x * scale**2, y * scale**3)
@@ -149,12 +149,12 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
         X, Z, gcds = x.p, x.q, list[fmpz]()
         while len(gcds) < terms and (modulus is None or modulus % resultant == 0):
             X, Z = double(X, Z)
-            common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
-            X, Z = X // common, Z // common
+            gcd = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
+            X, Z = X // gcd, Z // gcd
             if modulus is not None:
-                modulus //= common
+                modulus //= gcd
                 X, Z = X % modulus, Z % modulus
-            gcds.append(common)
+            gcds.append(gcd)
         return gcds
 
     # The common factors are usually much smaller than R, and as large as the first ones, which need no modulus.
@@ -177,9 +177,9 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
                 point = (point[0] / sizes[-1], point[1] / sizes[-1])
         with RR(128).working():  # summing needs few bits: only the doublings lose digits
             total, scale = initial_size.log(), arb(1)
-            for size, common in zip(sizes, gcds, strict=True):
+            for size, gcd in zip(sizes, gcds, strict=True):
                 scale /= 4
-                total += scale * (size.log() - arb(common).log())
+                total += scale * (size.log() - arb(gcd).log())
             total += arb(0, scale * bound)
             if total.is_finite() and float(total.rad()) < _ACCURACY:
                 return total / 2
@@ -197,19 +197,19 @@ def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
         radius, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
         return [acb(radius * (angle - 2 * k * arb.pi() / 3).cos() - shift) for k in range(3)]
     # Cardano's formula, with the one of the two cube roots that suffers no cancellation.
-    cube = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
-    u = -((-cube).root(3)) if cube < 0 else cube.root(3)
+    u_cubed = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
+    u = -((-u_cubed).root(3)) if u_cubed < 0 else u_cubed.root(3)
     v = -A / (3 * u)
-    real, imaginary = (u + v) / 2, (u - v) * arb(3).sqrt() / 2
-    return [acb(2 * real - shift), acb(-real - shift, imaginary), acb(-real - shift, -imaginary)]
+    re, im = (u + v) / 2, (u - v) * arb(3).sqrt() / 2
+    return [acb(2 * re - shift), acb(-re - shift, im), acb(-re - shift, -im)]
 
 
 def complex_roots(curve: EllipticCurve) -> list[acb]:
     """Return the roots of the cubic polynomial with acb coefficients, by Cardano's formula."""
     shift, A, B = _depressed_cubic(curve)
     sqrt = (B * B / 4 + A * A * A / 27).sqrt()
-    cube = max((-B / 2 + sqrt, -B / 2 - sqrt), key=lambda z: abs(z).mid())
-    u, omega = cube.root(3), acb(arb(-1) / 2, arb(3).sqrt() / 2)
+    u_cubed = max((-B / 2 + sqrt, -B / 2 - sqrt), key=lambda z: abs(z).mid())
+    u, omega = u_cubed.root(3), acb(arb(-1) / 2, arb(3).sqrt() / 2)
     v = -A / (3 * u)
     return [u - shift + v, u * omega + v / omega - shift, u / omega + v * omega - shift]
 

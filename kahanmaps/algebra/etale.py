@@ -147,8 +147,8 @@ class EtaleElement(Element):
             except ZeroDivisionError as error:
                 raise ZeroDivisionError(f"division by a zero divisor in {self.field}") from error
             return EtaleElement(self.field, fmpq_poly(solution.entries()))
-        common, inverse, _ = other.polynomial.xgcd(self.field.chi)
-        if common.degree() != 0:
+        gcd, inverse, _ = other.polynomial.xgcd(self.field.chi)
+        if gcd.degree() != 0:
             divisor = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
             raise ZeroDivisionError(f"division by {divisor}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)

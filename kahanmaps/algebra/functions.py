@@ -123,9 +123,9 @@ class FunctionField(Field):
             if numerator.is_zero():
                 return self.zero
             count_work(10 + (len(numerator) + len(denominator)) / 2)
-            common = numerator.gcd(denominator)
-            if not common.is_constant():
-                return Function(self, numerator / common, denominator / common)
+            gcd = numerator.gcd(denominator)
+            if not gcd.is_constant():
+                return Function(self, numerator / gcd, denominator / gcd)
         return Function(self, numerator, denominator)
 
     def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
@@ -178,25 +178,25 @@ class FunctionField(Field):
         """Return the sum of coefficients times powers of `factors`; `terms` maps exponents to coefficients."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
-        by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
+        terms_by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
         for (power, *other_exponents), coefficient in terms.items():
-            by_power.setdefault(power, {})[tuple(other_exponents)] = coefficient
+            terms_by_power.setdefault(power, {})[tuple(other_exponents)] = coefficient
         total = self.context.constant(0)
-        for power in range(max(by_power, default=-1), -1, -1):
+        for power in range(max(terms_by_power, default=-1), -1, -1):
             total = self.times(total, factors[0])
-            if power in by_power:
-                total += self._horner(by_power[power], factors[1:])
+            if power in terms_by_power:
+                total += self._horner(terms_by_power[power], factors[1:])
         return total
 
-    def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
-        """Return large / small if it is a polynomial, else None; the budget is charged as for a product."""
-        if small.is_constant():
-            return large / small.leading_coefficient()
-        if large.total_degree() < small.total_degree():
+    def quotient(self, dividend: fmpq_mpoly, divisor: fmpq_mpoly) -> fmpq_mpoly | None:
+        """Return dividend / divisor if it is a polynomial, else None; the budget is charged as for a product."""
+        if divisor.is_constant():
+            return dividend / divisor.leading_coefficient()
+        if dividend.total_degree() < divisor.total_degree():
             return None
-        self.pay(len(large) * len(small))
+        self.pay(len(dividend) * len(divisor))
         try:
-            return large / small
+            return dividend / divisor
         except DomainError:
             return None
 
@@ -231,10 +231,10 @@ class Function(Element):
         if self.denominator == other.denominator:
             return self.field.fraction(self.numerator + other.numerator, self.denominator)
         times = self.field.times
-        for small, large in ((self, other), (other, self)):
-            quotient = self.field.quotient(large.denominator, small.denominator)
+        for a, b in ((self, other), (other, self)):
+            quotient = self.field.quotient(b.denominator, a.denominator)
             if quotient is not None:
-                return self.field.fraction(large.numerator + times(small.numerator, quotient), large.denominator)
+                return self.field.fraction(b.numerator + times(a.numerator, quotient), b.denominator)
         numerator = times(self.numerator, other.denominator) + times(other.numerator, self.denominator)
         return self.field.fraction(numerator, times(self.denominator, other.denominator))
 
@@ -397,7 +397,7 @@ def _cache_minors(key: _Key, minors: list[fmpq_mpoly] | None, products: int, uni
         _cache[key] = minors, products, units
         while (
             len(_cache) > _MAX_CACHED
-            or sum(len(P) for cached, *_ in _cache.values() for P in cached or ()) > _MAX_CACHED_TERMS
+            or sum(len(P) for cached_minors, *_ in _cache.values() for P in cached_minors or ()) > _MAX_CACHED_TERMS
         ):
             del _cache[next(iter(_cache))]
 

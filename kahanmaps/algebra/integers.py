@@ -29,12 +29,12 @@ def over_common_denominator(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
 
 def content(integers: Iterable[fmpz]) -> fmpz:
     """Return the greatest common divisor of integers."""
-    common = fmpz(0)
+    gcd = fmpz(0)
     for entry in integers:
-        common = common.gcd(entry)
-        if common == 1:
+        gcd = gcd.gcd(entry)
+        if gcd == 1:
             break
-    return common
+    return gcd
 
 
 def coprime_part(number: fmpz, power: fmpz) -> fmpz:
@@ -44,39 +44,39 @@ def coprime_part(number: fmpz, power: fmpz) -> fmpz:
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
     """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 is (0, 1)."""
-    part = fmpz(1)
+    prime_part = fmpz(1)
     if number == 0:
-        return number, part
-    while (common := power.gcd(number % power)) != 1:
-        number = number // common
-        part = part * common
-        if has_full_multiplicity(common, power):
+        return number, prime_part
+    while (gcd := power.gcd(number % power)) != 1:
+        number = number // gcd
+        prime_part = prime_part * gcd
+        if has_full_multiplicity(gcd, power):
             break
-        power = common * common  # contains every prime that may still divide the number
-    return number, part
+        power = gcd * gcd  # contains every prime that may still divide the number
+    return number, prime_part
 
 
 def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
     """Return the largest common factor of integers (not all 0) that consists of primes dividing `power` > 0."""
     while True:
-        common = power
+        gcd = power
         for number in numbers:
-            if common == 1:
+            if gcd == 1:
                 break
-            common = common.gcd(number % common)
-        if common == 1 or has_full_multiplicity(common, power):
-            return common
-        power = common * common
+            gcd = gcd.gcd(number % gcd)
+        if gcd == 1 or has_full_multiplicity(gcd, power):
+            return gcd
+        power = gcd * gcd
 
 
-def has_full_multiplicity(common: fmpz, power: fmpz) -> bool:
+def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
     """Whether a gcd with `power` has the full multiplicity of its primes: `power` contains each one more often."""
-    cofactor = power // common
-    while common != 1:
-        shared = common.gcd(cofactor)
-        if shared == 1:
+    cofactor = power // gcd
+    while gcd != 1:
+        common_factor = gcd.gcd(cofactor)
+        if common_factor == 1:
             return False
-        common = common // shared
+        gcd = gcd // common_factor
     return True
 
 

@@ -273,8 +273,8 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
         stage_symbols = symbol_order[: stage + 1]
         for i in entries:
             denominator_texts[i].append(str(axes[j][i][1]))
-        dependent = [i for i in entries if _deg(axes[j][i][0]) or _deg(axes[j][i][1])]
-        for i in dependent:
+        dependents = [i for i in entries if _deg(axes[j][i][0]) or _deg(axes[j][i][1])]
+        for i in dependents:
             if quotients[i].shape.unknowns <= 2 and set(
                 quotients[i].shape.numerator + quotients[i].shape.denominator
             ) <= {one}:
@@ -283,15 +283,15 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
                 quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
                 assert quotient is not None  # D is monic
                 quotients[i] = quotient
-        dependent = [
+        dependents = [
             i
-            for i in dependent
+            for i in dependents
             if any(sum(m) != m[j] for m in (*quotients[i].shape.numerator, *quotients[i].shape.denominator))
         ]
-        if not dependent:
+        if not dependents:
             continue
         shapes = {}
-        for i in dependent:  # after symbol j is added, the possible monomials have its exponents on axis j
+        for i in dependents:  # after symbol j is added, the possible monomials have its exponents on axis j
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -299,18 +299,18 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
                     for monomials, side in sides
                 )
             )
-        max_unknowns = max(sum(_deg(axes[a][i][0]) + _deg(axes[a][i][1]) for a in stage_symbols) + 2 for i in dependent)
-        if max(shape.unknowns for shape in shapes.values()) > max_unknowns:
+        limit = max(sum(_deg(axes[a][i][0]) + _deg(axes[a][i][1]) for a in stage_symbols) + 2 for i in dependents)
+        if max(shape.unknowns for shape in shapes.values()) > limit:
             direction = tuple(rng.randrange(1, p) if i in stage_symbols else 0 for i in range(nvars))
-            line = _interpolate_on_line(values, anchor, direction, max_degree, rng)
-            for i in dependent:
-                denominator_texts[i].append(str(line[i][1]))
+            line_fractions = _interpolate_on_line(values, anchor, direction, max_degree, rng)
+            for i in dependents:
+                denominator_texts[i].append(str(line_fractions[i][1]))
                 shapes[i] = Shape(
-                    tuple(m for m in shapes[i].numerator if sum(m) <= _deg(line[i][0])),
-                    tuple(m for m in shapes[i].denominator if sum(m) <= _deg(line[i][1])),
+                    tuple(m for m in shapes[i].numerator if sum(m) <= _deg(line_fractions[i][0])),
+                    tuple(m for m in shapes[i].denominator if sum(m) <= _deg(line_fractions[i][1])),
                 )
         groups: dict[tuple[str, ...], list[int]] = {}
-        for i in dependent:
+        for i in dependents:
             groups.setdefault(tuple(denominator_texts[i]), []).append(i)
         numerator_texts = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
         split_groups = [split_group(group, [numerator_texts[i] for i in group], shapes) for group in groups.values()]
@@ -416,22 +416,22 @@ def fit(
 
     With `fixed` coordinates only points with these coordinates are used.
     """
-    fitted: dict[int, Quotient] = {}
+    quotients: dict[int, Quotient] = {}
     draw = values.random_points(nvars, rng, fixed)
     values.take(draw)
     while True:
         point_indices = [k for k, point in enumerate(values.points) if all(point[i] == v for i, v in fixed.items())]
         needed = 0
         for determining_entries, other_entries in split_groups:
-            if determining_entries[0] not in fitted:
-                needed = max(needed, _solve(values, point_indices, shapes, determining_entries, None, fitted))
-            if determining_entries[0] in fitted:
-                denominator = fitted[determining_entries[0]]
+            if determining_entries[0] not in quotients:
+                needed = max(needed, _solve(values, point_indices, shapes, determining_entries, None, quotients))
+            if determining_entries[0] in quotients:
+                denominator = quotients[determining_entries[0]]
                 for i in other_entries:
-                    if i not in fitted:
-                        needed = max(needed, _solve(values, point_indices, shapes, [i], denominator, fitted))
+                    if i not in quotients:
+                        needed = max(needed, _solve(values, point_indices, shapes, [i], denominator, quotients))
         if needed == 0:
-            return fitted
+            return quotients
         values.samples.check(needed)
         for _ in range(needed):
             values.take(draw)
@@ -443,9 +443,9 @@ def _solve(
     shapes: dict[int, Shape],
     entries: list[int],
     known_denominator: Quotient | None,
-    fitted: dict[int, Quotient],
+    quotients: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of entries with one denominator (known or not), and store them in `fitted`.
+    """Solve for the fractions of entries with one denominator (known or not), and store them in `quotients`.
 
     Returns the number of further values needed, 0 on success. Raises Unlucky if there is no solution.
     """
@@ -501,7 +501,7 @@ def _solve(
             is_consistent = D != 0 and (N - v * D) % p == 0
         if quotient is None or not is_consistent:
             raise Unlucky(f"a value modulo {p} that was held out does not agree")
-        fitted[i] = quotient
+        quotients[i] = quotient
     return 0
 
 
@@ -545,8 +545,8 @@ def _lift(
                 values = counterexample
             else:
                 return tuple(functions)
-            fitted = fit(values, shapes, split_groups, len(names), rng)
-            if any(fitted[i].shape.leading_monomial != shape.leading_monomial for i, shape in shapes.items()):
+            new_quotients = fit(values, shapes, split_groups, len(names), rng)
+            if any(new_quotients[i].shape.leading_monomial != shape.leading_monomial for i, shape in shapes.items()):
                 raise Unlucky(f"the prime {values.prime} divides a leading coefficient")
         except Unlucky:
             failures += 1
@@ -554,8 +554,8 @@ def _lift(
                 raise
             continue
         for i, shape in shapes.items():
-            numerator_terms = dict(zip(fitted[i].shape.numerator, fitted[i].numerator, strict=True))
-            denominator_terms = dict(zip(fitted[i].shape.denominator, fitted[i].denominator, strict=True))
+            numerator_terms = dict(zip(new_quotients[i].shape.numerator, new_quotients[i].numerator, strict=True))
+            denominator_terms = dict(zip(new_quotients[i].shape.denominator, new_quotients[i].denominator, strict=True))
             new_residues = [
                 *(numerator_terms.get(m, 0) for m in shape.numerator),
                 *(denominator_terms.get(m, 0) for m in shape.denominator),
@@ -574,10 +574,10 @@ def _find_counterexample(
         field = GF(values.prime)
         point = [field.convert(entry) for entry in values.points[-1]]
         try:
-            computed = [function.value(field, point) for function in functions]
+            computed_values = [function.value(field, point) for function in functions]
         except BadPrime as error:
             raise Unlucky(str(error)) from error
-        pairs = zip(computed, values.values[-1], strict=True)
+        pairs = zip(computed_values, values.values[-1], strict=True)
         if not all(
             computed_value is not None and field.convert(computed_value) == value for computed_value, value in pairs
         ):

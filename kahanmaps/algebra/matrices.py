@@ -72,11 +72,11 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
         rows, pivots = echelon_form.tolist(), split_columns(echelon_form, rank_found)[0]
     basis = []
     with field.working():
-        for free in (j for j in range(columns) if j not in set(pivots)):
+        for k in (j for j in range(columns) if j not in set(pivots)):
             vector = [field.zero] * columns
-            vector[free] = field.one
+            vector[k] = field.one
             for i, pivot in enumerate(pivots):
-                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], denominator)
+                vector[pivot] = -rows[i][k] if rows is not None else fmpq(-integers[i, k], denominator)
             basis.append(tuple(vector))
     return basis
 
@@ -101,12 +101,12 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     """Return the coprime integers proportional to a rational vector; the first nonzero integer is positive."""
     integers, _ = over_common_denominator(vector)
-    common = content(integers)
-    if common == 0:
+    gcd = content(integers)
+    if gcd == 0:
         return tuple(integers)
     if next(integer for integer in integers if integer != 0) < 0:
-        common = -common
-    return tuple(integer // common for integer in integers)
+        gcd = -gcd
+    return tuple(integer // gcd for integer in integers)
 
 
 class EntryMatrix(ABC):

@@ -49,8 +49,8 @@ def kernel_minors(
             larger_minors[mask] = total
         minors = larger_minors
     all_columns = (1 << width) - 1
-    maximal = (minors[all_columns ^ 1 << j] for j in range(width))
-    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal)]
+    maximal_minors = (minors[all_columns ^ 1 << j] for j in range(width))
+    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal_minors)]
 
 
 @cache

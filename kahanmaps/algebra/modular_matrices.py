@@ -76,10 +76,10 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]
     """
-    prime, (pivot_columns, free) = form.modulus(), split_columns(form, rank)
-    count_work(len(free) * (len(pivot_columns) / 3 + form.ncols() / 50))
+    prime, (pivot_columns, free_columns) = form.modulus(), split_columns(form, rank)
+    count_work(len(free_columns) * (len(pivot_columns) / 3 + form.ncols() / 50))
     basis = []
-    for k in free:
+    for k in free_columns:
         vector = [0] * form.ncols()
         vector[k] = 1
         for i, j in enumerate(pivot_columns):

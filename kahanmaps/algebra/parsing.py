@@ -449,9 +449,9 @@ class _Parser:
         token = self.take()
         if token.kind == "(":
             value = self.sum()
-            closing = self.take()
-            if closing.kind != ")":
-                raise _syntax_error(closing, self.arithmetic)
+            closing_token = self.take()
+            if closing_token.kind != ")":
+                raise _syntax_error(closing_token, self.arithmetic)
             return value
         if token.kind not in ("number", "name"):
             raise _syntax_error(token, self.arithmetic)
@@ -546,9 +546,9 @@ class _Arithmetic:
         def sum_of(values: list[_Polynomial]) -> _Polynomial:
             """Add in pairs: if the terms were added one by one, the growing sum would be copied for each term."""
             while len(values) > 1:
-                unpaired = values[-1:] if len(values) % 2 else []
+                unpaired_values = values[-1:] if len(values) % 2 else []
                 pairs = zip(values[::2], values[1::2], strict=False)
-                values = [self.add(left, right, column) for left, right in pairs] + unpaired
+                values = [self.add(left, right, column) for left, right in pairs] + unpaired_values
             return values[0]
 
         if not fractions:
@@ -609,15 +609,16 @@ class _Arithmetic:
             return _Quotient(self.times_number(denominator, 1 / number, column), None)
         if not self.quotients:
             raise self.error_at("found a division by something with variables in it, expected a polynomial", column)
-        leading = numerator.element.leading_coefficient()
-        if leading == 1:
+        leading_coefficient = numerator.element.leading_coefficient()
+        if leading_coefficient == 1:
             return _Quotient(denominator, numerator)
         # Make the leading coefficient 1, so that denominators that differ by a constant factor become equal.
         self.spend_words(numerator.terms, numerator.bits, column)
-        monic = numerator._replace(
-            element=numerator.element / leading, common_denominator=abs((leading * numerator.common_denominator).p)
+        monic_numerator = numerator._replace(
+            element=numerator.element / leading_coefficient,
+            common_denominator=abs((leading_coefficient * numerator.common_denominator).p),
         )
-        return _Quotient(self.times_number(denominator, 1 / leading, column), monic)
+        return _Quotient(self.times_number(denominator, 1 / leading_coefficient, column), monic_numerator)
 
     def negative(self, value: _Quotient, column: int) -> _Quotient:
         return _Quotient(self.times_number(value.numerator, fmpq(-1), column), value.denominator)

@@ -306,8 +306,8 @@ class RationalFunction(LatexDisplay):
         y
         """
         count_work(10 + (len(numerator) + len(denominator)) / 2)
-        common = numerator.gcd(denominator)
-        return cls(numerator / common, denominator / common)
+        gcd = numerator.gcd(denominator)
+        return cls(numerator / gcd, denominator / gcd)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RationalFunction):

@@ -240,14 +240,14 @@ class Notation:
         names = names_of(polynomial)
         order = sorted(range(len(names)), key=lambda k: self.eps_first and names[k] != "eps")
         variables = {k: self.name(names[k]) for k in order}
-        first, plus, minus = self.signs
+        first_minus, plus, minus = self.signs
         terms: list[str] = []
         for monomial, coefficient in terms_of(polynomial):
             powers = ((variables[k], monomial[k]) for k in order if monomial[k])
             factors = [name if exponent == 1 else self.power(name, exponent) for name, exponent in powers]
             if not factors or abs(coefficient) != 1:  # the coefficients 1 and -1 are printed only without factors
                 factors.insert(0, self.number(abs(coefficient)))
-            sign = (minus if terms else first) if coefficient < 0 else plus if terms else ""
+            sign = (minus if terms else first_minus) if coefficient < 0 else plus if terms else ""
             terms.append(sign + self.times.join(factors))
         return terms or [self.number(fmpq(0))]
 

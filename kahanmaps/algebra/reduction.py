@@ -88,7 +88,7 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
     c4, c6 = 16 * (a2 * a2 - 3 * a4), 32 * (9 * a2 * a4 - 2 * a2**3 - 27 * a6)
     discriminant = (c4**3 - c6 * c6) // 1728
     primes, composites = _factors([fmpz(6), discriminant] if divisors is None else [fmpz(6), *divisors, scale.p])
-    bad, minimal = list[int](), discriminant
+    bad, reduced_discriminant = list[int](), discriminant
     for p in sorted(primes):
         scale_exponent = min(_valuation(c, p) // k for c, k in ((discriminant, 12), (c4, 4), (c6, 6)) if c != 0)
         if p == 2:
@@ -96,12 +96,12 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
             scale_exponent -= not (b % 4 == 3 or (a == 0 and b in (0, 8)))
         elif p == 3:
             scale_exponent -= c6 != 0 and _valuation(c6, 3) == 6 * scale_exponent + 2
-        minimal //= fmpz(p) ** (12 * scale_exponent)
-        if minimal % p == 0:
+        reduced_discriminant //= fmpz(p) ** (12 * scale_exponent)
+        if reduced_discriminant % p == 0:
             bad.append(p)
     bad_composites = {n for n in composites if coprime_part(fmpz(n), curve.j.q) == 1}
     is_known = all(c4.gcd(fmpz(n)) == 1 for n in composites)
-    minimal_discriminant = int(minimal) if is_known else None
+    minimal_discriminant = int(reduced_discriminant) if is_known else None
     return BadPrimes(
         tuple(bad), (), tuple(sorted(bad_composites)), tuple(sorted(composites - bad_composites)), minimal_discriminant
     )

@@ -65,15 +65,15 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
     (100000000000000000000/7, None)
     """
     previous, remainder = (modulus, 0), (residue % modulus, 1)
-    simplest = remainder
+    simplest_pair = remainder
     while remainder[0] * abs(remainder[1]):
-        simplest = min(simplest, remainder, key=lambda pair: pair[0] * abs(pair[1]))
+        simplest_pair = min(simplest_pair, remainder, key=lambda pair: pair[0] * abs(pair[1]))
         quotient = previous[0] // remainder[0]
         previous, remainder = (
             remainder,
             (previous[0] - quotient * remainder[0], previous[1] - quotient * remainder[1]),
         )
-    n, d = simplest
+    n, d = simplest_pair
     return fmpq(n, d) if n * abs(d) < modulus >> spare_bits else None
 
 

@@ -49,11 +49,8 @@ class SolutionComponent:
     @property
     def free(self) -> tuple[int, ...]:
         """The indices of the free variables."""
-        occurs = [False] * self.values[0].context().nvars()
-        for value in (*self.values, *self.equations):
-            for i, exponent in enumerate(value.degrees()):
-                occurs[i] = occurs[i] or exponent > 0
-        return tuple(i for i, occurs_here in enumerate(occurs) if occurs_here)
+        degrees = [polynomial.degrees() for polynomial in (*self.values, *self.equations)]
+        return tuple(i for i, column in enumerate(zip(*degrees, strict=True)) if max(column) > 0)
 
     @property
     def point(self) -> tuple[fmpq, ...]:
@@ -122,18 +119,18 @@ def echelon_basis(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     >>> echelon_basis([x**2 + x, x**2 + y, x - y])
     [x^2 + y, x - y]
     """
-    nonzero = [p for p in polynomials if not p.is_zero()]
-    if not nonzero:
+    nonzero_polynomials = [p for p in polynomials if not p.is_zero()]
+    if not nonzero_polynomials:
         return []
-    context = nonzero[0].context()
+    context = nonzero_polynomials[0].context()
     # A sum of all the monomials lists them in the order of the ring.
-    monomials = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
-    column_of = {tuple(m): k for k, m in enumerate(monomials)}
-    count_work(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(column_of) / 30)
-    matrix = fmpq_mat(len(nonzero), len(column_of))
-    for i, p in enumerate(nonzero):
+    monomials = context.from_dict({m: fmpq(1) for p in nonzero_polynomials for m in p.monoms()}).monoms()
+    monomial_column = {tuple(m): k for k, m in enumerate(monomials)}
+    count_work(20 + 7 * sum(map(len, nonzero_polynomials)) + len(nonzero_polynomials) ** 2 * len(monomial_column) / 30)
+    matrix = fmpq_mat(len(nonzero_polynomials), len(monomial_column))
+    for i, p in enumerate(nonzero_polynomials):
         for monomial, value in p.terms():
-            matrix[i, column_of[tuple(monomial)]] = value
+            matrix[i, monomial_column[tuple(monomial)]] = value
     echelon_form, rank = matrix.rref()
     basis = []
     for i in range(rank):
@@ -274,8 +271,8 @@ class _Solver:
 
     def _solve_finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         """Branch on the rational values of a linear form if the Groebner basis shows finitely many solutions."""
-        free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
-        quotient = quotient_monomials(basis, free)
+        free_variables = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
+        quotient = quotient_monomials(basis, free_variables)
         if quotient is None:
             self._give_up(basis, values, "the solutions are not isolated points, and not linear families")
             return
@@ -283,15 +280,15 @@ class _Solver:
             self._give_up(basis, values, f"there are {len(quotient)} solutions over the complex numbers")
             return
         gens = basis[0].context().gens()
-        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free)), basis[0].context().constant(0))
-        context, index_of = form.context(), {m: k for k, m in enumerate(quotient)}
+        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free_variables)), basis[0].context().constant(0))
+        context, monomial_index = form.context(), {m: k for k, m in enumerate(quotient)}
         matrix = fmpq_mat(len(quotient), len(quotient))  # multiplication by the form in the quotient ring
         for k, m in enumerate(quotient):
             if self.budget.is_spent:
                 self._give_up(basis, values, SPENT)
                 return
             for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
-                matrix[index_of[tuple(int(e) for e in monomial)], k] = value
+                matrix[monomial_index[tuple(int(e) for e in monomial)], k] = value
         size = max((max(abs(e.p), e.q).bit_length() for e in matrix.entries()), default=1)
         count_work(20 + len(quotient) ** 3 * size / 200)
         _, factors = matrix.charpoly().factor()
@@ -333,8 +330,8 @@ def _factors_to_branch_on(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] |
         else:
             continue
         products.append(p.factor()[1])
-    reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
-    return min(reducible, key=lambda factors: (max(map(degree, factors)), sum(map(len, factors))), default=None)
+    factor_lists = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
+    return min(factor_lists, key=lambda factors: (max(map(degree, factors)), sum(map(len, factors))), default=None)
 
 
 def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly] | None:
@@ -413,10 +410,10 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in vector.autoreduction()]
 
 
-def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
+def quotient_monomials(basis: Sequence[fmpq_mpoly], free_variables: Sequence[int]) -> list[tuple[int, ...]] | None:
     """Return the monomials that no leading monomial of the basis divides; None if there are infinitely many."""
     leads = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
-    for i in free:
+    for i in free_variables:
         if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leads):
             return None
     count = len(leads[0])
@@ -426,7 +423,7 @@ def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list
         monomials += layer
         if len(monomials) > 4 * MAX_QUOTIENT:
             return monomials
-        next_layer = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free))
+        next_layer = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free_variables))
         layer = list(dict.fromkeys(next_layer))
     return monomials
 

@@ -264,14 +264,14 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         if check := arguments.pop("known", ""):
             arguments["claims"] = known_claims(arguments["system"], check)
         return certificate(checker=checker, command=command, **arguments)
-    parts: list[Any] = [result]
+    sub_results: list[Any] = [result]
     skipped = list[str]()
     if isinstance(result, Analysis):
-        parts = [result.integrals, result.densities, result.poisson]
+        sub_results = [result.integrals, result.densities, result.poisson]
         if result.symbols:
             skipped.append("symmetries, commuting and equivalent systems: they are about the values in the file")
         else:
-            parts += [result.symmetries, result.commuting, result.equivalent]
+            sub_results += [result.symmetries, result.commuting, result.equivalent]
     if isinstance(result, Analysis | Search):
         file, symbols = result.file, result.symbols
     elif isinstance(result, Equivalence) and result.file is not None:
@@ -292,7 +292,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
     formulas, data = _prepare(file, checker, symbols)
     claims = list[Claim]()
     provers: dict[str, Callable[[], list[Any]]] = {
-        type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
+        type(r).__name__: partial(_claims_of, r, data) for r in sub_results if r is not None
     }
     if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
         provers[ENTROPY] = dict(_known_claims(formulas, _Planes(file, data), checker))[ENTROPY]
@@ -303,7 +303,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
             except FalseClaim:
                 raise
             except InputError as error:  # of an analysis, results with too long identities are omitted
-                if parts == [result]:
+                if sub_results == [result]:
                     raise
                 skipped.append(f"{name}: {error}")
     if not claims:

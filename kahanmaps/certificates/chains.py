@@ -35,8 +35,8 @@ class RationalPoint:
         """Return the point with these coordinates, reduced to lowest terms over Z."""
         numerators, denominators, denominator_indices = [], list[fmpq_mpoly](), []
         for numerator, denominator in fractions:
-            common = numerator.gcd(denominator)
-            P, Q = numerator / common, denominator / common
+            gcd = numerator.gcd(denominator)
+            P, Q = numerator / gcd, denominator / gcd
             Q, P = Q / Q.leading_coefficient(), P / Q.leading_coefficient()
             common_multiple = common_denominator(P) * common_denominator(Q)
             P, Q = P * common_multiple, Q * common_multiple
@@ -125,8 +125,8 @@ def apply(data: MapData, point: RationalPoint) -> RationalPoint:
     """Return the image of a point that depends on x. Raises InputError if the image has too many terms."""
     fractions = []
     for numerator in data.numerators:
-        common = numerator.gcd(data.determinant)
-        values = [value_at(polynomial / common, point, data) for polynomial in (numerator, data.determinant)]
+        gcd = numerator.gcd(data.determinant)
+        values = [value_at(polynomial / gcd, point, data) for polynomial in (numerator, data.determinant)]
         (P, exponents), (Q, other_exponents) = values
         for denominator, a, b in zip(point.denominators, exponents, other_exponents, strict=True):
             P, Q = P * denominator ** max(b - a, 0), Q * denominator ** max(a - b, 0)

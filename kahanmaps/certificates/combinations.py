@@ -62,8 +62,8 @@ class AffineSymmetry(EquationClaim):
         """The inverse of T: for each coordinate a polynomial over Z and its divisor."""
         n, zero, letters = self.data.dim, (0,) * len(self.data.names), ring(self.data.names).gens()
         S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in self.image]).inv()
-        translated = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
-        images = [sum((S[i, j] * translated[j] for j in range(n)), letters[0] * 0) for i in range(n)]
+        translated_point = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
+        images = [sum((S[i, j] * translated_point[j] for j in range(n)), letters[0] * 0) for i in range(n)]
         return [(P * common_denominator(P), int(common_denominator(P))) for P in images]
 
 

@@ -59,7 +59,7 @@ def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) ->
     F_1, factor = _without_common_factor(_forms(data))
     iterates, factors = [F_1], [factor]
     line = [nmod_poly(list(point), PRIME) for point in LINE]
-    degrees, best = [1], None
+    degrees, best_bound = [1], None
     while len(degrees) <= 2 * len(iterates):
         line = _curve_image(F_1, line)
         degrees.append(max(X.degree() for X in line))
@@ -68,18 +68,18 @@ def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) ->
         n, is_even = len(degrees) // 2, len(degrees) % 2 == 1
         if is_even:
             bound = lower_bound(degrees[2 * n], _degree(iterates[n - 1]), n)
-            if bound is not None and (best is None or float(bound) > best[0]):
-                best = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
-            if (is_short and best) or n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
+            if bound is not None and (best_bound is None or float(bound) > best_bound[0]):
+                best_bound = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
+            if (is_short and best_bound) or n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
                 break
             F_n, context = iterates[-1], F_1[0].context()
             images = [F_n[0], F_n[1], *context.gens()[2:-1], F_n[2]]
             F_next, factor = _without_common_factor([F.compose(*images, ctx=context) for F in F_1])
             iterates.append(F_next)
             factors.append(factor)
-    if best is None:
+    if best_bound is None:
         raise InputError("no lower bound of the dynamical degree above 1 was found, which proves nothing")
-    _, n, line_degree, lower = best
+    _, n, line_degree, lower = best_bound
     B, _ = _without_common_factor(_forms(inverse))
     forms = tuple(iterates[:n])
     return PositiveEntropy("entropy", data, B, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
@@ -108,9 +108,9 @@ def _forms(data: MapData) -> list[fmpq_mpoly]:
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
     """Return the forms over Z divided by their primitive common factor, and this common factor."""
-    common = reduce(fmpq_mpoly.gcd, forms)
-    common *= common_denominator(common)
-    return tuple(form / common for form in forms), common
+    gcd = reduce(fmpq_mpoly.gcd, forms)
+    gcd *= common_denominator(gcd)
+    return tuple(form / gcd for form in forms), gcd
 
 
 def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
@@ -143,7 +143,7 @@ def _curve_image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime:
             scalar = int(coefficient.p) * pow(EPS, eps, prime)
             total += power(0, x) * power(1, y) * power(2, h) * scalar
         values.append(total)
-    common = reduce(nmod_poly.gcd, values)
+    gcd = reduce(nmod_poly.gcd, values)
     if not any(values):
         raise InputError("the image of the line modulo a prime is undefined: no degrees are computed")
-    return [value // common for value in values]
+    return [value // gcd for value in values]

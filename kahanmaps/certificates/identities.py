@@ -134,15 +134,15 @@ class MapData:
         """The names for x and x~, and the constants."""
         return (*self.variables, *self.new, *self.names[self.dim :])
 
-    def residual(self, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
-        """Return M(x) y - r(x) in the ring of `names`; x begins at the name with index `first`, y at `second`."""
+    def residual(self, names: Sequence[str], x_index: int, y_index: int) -> list[fmpq_mpoly]:
+        """Return M(x) y - r(x) in the ring of `names`; x begins at the name with index `x_index`, y at `y_index`."""
         n, context = self.dim, ring(names)
         letters = context.gens()
         constants = letters[len(names) - len(self.names) + n :]
         result = []
         for row in self.rows:
-            *entries, right = (entry.compose(*letters[first : first + n], *constants, ctx=context) for entry in row)
-            result.append(sum((e * y for e, y in zip(entries, letters[second : second + n], strict=True)), -right))
+            *entries, right = (entry.compose(*letters[x_index : x_index + n], *constants, ctx=context) for entry in row)
+            result.append(sum((e * y for e, y in zip(entries, letters[y_index : y_index + n], strict=True)), -right))
         return result
 
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
@@ -232,7 +232,7 @@ def map_data(
     multiples = (lcm(*(int(common_denominator(entry)) for entry in row)) for row in equation)
     rows = [[entry * multiple for entry in row] for row, multiple in zip(equation, multiples, strict=True)]
     row_gcds = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic; the next line makes the quotients integral again
-    integer_gcds = (common * common_denominator(common) for common in row_gcds)
+    integer_gcds = (gcd * common_denominator(gcd) for gcd in row_gcds)
     primitive_rows = tuple(tuple(entry / c for entry in row) for row, c in zip(rows, integer_gcds, strict=True))
     return MapData(tuple(variables), tuple(new), tuple(names), primitive_rows)
 
@@ -377,8 +377,8 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
             raise InputError(f"found {unknown[0]} in a function, expected {', '.join(names)} for a certificate")
         images = [letters.get(name, context.constant(0)) for name in function.names]
         P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
-    common = P.gcd(Q)
-    P, Q = P / common, Q / common
+    gcd = P.gcd(Q)
+    P, Q = P / gcd, Q / gcd
     scale = common_denominator(P), common_denominator(Q)
     multiple = scale[0] * scale[1] / scale[0].gcd(scale[1])
     return P * multiple, Q * multiple

@@ -51,10 +51,11 @@ class _Script:
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
         self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are defined by the script itself
-        self.old = [self.letters[name] for name in data.variables]
-        self.new = [self.letters[name] for name in data.new]
-        self.second_image = [self.letters[f"{name}2"] for name in data.new]
-        self.x, self.y, self.z = (" ".join(letters) for letters in (self.old, self.new, self.second_image))
+        # `xs`, `ys`, `zs` are the letters of x, its image y and the image z of y; `x`, `y`, `z` join them by blanks.
+        self.xs = [self.letters[name] for name in data.variables]
+        self.ys = [self.letters[name] for name in data.new]
+        self.zs = [self.letters[f"{name}2"] for name in data.new]
+        self.x, self.y, self.z = (" ".join(letters) for letters in (self.xs, self.ys, self.zs))
 
     @property
     def cramer(self) -> str:
@@ -68,7 +69,7 @@ class _Script:
 
     def image_letters(self, at_n: bool) -> list[str]:
         """Return the text of det(M) x~: the names of N, or products that Cramer's rule rewrites to N."""
-        return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
+        return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
     def constants(self) -> list[str]:
@@ -82,10 +83,10 @@ class _Script:
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
         """Define the equation of the map as a relation between arbitrary points, with the residuals e1, e2, ..."""
-        rows, arguments = (data or self.data).rows, " ".join([*self.old, *self.new])
+        rows, arguments = (data or self.data).rows, " ".join([*self.xs, *self.ys])
         lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
         for i, row in enumerate(rows):
-            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.new, strict=True) if entry]
+            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.ys, strict=True) if entry]
             total = f"{' + '.join(terms)} - ({self.text(row[-1])})"
             lines.append(f"Definition {letter}{i + 1} ({arguments} : R) : R := {total}.")
         equations = " /\\ ".join(f"{letter}{i + 1} {arguments} = 0" for i in range(len(rows)))
@@ -94,7 +95,7 @@ class _Script:
     def uniqueness_lemma(self, letter: str, data: MapData) -> list[str]:
         """State the lemma that a point with det M not 0 has one image; the proof uses adjugates of the blocks of M."""
         x, y, z = self.x, self.y, self.z
-        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.second_image, strict=True))
+        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.ys, self.zs, strict=True))
         one = ring(data.names).constant(1)
         block_of_variable = [restrict(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
         blocks = list({block.variables: block for block in block_of_variable}.values())
@@ -107,8 +108,8 @@ class _Script:
             f"Proof. intros {x} {y} {z} H {self.hypothesis('A')} {self.hypothesis('B')}.",
         ]
         for name in dets:
-            steps = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
-            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({steps}).")
+            tactics = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
+            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({tactics}).")
         for i, block in enumerate(block_of_variable):
             name = dets[[other_block.variables for other_block in blocks].index(block.variables)]
             rows = [data.variables.index(variable) + 1 for variable in block.variables]
@@ -118,10 +119,10 @@ class _Script:
                 if a
             ]
             definitions = " ".join([name, *(f"{letter}{j}" for j in rows)])
-            steps = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
-            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{definitions}] beta; ring |"
-            steps += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
-            lines.append(f"  split. {{ {steps} }}" if i < data.dim - 1 else f"  {steps}")
+            tactics = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
+            tactics += f"transitivity ({' + '.join(terms)}); [cbv delta [{definitions}] beta; ring |"
+            tactics += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
+            lines.append(f"  split. {{ {tactics} }}" if i < data.dim - 1 else f"  {tactics}")
         return [*lines, "Qed."]
 
     def chain(self, claim: Chain, theorem: str) -> list[str]:
@@ -130,7 +131,7 @@ class _Script:
         for letter, data in claim.maps.items():
             lines += [*self.predicate(letter, f"{letter}_maps", data), *self.uniqueness_lemma(letter, data)]
         lines += [f"Variables {self.x} : R.  (* a point x *)"]
-        points, denominators = [self.old], [[""] * n]
+        points, denominators = [self.xs], [[""] * n]
         for v, value in enumerate(claim.values[1:], 1):
             for i, P in enumerate(value.numerators):
                 lines.append(f"Definition w{v}_{i + 1} : R := {self.text(P)}.")
@@ -162,11 +163,11 @@ class _Script:
                     "Qed.",
                 ]
             proofs = [f"exact arrow{k}_{i + 1}" for i in range(n)]
-            steps = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
+            tactics = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
             lines.append(
-                f"Lemma arrow{k} : {letter}_maps {point_texts[s]} {point_texts[v]}. Proof. {steps} {proofs[-1]}. Qed."
+                f"Lemma arrow{k} : {letter}_maps {point_texts[s]} {point_texts[v]}. Proof. {tactics} {proofs[-1]}. Qed."
             )
-        point_names = [self.old, *([f"{a}_p{k}" for a in self.old] for k in range(1, len(claim.arrows) + 1))]
+        point_names = [self.xs, *([f"{a}_p{k}" for a in self.xs] for k in range(1, len(claim.arrows) + 1))]
         hypotheses, proof = [], []
         for k, (letter, source, _) in enumerate(claim.arrows, 1):
             source_names, image_names = " ".join(point_names[source]), " ".join(point_names[k])
@@ -245,7 +246,7 @@ class _Script:
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
         first_point, second_point = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
         target, letters = ("maps", "e") if is_own else ("target", "ef")
-        onto_equations = " /\\ ".join(f"{image} = {name}" for image, name in zip(points[1], self.old, strict=True))
+        onto_equations = " /\\ ".join(f"{image} = {name}" for image, name in zip(points[1], self.xs, strict=True))
         preimage = [f"(({self.text(P)}) / {divisor})" for P, divisor in claim.inverse]
         lines = [
             *self.predicate(),
@@ -260,10 +261,10 @@ class _Script:
         ]
         for i, row in enumerate(claim.matrix):
             terms = [f"({c}) * e{j + 1} {x} {y}" for j, c in enumerate(row) if c]
-            steps = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
-            steps += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
-            steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
-            lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
+            tactics = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
+            tactics += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
+            tactics += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
+            lines.append(f"  split; [{tactics[:-1]} |]." if i < n - 1 else f"  {tactics}")
         return [*lines, "Qed."]
 
     def coordinate_change(self, claim: ChangedFunction, theorem: str) -> list[str]:
@@ -301,7 +302,7 @@ class _Script:
         for i, row in enumerate(data.rows):
             lines += [f"Definition m{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row[:-1])]
             lines.append(f"Definition r{i + 1} : R := {self.text(row[-1])}.")
-        left_sides = [" + ".join(f"m{i + 1}{j + 1} * {name}" for j, name in enumerate(self.new)) for i in range(n)]
+        left_sides = [" + ".join(f"m{i + 1}{j + 1} * {name}" for j, name in enumerate(self.ys)) for i in range(n)]
         lines += [f"Hypothesis equation{i + 1} : {left_sides[i]} = r{i + 1}." for i in range(n)]
         lines += [f"Definition det : R := {determinant_text(entries('m', n))}.", "Hypothesis regular : det <> 0."]
         if not is_solved:
@@ -319,7 +320,7 @@ class _Script:
         for i in range(n):
             combination = " + ".join(f"a{i + 1}{j + 1} * ({left_sides[j]})" for j in range(n))
             lines += [
-                f"Lemma cramer{i + 1} : det * {self.new[i]} = n{i + 1}.",
+                f"Lemma cramer{i + 1} : det * {self.ys[i]} = n{i + 1}.",
                 "Proof.",
                 f"  transitivity ({combination}).",
                 f"  - {self.expand_tactic()}",
@@ -354,7 +355,7 @@ class _Script:
 
         `labels` contains, for each product, its name and the name of its cofactor.
         """
-        old, new, k = self.x, self.y, fraction.degree
+        x, y, k = self.x, self.y, fraction.degree
         lines = [f"Definition c{j} : R := {self.text(c)}." for j, c in enumerate(fraction.common_factors, 1)]
         for (label, letter), product, cofactor in zip(labels, fraction.products, fraction.cofactors, strict=True):
             is_single = product.is_single and product.degree == k
@@ -362,24 +363,22 @@ class _Script:
             definition = f"Definition {letter} : R := {_monomial_text(cofactor)}."
             lines += [] if definition in lines else [definition]
             for name, factor in zip(names, product.factors, strict=True):
-                lines += self.functions(old, **{name: factor.polynomial})
+                lines += self.functions(x, **{name: factor.polynomial})
                 value = letter if is_single else f"({_monomial_text(factor.cofactor)})"
                 definitions = [f"c{j}" for j, power in enumerate(factor.cofactor.powers[1:], 1) if power]
                 definitions += [letter] if is_single else []
-                lines += self.image_lemma(
-                    name, factor.polynomial, factor.degree, f"{value} * {name} {old}", *definitions
-                )
+                lines += self.image_lemma(name, factor.polynomial, factor.degree, f"{value} * {name} {x}", *definitions)
             if is_single:
                 continue
             content = [] if product.content.is_one() and names else [f"({self.text(product.content)})"]
             factors = list(zip(names, product.factors, strict=True))
-            text = " * ".join(content + [f"{name} {old}" + _power_text(factor.exponent) for name, factor in factors])
-            scaled_factors = [f"({name} {new} * det ^ {f.degree})" + _power_text(f.exponent) for name, f in factors]
+            text = " * ".join(content + [f"{name} {x}" + _power_text(factor.exponent) for name, factor in factors])
+            scaled_factors = [f"({name} {y} * det ^ {f.degree})" + _power_text(f.exponent) for name, f in factors]
             scaled_factors = [*content, *scaled_factors, f"det ^ {k - product.degree}"]
             images = "".join(f"?{name}_image, " for name in names)[:-2]
             lines += [
-                f"Definition {label} ({old} : R) : R := {text}.",
-                f"Lemma {label}_image : {label} {new} * det ^ {k} = {letter} * {label} {old}.",
+                f"Definition {label} ({x} : R) : R := {text}.",
+                f"Lemma {label}_image : {label} {y} * det ^ {k} = {letter} * {label} {x}.",
                 "Proof.",
                 f"  transitivity ({' * '.join(scaled_factors)}); [unfold {label}; ring |].",
                 f"  {f'rewrite {images}. ' if images else ''}unfold {label}, {letter}. ring.",
@@ -389,29 +388,29 @@ class _Script:
 
     def conserved_function(self, claim: ConservedFunction, theorem: str) -> list[str]:
         """State the theorem that a function has the same value at x and x~."""
-        old, new, k = self.x, self.y, claim.fraction.degree
+        x, y, k = self.x, self.y, claim.fraction.degree
         lines = [
             "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
             *self.products(claim.fraction, ("num", "cofactor"), ("den", "cofactor")),
             f"Theorem {theorem} :",
-            f"  den {old} <> 0 -> den {new} <> 0 ->",
-            f"  num {new} / den {new} = num {old} / den {old}.",
+            f"  den {x} <> 0 -> den {y} <> 0 ->",
+            f"  num {y} / den {y} = num {x} / den {x}.",
             "Proof.",
             "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
             f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {k} * den {old}); [ring |]. rewrite num_image.",
-            f"  transitivity (num {old} * (den {new} * det ^ {k})); [rewrite den_image; ring | ring].",
+            f"  transitivity (num {y} * det ^ {k} * den {x}); [ring |]. rewrite num_image.",
+            f"  transitivity (num {x} * (den {y} * det ^ {k})); [rewrite den_image; ring | ring].",
             "Qed.",
         ]
         return lines
 
     def darboux_polynomial(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
         """State the theorem that P(x~) is P(x) times the cofactor."""
-        old, new, k = self.x, self.y, claim.product.degree
+        x, y, k = self.x, self.y, claim.product.degree
         return [
             "(* A Darboux polynomial, with its cofactor over a power of det. *)",
             *self.products(claim.product, ("num", "cofactor")),
-            f"Theorem {theorem} : num {new} = cofactor / det ^ {k} * num {old}.",
+            f"Theorem {theorem} : num {y} = cofactor / det ^ {k} * num {x}.",
             "Proof.",
             f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
             "  rewrite num_image. field. exact regular.",
@@ -425,7 +424,7 @@ class _Script:
         entries_of_L = [entry for row in self.data.derivative for entry in row]
         lines += [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, entries_of_L, strict=True)]
         for i, difference in enumerate(self.data.residuals, 1):
-            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.new))
+            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.ys))
             definitions = " ".join(f"m{i}{k + 1}" for k in range(self.data.dim))
             lines += [
                 f"Definition e{i} ({self.x} : R) : R := {self.text(difference)}.",
@@ -438,28 +437,28 @@ class _Script:
 
     def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
         """State the lemma that d (called `name`) is a derivative: P(x + t e_s) = P(x) + t d + t^2 (polynomial)."""
-        names, t_name, old = names_of(P), "t_", " ".join(self.old)
+        names, t_name, x_text = names_of(P), "t_", " ".join(self.xs)
         context = ring((*names, "".join(names) + "_"))  # t may be a variable, so take a name longer than all others
         *letters, t = context.gens()
         P_shifted = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
         P_x, slope = (polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s)))
         remainder = (P_shifted - P_x - t * slope) / t**2
         remainder_text = polynomial_text(remainder, [*(self.letters[x] for x in names), t_name])
-        point = " ".join(f"({x} + {t_name})" if k == s else x for k, x in enumerate(self.old))
+        point = " ".join(f"({x} + {t_name})" if k == s else x for k, x in enumerate(self.xs))
         return [
             f"Lemma derivative_{function}_{s + 1} : forall {t_name}, exists rest,",
-            f"  {function} {point} = {function} {old} + {t_name} * {name} + {t_name} ^ 2 * rest.",
+            f"  {function} {point} = {function} {x_text} + {t_name} * {name} + {t_name} ^ 2 * rest.",
             f"Proof. intro {t_name}. exists ({remainder_text}). cbv delta [{function} {name}] beta; ring. Qed.",
         ]
 
     def poisson_tensor(self, claim: InvariantTensor, theorem: str) -> list[str]:
         """State the theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
-        n, k, old, new = claim.dim, claim.degree, self.x, self.y
+        n, k, x, y = claim.dim, claim.degree, self.x, self.y
         lines, L_names = self.derivative()
         lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
         name_of_pair = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
         functions = {name: claim.upper[pair] for pair, name in name_of_pair.items()} | {"den": claim.denominator}
-        lines += self.functions(old, **functions)
+        lines += self.functions(x, **functions)
         names = " ".join(functions)
 
         def entry_text(
@@ -483,12 +482,12 @@ class _Script:
             for name, P in functions.items():
                 lines += self.image_lemma(name, P, k)
         for i, j in combinations(range(n), 2):
-            left, right = entry_text("l", i, j, old), entry_text("m", i, j, new)
+            left, right = entry_text("l", i, j, x), entry_text("m", i, j, y)
             label = f"{theorem}_{i + 1}{j + 1}"
             lines += [
-                f"Theorem {label} : den {old} <> 0 -> den {new} <> 0 ->",
-                f"  ({left}) / den {old} =",
-                f"  ({right}) / den {new}.",
+                f"Theorem {label} : den {x} <> 0 -> den {y} <> 0 ->",
+                f"  ({left}) / den {x} =",
+                f"  ({right}) / den {y}.",
                 "Proof.",
                 "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
             ]
@@ -496,15 +495,15 @@ class _Script:
                 lines += [f"  (* This identity holds for any x and x~. *) {self.expand_tactic(names, L_names)}", "Qed."]
                 continue
             scaled_sides = (
-                entry_text("l", i, j, old, "({} * det)"),
-                entry_text("m", i, j, new, point_format=f"({{}} * det ^ {k})"),
+                entry_text("l", i, j, x, "({} * det)"),
+                entry_text("m", i, j, y, point_format=f"({{}} * det ^ {k})"),
             )
             images = [f"?l{row + 1}{column + 1}_image" for row in (i, j) for column in range(n)]
             images += [f"?{name}_image" for name in names.split()]
             lines += [
                 f"  apply (Rmult_eq_reg_r (det ^ {k + 2})); [| apply pow_nonzero; exact regular].",
-                f"  transitivity (({scaled_sides[0]}) * (den {new} * det ^ {k})); [ring |].",
-                f"  transitivity (({scaled_sides[1]}) * den {old} * det ^ 2); [| ring].",
+                f"  transitivity (({scaled_sides[0]}) * (den {y} * det ^ {k})); [ring |].",
+                f"  transitivity (({scaled_sides[1]}) * den {x} * det ^ 2); [| ring].",
                 f"  rewrite {', '.join(images)}. {self.expand_tactic(names)}",
                 "Qed.",
             ]
@@ -514,7 +513,7 @@ class _Script:
         self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
     ) -> list[str]:
         """State the Jacobi identities for i < j < k: the cyclic sum over T_is d/dx_s T_jk, times den^3, is 0."""
-        old, lines = self.x, list[str]()
+        x, lines = self.x, list[str]()
         for name, P in functions.items():
             for s in range(claim.dim):
                 lines.append(f"Definition {name}_{s + 1} : R := {self.text(P.derivative(s))}.")
@@ -526,8 +525,8 @@ class _Script:
 
         for i, j, k in claim.triples:
             terms = [
-                f"({entry(a, s, f' {old}')}) * (({entry(b, c, f'_{s + 1}')}) * den {old} - "
-                f"({entry(b, c, f' {old}')}) * den_{s + 1})"
+                f"({entry(a, s, f' {x}')}) * (({entry(b, c, f'_{s + 1}')}) * den {x} - "
+                f"({entry(b, c, f' {x}')}) * den_{s + 1})"
                 for a, b, c in ((i, j, k), (j, k, i), (k, i, j))
                 for s in range(claim.dim)
                 if s != a
@@ -538,7 +537,7 @@ class _Script:
 
     def invariant_volume(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """State the theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
-        n, old, new = self.data.dim, self.x, self.y
+        n, x, y = self.data.dim, self.x, self.y
         lines, L_names = self.derivative()
         lines += [
             f"Definition volume : R := {determinant_text(entries('l', n))}.  (* det L *)",
@@ -546,18 +545,18 @@ class _Script:
         ]
         statement = [
             f"Theorem {theorem} :",
-            f"  den {old} <> 0 -> den {new} <> 0 ->",
-            f"  num {new} / den {new} = num {old} / den {old} * (volume / det).",
+            f"  den {x} <> 0 -> den {y} <> 0 ->",
+            f"  num {y} / den {y} = num {x} / den {x} * (volume / det).",
             "Proof.",
             "  intros Hx Hy.",
-            f"  replace (num {old} / den {old} * (volume / det)) with (num {old} * volume / (den {old} * det))",
+            f"  replace (num {x} / den {x} * (volume / det)) with (num {x} * volume / (den {x} * det))",
             "    by (field; split; [exact regular | assumption]).",
             "  apply equal_fractions; [assumption | apply Rmult_integral_contrapositive_currified; [assumption |"
             " exact regular] |].",
         ]
         if claim.fraction is None:
             proof = self.expand_tactic(f"num den volume {L_names}")
-            lines += self.functions(old, num=claim.numerator, den=claim.denominator)
+            lines += self.functions(x, num=claim.numerator, den=claim.denominator)
             return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {proof}", "Qed."]
         lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
         # Each row of L has degree 1 in x~, so det^n det L is a determinant whose rows contain det and det x~.
@@ -579,10 +578,10 @@ class _Script:
             "Qed.",
             *statement,
             f"  apply (Rmult_eq_reg_r (det ^ {k + n})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {k} * (den {old} * det * det ^ {n})); [ring |].",
-            f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {k})); [| ring].",
+            f"  transitivity (num {y} * det ^ {k} * (den {x} * det * det ^ {n})); [ring |].",
+            f"  transitivity (num {x} * (volume * det ^ {n}) * (den {y} * det ^ {k})); [| ring].",
             "  rewrite num_image, den_image.",
-            f"  transitivity (num {old} * den {old} * (cofactor_num * (det * det ^ {n}))); [ring |].",
+            f"  transitivity (num {x} * den {x} * (cofactor_num * (det * det ^ {n}))); [ring |].",
             "  rewrite balance. ring.",
             "Qed.",
         ]

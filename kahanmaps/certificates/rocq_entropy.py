@@ -151,7 +151,7 @@ def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator
     unfold = f"cbv beta iota zeta delta [{forms} {' '.join(f'F{k} c{k}' for k in range(1, n + 1))} eval fold_right"
     compose = f"{unfold} B g point composed]; intros; split; [| split]; ring."
     coordinates = [f"eval c1 {x} {y} 1 {eps} * eval F1_{i} {x} {y} 1 {eps}" for i in (1, 2, 3)]
-    images = [*(f"det * {name}" for name in script.new), "det"]
+    images = [*(f"det * {name}" for name in script.ys), "det"]
     equations = " /\\ ".join(f"{a} = {b}" for a, b in zip(coordinates, images, strict=True))
     yield f"Theorem {theorem}_coordinates : {equations}."
     yield f"Proof. rewrite cramer1, cramer2, det_value. {unfold} n1 n2 d]. split; [| split]; ring. Qed."

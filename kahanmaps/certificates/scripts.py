@@ -231,8 +231,8 @@ class _Script:
         letters = [self.letters[name] for name in names_of(polynomial)]
         text = polynomial_text(polynomial, letters, "*", self.language.power)
         terms = re.split(r" (?=[+-] )", text)
-        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
-        return text if self.language is GP or len(parts) == 1 else f"sum([{', '.join(parts)}])"
+        partial_sums = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
+        return text if self.language is GP or len(partial_sums) == 1 else f"sum([{', '.join(partial_sums)}])"
 
     def vector(self, entries: Sequence[fmpq_mpoly]) -> str:
         """Return the text of a vector of polynomials."""
@@ -356,23 +356,23 @@ class _Script:
             self.polynomial(f"c{j}", common_factor)
         cofactors = []
         for name, product, power in zip(names, fraction.products, powers, strict=True):
-            parts = [name if product.is_single else f"{name}{i}" for i in range(1, len(product.factors) + 1)]
-            for part, factor in zip(parts, product.factors, strict=True):
+            factor_names = [name if product.is_single else f"{name}{i}" for i in range(1, len(product.factors) + 1)]
+            for factor_name, factor in zip(factor_names, product.factors, strict=True):
                 monomial = factor.cofactor.text("D")
-                self.polynomial(part, factor.polynomial)
-                statement = f"{label}: D^{factor.degree} {part}(N/D) = {monomial} {part}"
-                self.check(statement, f"image({part}, {factor.degree}, old) == {monomial}*{part}")
+                self.polynomial(factor_name, factor.polynomial)
+                statement = f"{label}: D^{factor.degree} {factor_name}(N/D) = {monomial} {factor_name}"
+                self.check(statement, f"image({factor_name}, {factor.degree}, old) == {monomial}*{factor_name}")
             content_text = f"({self.text(product.content)})" + " * one" * (self.language is PYTHON)
-            if product.is_single or not parts:
+            if product.is_single or not factor_names:
                 monomial = product.cofactor(power, len(fraction.common_factors)).text("D")
-                if parts and power >= product.degree:
+                if factor_names and power >= product.degree:
                     monomial = f"D^{power - product.degree}*{product.factors[0].cofactor.text('D')}"
-                if not parts:
+                if not factor_names:
                     self.define(name, content_text)
             else:
                 self.define(f"e{name}", f"[{', '.join(str(factor.exponent) for factor in product.factors)}]")
                 content_text = "" if product.content.is_one() else f"{content_text}*"
-                self.define(name, f"{content_text}monomial([{', '.join(parts)}], e{name})")
+                self.define(name, f"{content_text}monomial([{', '.join(factor_names)}], e{name})")
                 D_exponents = [factor.cofactor.powers[0] - factor.degree for factor in product.factors]
                 other_monomials = ", ".join(factor.cofactor.text("") for factor in product.factors)
                 monomial = f"D^({power} + total({D_exponents}, e{name}))*monomial([{other_monomials}], e{name})"

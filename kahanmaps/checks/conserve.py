@@ -225,8 +225,8 @@ def check_integrals(
             finding = certify(claim, identity, settings, proof, orbit if is_tried else None, **details)
         findings.append(finding)
     notes = []
-    proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
-    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):
+    proved_findings = [finding for finding in findings if finding.verdict is Certainty.PROVED]
+    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved_findings):
         notes.append(f"of the proved integrals the first {max_tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
     known_argument = {"known": "integrals"} if known or extra is None else {}
@@ -244,8 +244,8 @@ def _certified(
         return settings.certified(file, claims=[integral.name])
     assert isinstance(integral, ImageFunction)
     if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # integral of an associated system
-        why = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
-        return {"why_not": f"{why}: type km.certificate(system, checker)"}
+        reason = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
+        return {"why_not": f"{reason}: type km.certificate(system, checker)"}
     power = integral.power if isinstance(integral, CommutantIntegral) else 0
     is_form = file.member is not None and not isinstance(integral, ModifiedHamiltonian)
     return settings.certified(file, claims=[f"H{power}" if is_form else "modified_hamiltonian"])

@@ -31,7 +31,7 @@ MAX_FACTORS = 8
 def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
     """Return the evidence that a theorem applies; None unless every hypothesis holds."""
     distinct_hypotheses = list(dict.fromkeys(hypotheses))
-    if not all(holds for _, holds in distinct_hypotheses):
+    if not all(is_true for _, is_true in distinct_hypotheses):
         return None
     names = [name for name, _ in distinct_hypotheses]
     return Evidence(METHOD, f"{theorem} applies: {'; '.join(names)}", {"theorem": theorem, "hypotheses": names})

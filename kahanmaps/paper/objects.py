@@ -190,8 +190,8 @@ class PaperObjects:
 
     def second(self, f: SystemOver, v: Any) -> Any:
         """Return the matrix f''v, for which f'(x + v) = f'(x) + f''v."""
-        second = f.hessian_times(v.entries())
-        return second if self.error_of_second is None else second + self.error_of_second * v[0, 0]
+        matrix = f.hessian_times(v.entries())
+        return matrix if self.error_of_second is None else matrix + self.error_of_second * v[0, 0]
 
     @cache_by_id
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:

@@ -209,17 +209,17 @@ class Verifier:
     def findings(self) -> list[Finding]:
         """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
         sections = self.options.sections
-        applicable = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
-        selected = [c for c in applicable if sections is None or c.section in sections]
+        applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
+        selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]
         findings: list[Finding] = []
-        unrefuted: list[str] = []
-        for k, claim in enumerate(selected):
-            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
+        unrefuted_keys: list[str] = []
+        for k, claim in enumerate(selected_claims):
+            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected_claims)})")
             if self.options.controls:
                 controls = self.controls(claim)
                 findings += controls
                 if self.why_outside(claim) is None and not any(finding.is_as_expected for finding in controls):
-                    unrefuted.append(claim.key)
+                    unrefuted_keys.append(claim.key)
             else:
                 findings.append(self.verify_claim(claim))
             for objects in self._points.values():  # otherwise the objects would cache the values of all claims
@@ -228,11 +228,11 @@ class Verifier:
         if self.options.controls:
             counts = {"claims": len({finding.place["key"] for finding in findings})}
             text = f"{len(findings)} controls of {counts['claims']} claims, all refuted at exact points"
-            if unrefuted or not findings:
-                text = f"no control refutes {', '.join(unrefuted)}" if unrefuted else "no claim was tested"
-            verdict = Certainty.UNDECIDED if unrefuted or not findings else Certainty.PROVED
-            claimed = "every claim fails on some input that breaks one of its hypotheses"
-            findings.append(Finding(claimed, verdict, Evidence("controls", text, counts)))
+            if unrefuted_keys or not findings:
+                text = f"no control refutes {', '.join(unrefuted_keys)}" if unrefuted_keys else "no claim was tested"
+            verdict = Certainty.UNDECIDED if unrefuted_keys or not findings else Certainty.PROVED
+            statement = "every claim fails on some input that breaks one of its hypotheses"
+            findings.append(Finding(statement, verdict, Evidence("controls", text, counts)))
         return findings
 
     def point(self, needs_roots: bool, number: int) -> PaperObjects | None:
@@ -379,9 +379,9 @@ class Verifier:
                 continue
             point_count += 1
             if outcome.holds and outcome.pairs:
-                place = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
+                point_text = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
                 method = "exact rational point" if objects.K is QQ else "point over GF(p)"
-                text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {place}"
+                text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {point_text}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
@@ -588,12 +588,12 @@ class ClaimAtPoints:
                 yield Trial()
                 continue
             if not outcome.holds:
-                why = "chi splits" if self._needs_roots else "all denominators are units, so it fails over Q"
-                text = f"fails at a point over {outcome.objects.K.name}, where {why}"
+                reason = "chi splits" if self._needs_roots else "all denominators are units, so it fails over Q"
+                text = f"fails at a point over {outcome.objects.K.name}, where {reason}"
                 evidence = Evidence("point over GF(p)", text)
                 # A rational point is easier to read.
-                exact = (self._verifier.exact_point(self._needs_roots, exact_number) for exact_number in range(12))
-                if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
+                points = (self._verifier.exact_point(self._needs_roots, k) for k in range(12))
+                if failure := next((result for result in outcomes(self._claim, points) if not result.holds), None):
                     outcome = failure
                     evidence = Evidence("exact rational point", "fails at a rational point, exactly")
                 yield Trial(decision=Decision(Certainty.REFUTED, evidence, witness_of(outcome)))
@@ -619,8 +619,8 @@ def formal_proof(claim: Claim) -> Evidence | None:
         count += 1
         if left != right:
             raise Contradiction(f"{claim.place}: {claim.title}: identity {count} of its formal proof fails")
-    what = "one identity" if count == 1 else f"{count} identities"
-    text = f"follows, in every dimension, from {what} without coordinates (docs/mathematics.md, Formal proofs)"
+    count_text = "one identity" if count == 1 else f"{count} identities"
+    text = f"follows, in every dimension, from {count_text} without coordinates (docs/mathematics.md, Formal proofs)"
     return Evidence("formal proof", text, {"identities": count})
 
 

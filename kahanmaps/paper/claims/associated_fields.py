@@ -214,16 +214,16 @@ def sums_of_coefficients(o: PaperObjects) -> Pairs:
 def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
     """The coefficients of chi follow from traces of powers of A (Newton's identities with half the traces)
     a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c"""
-    half = o.number(1, 2)
-    sums = [o.trace(o.A_to(k)) * half for k in range(1, o.m + 1)]
-    elementary = [o.K.one]
+    one_half = o.number(1, 2)
+    sums = [o.trace(o.A_to(k)) * one_half for k in range(1, o.m + 1)]
+    symmetric_functions = [o.K.one]
     for k in range(1, o.m + 1):
         total = o.K.zero
         for j in range(1, k + 1):
-            total = total + elementary[k - j] * sums[j - 1] * o.number(1 if j % 2 else -1)
-        elementary.append(total * o.number(1, k))
+            total = total + symmetric_functions[k - j] * sums[j - 1] * o.number(1 if j % 2 else -1)
+        symmetric_functions.append(total * o.number(1, k))
     for k in range(o.m + 1):
-        yield o.chi_of_roots[o.m - k], elementary[k] * o.number(1 if k % 2 == 0 else -1)
+        yield o.chi_of_roots[o.m - k], symmetric_functions[k] * o.number(1 if k % 2 == 0 else -1)
 
 
 @claim("(40)", "B constr", "B")
@@ -356,11 +356,11 @@ def sixth_powers(o: PaperObjects) -> Pairs:
     """(50) implies this equation and, after division by f'^4, the next one
     32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0"""
     square = o.df * o.df
-    fourth = square * square
+    fourth_power = square * square
     for i in o.free:
         difference = o.I - o.B(i).transpose()
         traces = o.trace(square) - o.trace(o.B(i).transpose() * square)
-        yield difference * (fourth * square) * o.number(32), difference * fourth * (o.number(8) * traces)
+        yield difference * (fourth_power * square) * o.number(32), difference * fourth_power * (o.number(8) * traces)
         yield difference * square * o.number(32), difference * (o.number(8) * traces)
 
 

@@ -40,11 +40,11 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     'fails for m = 1, H = u1^3 + v1'
     """
     report = verify(None, settings, VerifyOptions(beyond=True), m=m)
-    by_key = {claim.key: claim for claim in claims()}
+    claim_by_key = {claim.key: claim for claim in claims()}
     functions = {formula: function for function, formula, *_ in STATEMENTS}
     cells = []
     for finding in report.findings:
-        claim = by_key[finding.place["key"]]
+        claim = claim_by_key[finding.place["key"]]
         is_negated = finding.formula.startswith(_NEGATION)
         verdict, evidence, witness = finding.verdict, finding.evidence, finding.witness
         if is_negated and verdict is Certainty.PROVED:
@@ -141,13 +141,13 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **options: An
     )
 
 
-def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
-    """Return slots for monomials of these degrees (in the variables of one plane if `planar`) and coordinates of x."""
+def _slots(m: int, degrees: Sequence[int], is_planar: bool = True) -> list[Slot]:
+    """Return slots for monomials of these degrees (of one plane if `is_planar`) and for coordinates of x."""
     slots: list[Slot] = []
     for degree in degrees:
         for exponent in monomials(2 * m, degree):
             planes = {i % m for i, e in enumerate(exponent) if e}
-            if not planar or len(planes) == 1:
+            if not is_planar or len(planes) == 1:
                 slots.append(("H", tuple(exponent)))
     return slots + [("x", (i,)) for i in range(2 * m)]
 
@@ -157,5 +157,5 @@ _SEARCH_SPACES: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]
     "inhomogeneous": (1, (1,), _slots(1, (3, 2, 1)), {}),
     "steps": (1, (1,), _slots(1, (3,)), {"associate_matrices": (QQ.identity(2) * fmpq(-2),)}),
     "any-structure": (2, (1, 2), [("J", pair) for pair in itertools.combinations(range(4), 2)] + _slots(2, (3,)), {}),
-    "derogatory": (2, (1, 1), _slots(2, (3,), planar=False), {"associate_matrices": (QQ.identity(4),)}),
+    "derogatory": (2, (1, 1), _slots(2, (3,), is_planar=False), {"associate_matrices": (QQ.identity(4),)}),
 }

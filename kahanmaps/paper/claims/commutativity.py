@@ -133,9 +133,9 @@ def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
     f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f"""
     for B in o.associates():
         g = o.g(B)
-        by_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
-        by_f = o.solve(o.minus_eps_jac(o.f, o.x), o.fx)
-        yield o.second(o.f, by_g) + o.second(g, by_g), o.second(o.f, by_f) + o.second(g, by_f)
+        step_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
+        step_f = o.solve(o.minus_eps_jac(o.f, o.x), o.fx)
+        yield o.second(o.f, step_g) + o.second(g, step_g), o.second(o.f, step_f) + o.second(g, step_f)
 
 
 @claim("Lemma 10 (59)", "g''", "H B", blockwise=True)
@@ -167,10 +167,10 @@ def last_displays(o: PaperObjects) -> Pairs:
     for B in o.associates():
         g, BT = o.g(B), B.transpose()
         gx, dg = o.value(g, o.x), o.jac(g, o.x)
-        by_g, by_f = o.solve(o.minus_eps_jac(g, o.x), gx), o.solve(o.minus_eps_jac(f, o.x), fx)
-        yield o.second(f, by_g), o.second(f, o.solve(square, gx + dg * gx * o.eps))
-        yield o.second(g, by_g), o.second(f, o.solve(square, BT * (gx + dg * gx * o.eps)))
-        yield o.second(g, by_g), o.second(f, o.solve(square, fx + df * gx * o.eps))
-        yield o.second(f, by_f), o.second(f, o.solve(square, fx + df * fx * o.eps))
-        yield o.second(g, by_f), o.second(f, o.solve(square, BT * (fx + df * fx * o.eps)))
-        yield o.second(g, by_f), o.second(f, o.solve(square, gx + dg * fx * o.eps))
+        step_g, step_f = o.solve(o.minus_eps_jac(g, o.x), gx), o.solve(o.minus_eps_jac(f, o.x), fx)
+        yield o.second(f, step_g), o.second(f, o.solve(square, gx + dg * gx * o.eps))
+        yield o.second(g, step_g), o.second(f, o.solve(square, BT * (gx + dg * gx * o.eps)))
+        yield o.second(g, step_g), o.second(f, o.solve(square, fx + df * gx * o.eps))
+        yield o.second(f, step_f), o.second(f, o.solve(square, fx + df * fx * o.eps))
+        yield o.second(g, step_f), o.second(f, o.solve(square, BT * (fx + df * fx * o.eps)))
+        yield o.second(g, step_f), o.second(f, o.solve(square, gx + dg * fx * o.eps))

@@ -61,8 +61,8 @@ def skew_hamiltonian(o: PaperObjects) -> Pairs:
 def involution(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} are pairwise in involution
     {H_i, H_j} = 0"""
-    first, second = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
-    yield o.dot(first, o.J * second), o.dot(first, o.J * (o.A * first))
+    gradient_0, gradient_1 = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
+    yield o.dot(gradient_0, o.J * gradient_1), o.dot(gradient_0, o.J * (o.A * gradient_0))
     for i in range(o.m):
         for j in range(i):
             yield o.dot(o.gradient_of_chain(i, o.x), o.J * o.gradient_of_chain(j, o.x)), o.K.zero
@@ -202,8 +202,8 @@ def independent_equations(o: PaperObjects) -> Pairs:
 def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
     """The cubics of A form a space of dimension 12, without a condition on the roots
     dim of the cubics = 4m for any skew-Hamiltonian A"""
-    derogatory = o.replace(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
-    yield comb(o.n + 2, 3) - derogatory.rank_of_cubic_equations(), 4 * o.m
+    derogatory_objects = o.replace(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
+    yield comb(o.n + 2, 3) - derogatory_objects.rank_of_cubic_equations(), 4 * o.m
 
 
 @claim("Prop. 2", "", "repeated A", at_most="the 4m cubics on the eigenspaces solve them", distinct_roots=True)

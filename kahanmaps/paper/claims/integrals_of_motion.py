@@ -91,9 +91,9 @@ def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
     H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f"""
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         square = o.one_minus_square(g, o.x)
-        middle = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
-        yield o.integral(g, o.x), middle
-        yield middle, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
+        middle_form = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
+        yield o.integral(g, o.x), middle_form
+        yield middle_form, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
 
 
 @claim("Sect. 7", "", "f inhomogeneous", blockwise=True)
@@ -103,22 +103,22 @@ def leading_terms(o: PaperObjects) -> Pairs:
     yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
     yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
     for B in o.associates():
-        middle = o.dot(o.x, B * o.grad(o.x)) * o.number(-2)
-        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), middle
-        yield middle, o.Kf(B, o.x) * o.number(-6)
+        middle_form = o.dot(o.x, B * o.grad(o.x)) * o.number(-2)
+        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), middle_form
+        yield middle_form, o.Kf(B, o.x) * o.number(-6)
 
 
 @claim("(65)", "", "f eps inhomogeneous", blockwise=True)
 def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
     """The equalities of the computation of H~(x~) hold
     H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x"""
-    once = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
-    twice = o.solve(o.minus_eps_jac(o.f, o.x_tilde), once)
+    solution = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
+    second_solution = o.solve(o.minus_eps_jac(o.f, o.x_tilde), solution)
     steps = [
         o.H_tilde(o.x_tilde),
         o.dot(o.x_tilde, o.J * o.solve(o.minus_eps_jac(o.f, o.x_tilde), o.x_tilde)) / o.eps,
-        o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * twice)) / o.eps,
-        o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * twice)) / o.eps,
+        o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * second_solution)) / o.eps,
+        o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * second_solution)) / o.eps,
         o.H_tilde(o.x),
     ]
     yield from pairwise(steps)
@@ -195,8 +195,8 @@ def even_terms_as_printed(o: PaperObjects) -> Pairs:
     solution = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     for B in o.associates():
         g = o.g(B)
-        second = (o.second(g, solution) * o.x)[0, 0] * (o.number(2) * o.eps * o.eps)
-        yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second
+        second_term = (o.second(g, solution) * o.x)[0, 0] * (o.number(2) * o.eps * o.eps)
+        yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second_term
 
 
 @claim("Theorem 11, proof", "", "B H eps", blockwise=True)

@@ -173,6 +173,6 @@ def integrals_are_in_involution(o: PaperObjects) -> Pairs:
     {K~_i, K~_j} = 0 for the bracket of Pi"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
     gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
-    for k, first in enumerate(gradients):
-        for second in gradients[:k]:
-            yield o.dot(first, o.Pi(o.x) * second), o.K.zero
+    for k, gradient_1 in enumerate(gradients):
+        for gradient_2 in gradients[:k]:
+            yield o.dot(gradient_1, o.Pi(o.x) * gradient_2), o.K.zero

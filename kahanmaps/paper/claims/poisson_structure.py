@@ -268,8 +268,8 @@ def gradient_of_q(o: PaperObjects) -> Pairs:
     for i in o.free:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
         for l in range(o.n):
-            first, second = _two_traces(o, o.B(i), l)
-            yield gradient[l, 0], first + second
+            trace_1, trace_2 = _two_traces(o, o.B(i), l)
+            yield gradient[l, 0], trace_1 + trace_2
 
 
 @claim("(91)-(93)", "A grad q comp", "H B")
