@@ -62,11 +62,11 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
         A bound for all polynomials that vanish if and only if the pairs are equal, and the degree of the product of
         all polynomials that must not be zero: the divisors, and the elements compared with zero.
     """
-    equation = ONE
+    bound = ONE
     for pair in pairs:
         left, right = (side.entry if isinstance(side, BoundMatrix) else field.convert(side) for side in pair)
-        equation = equation | (left - right).numerator
-    return equation, field.pole_degree
+        bound = bound | (left - right).numerator
+    return bound, field.pole_degree
 
 
 class BoundField(Field):
@@ -110,10 +110,7 @@ class BoundField(Field):
             return len(self._denominators) - 1
         owner_and_index = self._index_by_id.get(id(owner))
         if owner_and_index is None:
-            owner_and_index = self._index_by_id[id(owner)] = (
-                owner,
-                len(self._denominators),
-            )  # storing the owner keeps its id unique
+            owner_and_index = self._index_by_id[id(owner)] = owner, len(self._denominators)  # keeps the id unique
             self._denominators.append(size)
         return owner_and_index[1]
 

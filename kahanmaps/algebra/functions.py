@@ -138,7 +138,7 @@ class FunctionField(Field):
         exponent_columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         entries_with_exponents = [(point[k], powers) for k, powers in exponent_columns if any(powers)]
         denominators: list[fmpq_mpoly] = []  # no element divides another one
-        for entry, _ in sorted(entries_with_exponents, key=lambda operand: -int(operand[0].denominator.total_degree())):
+        for entry, _ in sorted(entries_with_exponents, key=lambda pair: -int(pair[0].denominator.total_degree())):
             if (
                 all(self.quotient(D, entry.denominator) is None for D in denominators)
                 and not entry.denominator.is_constant()

@@ -77,9 +77,9 @@ def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
         coefficient = polynomial[power]
         if coefficient == 0:
             continue
-        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
+        absolute, sign = abs(coefficient), "-" if coefficient < 0 else "+"
         power_text = "" if power == 0 else name if power == 1 else f"{name}^{power}"
-        number = "" if size == 1 and power_text else format_number(size) + ("*" if power_text else "")
+        number = "" if absolute == 1 and power_text else format_number(absolute) + ("*" if power_text else "")
         text += f" {sign} {number}{power_text}" if text else f"{'-' if sign == '-' else ''}{number}{power_text}"
     return text or "0"
 
@@ -179,11 +179,11 @@ def numerator_and_denominator(
     Each is a pair: a positive integer, and powers (polynomial, exponent) with short polynomials first.
     """
 
-    def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
+    def sort_key(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
         return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
 
     return [
-        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=size))
+        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=sort_key))
         for sign, number in ((1, abs(int(constant.p))), (-1, int(constant.q)))
     ]
 

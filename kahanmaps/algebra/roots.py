@@ -109,8 +109,8 @@ class Root:
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
-        residues = [int(field.convert(c)) for c in self.polynomial.coeffs()]
-        roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
+        coefficients = [int(field.convert(c)) for c in self.polynomial.coeffs()]
+        roots = sorted(int(root) for root, _ in nmod_poly(coefficients, p).roots())
         if not roots:
             raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: use another prime", p)
         return roots

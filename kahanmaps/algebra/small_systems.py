@@ -221,10 +221,10 @@ class _Solver:
         if self.stop_reason:  # the reason is already in the result
             return
         count_work(50)
-        original = [p for p in equations if not p.is_zero()]
+        original_equations = [p for p in equations if not p.is_zero()]
         equations = equations if is_basis else echelon_basis(equations)
-        if len(original) > len(equations):
-            original = equations
+        if len(original_equations) > len(equations):
+            original_equations = equations
         if any(p.is_constant() for p in equations):
             return
         if not equations:
@@ -242,18 +242,16 @@ class _Solver:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
-                count_work(sum(20 + len(q) * len(p) for q in (*original, *values)))
-                substituted = [
-                    tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (original, values)
-                ]
-                self.solve(list(substituted[0]), substituted[1])
+                count_work(sum(20 + len(q) * len(p) for q in (*original_equations, *values)))
+                new_equations = [q.compose(*gens, ctx=context) for q in original_equations]
+                self.solve(new_equations, tuple(q.compose(*gens, ctx=context) for q in values))
                 return
         # The reduced basis may hide factors of the original equations, as for x f, y g, z h: factor both.
-        factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original)
+        factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original_equations)
         if factors is not None:
             for factor in sorted(factors, key=lambda q: (degree(q), str(q))):
                 # Use remainders: otherwise the solver would branch on the same product again.
-                self.solve([factor, *(divmod(p, factor)[1] for p in original)], values)
+                self.solve([factor, *(divmod(p, factor)[1] for p in original_equations)], values)
             return
         for p in equations:
             if sum(e > 0 for e in p.degrees()) == 1:  # in one variable, irreducible and not linear: no rational root

@@ -253,8 +253,8 @@ def restrict(data: MapData, function: RationalFunction) -> MapData:
     indices = [j for j in range(n) if names[j] in used_names]
     variables, new = (tuple(letters[j] for j in indices) for letters in (names, data.new))
     context = ring((*variables, *names[n:]))
-    letters = dict(zip(context.names(), context.gens(), strict=True))
-    images = [letters.get(name, context.constant(0)) for name in names]
+    generators = dict(zip(context.names(), context.gens(), strict=True))
+    images = [generators.get(name, context.constant(0)) for name in names]
     restricted_rows = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*indices, n)) for row in rows)
     return MapData(variables, new, tuple(context.names()), restricted_rows)
 
@@ -379,8 +379,8 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
         P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
     gcd = P.gcd(Q)
     P, Q = P / gcd, Q / gcd
-    scale = common_denominator(P), common_denominator(Q)
-    multiple = scale[0] * scale[1] / scale[0].gcd(scale[1])
+    denominators = common_denominator(P), common_denominator(Q)
+    multiple = denominators[0] * denominators[1] / denominators[0].gcd(denominators[1])
     return P * multiple, Q * multiple
 
 

@@ -654,8 +654,8 @@ def _new_statements(lines: Sequence[str], statement_of: dict[str, str], ending: 
             statements[-1] += f"\n{line}"
     result = list[str]()
     for statement in statements:
-        for old, new in new_names.items():
-            statement = re.sub(rf"\b{old}\b", new, statement)
+        for old_name, new_name in new_names.items():
+            statement = re.sub(rf"\b{old_name}\b", new_name, statement)
         name = re.sub(r"^\(\*.*\*\)\n", "", statement).split()[1]
         if statement_of.get(name) == statement:
             continue

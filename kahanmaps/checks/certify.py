@@ -14,7 +14,7 @@ from typing import Any
 from kahanmaps.algebra.functions import DEFAULT_BUDGET, BudgetExceeded, FunctionField
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Witness
 from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
-from kahanmaps.checks.settings import OrbitRun, Settings, along
+from kahanmaps.checks.settings import OrbitRun, Settings, try_along_orbit
 
 METHOD = "expansion"
 # Above this dimension the budget never suffices for an expansion.
@@ -78,7 +78,7 @@ def certify(
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
-        orbit_evidence, orbit_witness = along(identity, orbit)
+        orbit_evidence, orbit_witness = try_along_orbit(identity, orbit)
         also.append(orbit_evidence)
         if orbit_witness is not None and verdict is not Certainty.REFUTED:
             if verdict is Certainty.PROVED:

@@ -198,12 +198,12 @@ class Decidable(Protocol):
 
 def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
     """Test a statement at random points over GF(p): supported (error below 2^-error_bits), refuted or undecided."""
-    equation, pole_degree = statement.bound
-    log2_trial_error = log2_error(equation, pole_degree, statement.conjugates)
-    is_bounded = not math.isinf(equation.bits)
+    size, pole_degree = statement.bound
+    log2_trial_error = log2_error(size, pole_degree, statement.conjugates)
+    is_bounded = not math.isinf(size.bits)
     if is_bounded and log2_trial_error >= -1:
-        text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
-        return _undecided(text, points=0, degree_bound=equation.degree)
+        text = f"the degree bound {size.degree} is too large for primes of 63 bits to decide anything"
+        return _undecided(text, points=0, degree_bound=size.degree)
     point_count = max(1, math.ceil(error_bits / -log2_trial_error)) if is_bounded else 1
     undefined_count = 0
     primes: list[int] = []
@@ -233,8 +233,8 @@ def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS
             {
                 "points": point_count,
                 "error_bound": f"2^-{error_bits_bound}",
-                "degree_bound": equation.degree,
-                "coefficient_bits_bound": math.ceil(equation.bits),
+                "degree_bound": size.degree,
+                "coefficient_bits_bound": math.ceil(size.bits),
                 "pole_degree_bound": pole_degree,
                 "primes": [str(prime) for prime in primes],
                 **statement.data(undefined_count),
@@ -247,21 +247,21 @@ def _undecided(text: str, **data: Any) -> Decision:
     return Decision(Certainty.UNDECIDED, Evidence(METHOD, text, data))
 
 
-def log2_error(equation: CoefficientSize, pole_degree: int, conjugates: int = 1) -> float:
+def log2_error(size: CoefficientSize, pole_degree: int, conjugates: int = 1) -> float:
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
     at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many
     are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides the norm.
     """
-    if max(equation.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
+    if max(size.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
-    bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)
-    prime_bound = 2.0**PRIME_BITS
+    bad_prime_probability = 2 ** (math.log2(max(1.0, conjugates * size.bits / PRIME_BITS)) - primes_log2)
+    min_prime = 2.0**PRIME_BITS
     # The factor 2 accounts for the condition that no denominator vanishes at the point. It holds with probability at
     # least 1/2: the denominators have degree below 2^60, and coefficients that fit into a computer's memory.
-    return math.log2(2 * (bad_primes + equation.degree / prime_bound))
+    return math.log2(2 * (bad_prime_probability + size.degree / min_prime))
 
 
 def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:

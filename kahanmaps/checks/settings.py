@@ -168,7 +168,7 @@ def run_orbit(
             return OrbitRun(orbit.start, tuple(points), eps, end)
 
 
-def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
+def try_along_orbit(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
     tried_count = undefined_count = 0
     number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]

@@ -97,11 +97,11 @@ X, Y, Z = letter("x"), letter("y"), letter("z")
 class KahanEquation:
     """Kahan's equation E = 0 for f(x) = Q(x, x) + B x + c, with the matrices M = I - eps f' and P = I + eps f'."""
 
-    def __init__(self, Q: Multilinear = Q, homogeneous: bool = False) -> None:
+    def __init__(self, Q: Multilinear = Q, is_homogeneous: bool = False) -> None:
         self.Q = Q
         zero = Expression({})
-        self.B: Callable[[Expression], Expression] = (lambda v: zero) if homogeneous else B
-        self.c = zero if homogeneous else letter("c")
+        self.B: Callable[[Expression], Expression] = (lambda v: zero) if is_homogeneous else B
+        self.c = zero if is_homogeneous else letter("c")
 
     def f(self, x: Expression) -> Expression:
         return self.Q(x, x) + self.B(x) + self.c
@@ -130,7 +130,7 @@ def map_of_any_quadratic_system(Q: Multilinear = Q) -> Pairs:
 
 def map_of_any_homogeneous_system(Q: Multilinear = Q) -> Pairs:
     """Yield the identities that imply (8) and (9)."""
-    kahan = KahanEquation(Q, homogeneous=True)
+    kahan = KahanEquation(Q, is_homogeneous=True)
     yield kahan.M(X, Y) - X, kahan.E(X, Y)
     yield Y - kahan.P(Y, X), kahan.E(X, Y)
 

@@ -598,7 +598,7 @@ class PaperObjects:
         objects: PaperObjects = self._cache["inhomogeneous"]
         return objects
 
-    def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
+    def arbitrary_system(self, is_homogeneous: bool = False) -> SystemOver:
         """Return a quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
@@ -606,7 +606,7 @@ class PaperObjects:
             for k in range(j, n):
                 rows[j, k] = rows[k, j] = self.vector(f"f'' {j} {k}")
         tensor = [rows[j, k][i, 0] for i in range(n) for j in range(n) for k in range(n)]
-        if homogeneous:
+        if is_homogeneous:
             return SystemOver(K, K.matrix(n * n, n, tensor))
         linear = self.columns([self.vector(f"B {j}") for j in range(n)])
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
@@ -634,8 +634,8 @@ class PaperObjects:
         linear = self.columns([M * self.vector("e'") for M in linear_form("c")])
         return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
-    def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
-        """Return objects with a random H with terms of all degrees up to 3, and a skew J, random unless `standard`."""
+    def arbitrary_hamiltonian(self, has_standard_J: bool = False) -> PaperObjects:
+        """Return objects with a random H, of terms of all degrees up to 3, and the standard J or a random skew J."""
         n, K = self.n, self.K
         entry_of: dict[tuple[int, ...], Any] = {}
         for i, j in itertools.combinations_with_replacement(range(n), 2):
@@ -650,7 +650,7 @@ class PaperObjects:
             d3H=d3H,
             hessian_of_quadratic_part=X + X.transpose(),
             gradient_of_linear_part=self.vector("linear"),
-            J=self.J if standard else J - J.transpose(),
+            J=self.J if has_standard_J else J - J.transpose(),
             base=None,
             draw=self.vector,
         )

@@ -349,7 +349,7 @@ class Verifier:
             proof = self.proof(claim, statement.used_names, *statement.bound)
             if proof is None and claim.theorem:
                 proof = Evidence("hypotheses", f"{claim.theorem} applies; its hypotheses hold by construction")
-            also = tuple(self.also(claim))
+            also = tuple(self.further_evidence(claim))
         except Contradiction as error:
             text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
             return self._finding(claim, Certainty.REFUTED, Evidence("contradiction", text), witness=error.witness)
@@ -403,7 +403,7 @@ class Verifier:
         evidence = Evidence("random points", f"{text} at each of {point_count} random points", {"points": point_count})
         return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
-    def proof(self, claim: Claim, used_names: set[str], equation: CoefficientSize, pole_degree: int) -> Evidence | None:
+    def proof(self, claim: Claim, used_names: set[str], size: CoefficientSize, pole_degree: int) -> Evidence | None:
         """Return a proof of a claim; None if there is none within the budget."""
         if claim.formal is not None:
             return formal_proof(claim)
@@ -413,7 +413,7 @@ class Verifier:
         if not used_names - {"roots"} and (self.roots is not None or "roots" not in used_names):
             objects = self.exact_point("roots" in used_names, 0)
             with suppress(*UNDEFINED):
-                if objects is not None and equation.degree == 0 and evaluate(claim, objects).holds:
+                if objects is not None and size.degree == 0 and evaluate(claim, objects).holds:
                     return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
             evidence = normal_form_proof(claim.key, blocks, order)
@@ -422,7 +422,7 @@ class Verifier:
                 data = {**evidence.data, "hypotheses_verified": hypotheses_text}
                 return Evidence(evidence.method, f"{evidence.summary}; {hypotheses_text}", data)
         vectors = sorted(used_names - {"roots"})
-        if equation.degree > 6 or pole_degree > 4 or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
+        if size.degree > 6 or pole_degree > 4 or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
             return None
         if "roots" in used_names and self.roots is None:
             return None
@@ -437,7 +437,7 @@ class Verifier:
         scope = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
-    def also(self, claim: Claim) -> Iterable[Evidence]:
+    def further_evidence(self, claim: Claim) -> Iterable[Evidence]:
         """Return further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
         if self.member is None or not self.member.is_generic:
             return

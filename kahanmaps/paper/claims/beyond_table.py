@@ -83,10 +83,10 @@ def table(report: Report) -> str:
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
     """Return data that refute a statement as text and as witness; None if none with at most seven ones refute it."""
-    m, roots, slots, options = _SEARCH_SPACES[variation]
+    m, roots, slots, further_objects = _SEARCH_SPACES[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
-            o = _objects(m, roots, ones, **options)
+            o = _objects(m, roots, ones, **further_objects)
             try:
                 failure = next((pair for pair in function(o) if not same(QQ, *pair)), None)
             except UNDEFINED:
@@ -107,7 +107,7 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
     return None
 
 
-def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **options: Any) -> PaperObjects:
+def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_objects: Any) -> PaperObjects:
     """Return objects in normal form: A = diag(roots, roots), H the sum of the monomials, x of the unit vectors.
 
     If `ones` contain index pairs of J, J has the entry 1 at these pairs {x_i, x_j}, -1 at {x_j, x_i}, and 0 elsewhere.
@@ -127,7 +127,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **options: An
             for permutation in itertools.permutations(coordinates):
                 entries[functools.reduce(lambda position, i: position * n + i, permutation)] += 1
     if any(J):
-        options["J"] = QQ.matrix(n, n, list(map(fmpq, J)))
+        further_objects["J"] = QQ.matrix(n, n, list(map(fmpq, J)))
     return PaperObjects(
         K=QQ,
         A=QQ.matrix(n, n, [fmpq(roots[i % m] * (i == j)) for i in range(n) for j in range(n)]),
@@ -137,7 +137,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **options: An
         eps=fmpq(1),
         roots=tuple(map(fmpq, roots)),
         draw=lambda name: QQ.column(list(map(fmpq, vectors[name]))),
-        **options,
+        **further_objects,
     )
 
 

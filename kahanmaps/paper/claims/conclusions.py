@@ -116,8 +116,8 @@ def translations(o: PaperObjects) -> Pairs:
             points = [E * point for point in orbit]
 
             def area(*indices: int, points: list[Any] = points) -> Any:
-                sides = zip(indices, indices[1:] + indices[:1], strict=True)
-                return o.sum([o.dot(points[a], o.J * points[b]) for a, b in sides])
+                index_pairs = zip(indices, indices[1:] + indices[:1], strict=True)
+                return o.sum([o.dot(points[a], o.J * points[b]) for a, b in index_pairs])
 
             area_1, area_2 = area(1, 0, 3), area(2, 0, 3)
             chord_point, w = points[2] * area_1 - points[1] * area_2, area_1 - area_2

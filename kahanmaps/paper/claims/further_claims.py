@@ -164,8 +164,8 @@ def division_polynomials(o: PaperObjects) -> Pairs:
             points.append(o.step(o.f, points[-1]))
 
         def det(*indices: int, points: list[Any] = points) -> Any:
-            sides = zip(indices, indices[1:] + indices[:1], strict=True)
-            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in sides])
+            index_pairs = zip(indices, indices[1:] + indices[:1], strict=True)
+            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in index_pairs])
 
         x, fx = points[0], o.value(o.f, points[0])
         D, D_f = o.block_determinant(i, x), o.block_determinant(i, fx)

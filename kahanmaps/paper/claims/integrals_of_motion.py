@@ -161,17 +161,17 @@ def odd_terms_vanish(o: PaperObjects) -> Pairs:
     gradient = o.grad(o.x)
     for B in o.associates():
         g = o.g(B)
-        skew = B.transpose() * o.solve(square, o.J)
+        skew_matrix = B.transpose() * o.solve(square, o.J)
         steps = [
             o.dot(o.x, o.J * (o.second(g, solution) * o.x)),
             o.dot(o.x, o.J * (o.jac(g, o.x) * solution)),
             -o.dot(o.x, B * o.hess(o.x) * solution),
             o.dot(B * gradient, solution) * o.number(-2),
-            o.dot(gradient, skew * gradient) * o.number(-2),
+            o.dot(gradient, skew_matrix * gradient) * o.number(-2),
             o.K.zero,
         ]
         yield from pairwise(steps)
-        yield skew.transpose(), -skew
+        yield skew_matrix.transpose(), -skew_matrix
 
 
 @claim("(69)", "aux7", "inhomogeneous", blockwise=True)

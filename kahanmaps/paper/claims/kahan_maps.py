@@ -41,7 +41,7 @@ def any_quadratic_system(o: PaperObjects) -> Pairs:
 def any_homogeneous_system(o: PaperObjects) -> Pairs:
     """The map of every homogeneous quadratic system has both homogeneous forms
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f"""
-    f = o.arbitrary_system(homogeneous=True)
+    f = o.arbitrary_system(is_homogeneous=True)
     x_tilde = o.step(f, o.x)
     yield x_tilde, o.solve(o.minus_eps_jac(f, o.x), o.x)
     yield x_tilde, o.plus_eps_jac(f, x_tilde) * o.x

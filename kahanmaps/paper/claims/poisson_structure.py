@@ -147,7 +147,7 @@ def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
 def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
     """The gradient conditions solve the equations of first order in eps^2
     coefficient of eps^2 in the Jacobi identities vanishes for nabla pi_k = C_k w, w any vector"""
-    equations, solutions = _first_order(o)
+    equations, solutions = _first_order_equations(o)
     yield equations * solutions, o.zeros(equations.nrows(), o.n)
 
 
@@ -162,7 +162,7 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
 def rank_of_the_first_order(o: PaperObjects) -> Pairs:
     """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3
     these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions"""
-    equations, solutions = _first_order(o)
+    equations, solutions = _first_order_equations(o)
     yield equations.nrows(), comb(2 * o.m, 3)
     yield o.rank(equations), 2 * o.m * (o.m - 1)
     yield o.rank(solutions), equations.ncols() - 2 * o.m * (o.m - 1)
@@ -302,7 +302,7 @@ def _long_form(o: PaperObjects, x: Any) -> Any:
     return right
 
 
-def _first_order(o: PaperObjects) -> tuple[Any, Any]:
+def _first_order_equations(o: PaperObjects) -> tuple[Any, Any]:
     """Return the equations of first order in eps^2 for the d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
     n, m = o.n, o.m
     powers = [o.A_to(k).transpose() * o.J for k in range(m)]
@@ -311,9 +311,9 @@ def _first_order(o: PaperObjects) -> tuple[Any, Any]:
         row = [o.K.zero] * (n * m)
         for a in range(3):
             i, j, k = triple[a], triple[(a + 1) % 3], triple[(a + 2) % 3]
-            for power in range(m):
+            for exponent in range(m):
                 for l in range(n):  # to this order the bracket of x_i with a function u is sum_l J_il d_l u
-                    row[power * n + l] = row[power * n + l] + o.J[i, l] * powers[power][j, k]
+                    row[exponent * n + l] = row[exponent * n + l] + o.J[i, l] * powers[exponent][j, k]
         rows.append(row)
     equations = o.K.matrix(len(rows), n * m, [entry for row in rows for entry in row])
     entries = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
