@@ -62,12 +62,6 @@ class Check:
         return report
 
 
-def _tensor(file: SystemFile, path: str) -> Any:
-    from kahanmaps.invariants.poisson import MatrixPoissonTensor
-
-    return MatrixPoissonTensor.read(path, file.variables, file.parameters)
-
-
 _CHECKS = [
     Check(
         "commute",
@@ -156,7 +150,9 @@ _CHECKS = [
             "--tensor",
             "FILE",
             "A claimed tensor P: a section [poisson] with rows of functions, as find-poisson --toml prints it.",
-            _tensor,
+            lambda file, path: import_module("kahanmaps.invariants.poisson").MatrixPoissonTensor.read(
+                path, file.variables, file.parameters
+            ),
         ),
         for_batch="Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?",
     ),

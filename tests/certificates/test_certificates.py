@@ -22,10 +22,10 @@ from kahanmaps.certificates.certificate import (
     _SEARCHES,
     CHECKERS,
     _claims_of,
-    _commuting,
+    _commuting_claims,
     _known_claims,
     _Planes,
-    _prepared,
+    _prepare,
     certificate,
     certificate_of,
 )
@@ -113,7 +113,7 @@ def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tm
 def claims_of(name: str, kind: str):
     """The claims with this name about the map of a system, or the first one that a search finds."""
     file = load(name)
-    formulas, data = _prepared(file, "gp")
+    formulas, data = _prepare(file, "gp")
     known = dict(_known_claims(formulas, _Planes(file, data)))
     return known[kind]() if kind in known else _claims_of(_SEARCHES[kind](file), data)[:1]
 
@@ -128,7 +128,8 @@ def changed(claim):
     if isinstance(claim, InvariantTensor):
         return replace(claim, upper={pair: P + (pair == (0, 1)) for pair, P in claim.upper.items()})
     if isinstance(claim, ChangedFunction):
-        return replace(claim, moved=(claim.moved[0] + claim.moved[0].context().gen(0), claim.moved[1]))
+        P, Q = claim.new_function
+        return replace(claim, new_function=(P + P.context().gen(0), Q))
     if isinstance(claim, ConservedFunction):
         return replace(claim, fraction=changed_products(claim.fraction))
     if isinstance(claim, DarbouxPolynomial):
@@ -182,7 +183,7 @@ def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed
 )
 def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(system, other, checker, tmp_path):
     file = load(system) if other == "associates" else System(system)
-    claims = _commuting(file, _prepared(file, checker)[1], other if other == "associates" else System(other))
+    claims = _commuting_claims(file, _prepare(file, checker)[1], other if other == "associates" else System(other))
     claims = [*[claim for claim in claims if not isinstance(claim, Chain)][:2], claims[-1]]
     assert run(checker, CHECKERS[checker](claims), tmp_path).returncode == 0
     chain = claims[-1]
@@ -202,7 +203,7 @@ def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(che
     text = result.certificate(checker)
     assert "equivalence: f is equivalent to weierstrass at g2 = 64 after (x, y) -> (4*x - 8, 4*y + 4)" in text
     assert run(checker, text, tmp_path).returncode == 0
-    (claim,) = _claims_of(result, _prepared(EQUIVALENT, checker)[1])
+    (claim,) = _claims_of(result, _prepare(EQUIVALENT, checker)[1])
     one = claim.image[0] ** 0
     shifted = replace(claim, image=(claim.image[0] + one, claim.image[1]))
     rows = claim.target.rows
@@ -245,7 +246,7 @@ def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
 def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     file = load("lyness", {"a": 1})
     assert run(checker, certificate(file, checker, period=5), tmp_path).returncode == 0
-    chain = periodic(_prepared(file, checker)[1], 5)
+    chain = periodic(_prepare(file, checker)[1], 5)
     wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
     values = (*chain.values[:2], wrong, *chain.values[3:])
     assert run(checker, CHECKERS[checker]([replace(chain, values=values)]), tmp_path).returncode != 0
@@ -294,7 +295,7 @@ def test_coq_accepts_positive_entropy_from_one_axiom(name, tmp_path):
 @pytest.mark.slow
 def test_coq_refuses_positive_entropy_with_one_number_changed(tmp_path):
     file = load("hietarinta_viallet")
-    data = _prepared(file, "rocq")[1]
+    data = _prepare(file, "rocq")[1]
     claim = positive_entropy(data, data.with_rows(file.map.inverse_rows), is_short=True)
     text, (first, *others) = CHECKERS["rocq"]([claim]), claim.forms[-1]
     wrong = [
@@ -349,7 +350,7 @@ def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_po
 
 
 def test_false_claims_of_each_kind_have_no_certificate():
-    _, data = _prepared(load("euler_top"), "gp")
+    _, data = _prepare(load("euler_top"), "gp")
     x = ring(data.names).gens()
     with pytest.raises(FalseClaim, match="T is no symmetry"):
         affine_symmetry(data, "T", fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), [fmpq(0)] * 3, False)
@@ -447,7 +448,7 @@ def test_names_of_factors_and_of_later_claims_differ():
 @given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))
 def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
     """D^k P(N/D) against P at the image that the map itself computes, modulo a prime."""
-    (formulas, data), field = _prepared(load("euler_top"), "gp"), GF(2**61 - 1)
+    (formulas, data), field = _prepare(load("euler_top"), "gp"), GF(2**61 - 1)
     P = parse_rational_function("x1^2*x2 - 3*x3 + eps*x1 + 5", data.names).numerator
     point = [field.convert(value) for value in (x, y, z)]
     step = field.convert(f"1/{eps}")
@@ -467,7 +468,7 @@ def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
 
 
 def test_the_adjugate_solves_the_equation_of_the_map():
-    _, data = _prepared(load("volterra_periodic_4"), "gp")
+    _, data = _prepare(load("volterra_periodic_4"), "gp")
     n = data.dim
     for i in range(n):
         row = data.rows[i]
@@ -503,7 +504,7 @@ def test_maps_with_a_constant_determinant_have_certificates(x_dot, options, chec
 
 
 def test_a_density_that_is_not_invariant_has_no_certificate():
-    _, data = _prepared(load("lotka_volterra"), "gp")
+    _, data = _prepare(load("lotka_volterra"), "gp")
     with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
         invariant_volume(data, "volume", parse_rational_function("x", data.names))
 
@@ -599,19 +600,19 @@ def test_the_time_that_is_said_beforehand_is_that_of_coq_within_a_factor_of_3(na
 @pytest.mark.parametrize("claim", ["euler_top F1", "zander_111 F", "repaired_icosahedral F"])
 def test_the_conserved_polynomials_have_the_same_cofactor_over_Z(claim):
     name, integral = claim.split()
-    formulas, data = _prepared(load(name), "gp")
+    formulas, data = _prepare(load(name), "gp")
     fraction = conserved_function(data, integral, formulas.integrals[integral]).fraction
     P, Q = coprime(formulas.integrals[integral], data.names)
     assert [product.polynomial for product in fraction.products] == [P, Q]
-    cofactors = [cofactor.at((data.determinant, *fraction.letters)) for cofactor in fraction.cofactors]
+    cofactors = [cofactor.at((data.determinant, *fraction.common_factors)) for cofactor in fraction.cofactors]
     assert cofactors[0] == cofactors[1] != 0
     assert homogeneous_value(P, fraction.degree, data) == cofactors[0] * P
     assert homogeneous_value(Q, fraction.degree, data) == cofactors[0] * Q
-    assert all(c.q == 1 for letter in fraction.letters for _, c in letter.terms())
+    assert all(c.q == 1 for letter in fraction.common_factors for _, c in letter.terms())
 
 
 def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():
-    formulas, data = _prepared(load("repaired_icosahedral"), "gp")
+    formulas, data = _prepare(load("repaired_icosahedral"), "gp")
     lines, curve = conserved_function(data, "F", formulas.integrals["F"]).fraction.products
     assert [(factor.degree, factor.exponent) for factor in lines.factors] == [(1, 1), (1, 2), (1, 3)]
     assert [(factor.degree, factor.exponent) for factor in curve.factors] == [(6, 1)]
@@ -619,7 +620,7 @@ def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():
 
 def test_rows_of_the_equation_have_no_common_factor():
     # The second row of this composition of two involutions has one, which makes its determinant larger.
-    formulas, data = _prepared(load("qrt_asymmetric"), "gp")
+    formulas, data = _prepare(load("qrt_asymmetric"), "gp")
     assert [len(entry) for row in formulas.equation for entry in row] == [4, 0, 4, 0, 46, 54]
     assert [len(entry) for row in data.rows for entry in row] == [4, 0, 4, 0, 20, 27]
 

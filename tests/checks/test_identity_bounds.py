@@ -141,7 +141,7 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, 
     bounds = broken(control, specialize.bound_objects(result, None, 3))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     statement = ClaimAtPoints(examined, claim)
-    needs, (equation, poles) = statement.needs, statement.bound
+    needs, (equation, poles) = statement.used_names, statement.bound
     functions = specialize.member_functions(result, sorted(needs - {"roots"}), None, 10**9, 3)
     sizes = difference_sizes(claim, broken(control, functions))
     for above, below in sizes:

@@ -33,7 +33,7 @@ from kahanmaps.algebra.modular_matrices import (
     multiply,
     null_space,
     rank,
-    reduced,
+    reduced_echelon_form,
     split_columns,
 )
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
@@ -149,7 +149,7 @@ def relations_on_orbit(
     rank_bound = len(support) if rank_bound is None else min(rank_bound, len(support))
     evaluated_support = support if len(support) < len(exponents) else None
     rows, point, period = map_.along_orbit(degree, rank_bound + _SPARE, evaluated_support)
-    form, row_rank = reduced(matrix(rows, map_.prime))
+    form, row_rank = reduced_echelon_form(matrix(rows, map_.prime))
     pivot_columns, free_columns = split_columns(form, row_rank)
     new_leading = frozenset(exponents[support[k]] for k in free_columns)
     if row_rank > rank_bound or not leading <= new_leading:

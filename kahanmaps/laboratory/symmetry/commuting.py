@@ -27,9 +27,9 @@ from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import (
     SolutionComponent,
     decoupling,
+    maximal_components,
     normal_form,
     solve_system,
-    without_contained,
 )
 from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty, Finding, combined
@@ -285,7 +285,7 @@ class _Search:
                 self._solve(all_fields, 0)
         zeros = [fmpq(0)] * (len(self.space.fields) - 1)
         trivial_points = [(fmpq(f_weight), *zeros) for f_weight in (0, 1, -1)]
-        isolated_points = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
+        isolated_points = [c.point for c in maximal_components([*self.families, *self.points]) if not c.free]
         # Each -g directly follows g in the list.
         signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in isolated_points if p not in trivial_points}
         sorted_points = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))

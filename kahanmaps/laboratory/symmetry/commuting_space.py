@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.small_systems import independent
+from kahanmaps.algebra.small_systems import echelon_basis
 from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -100,7 +100,7 @@ def commutator_equations(
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
         f_after_g, g_after_f = map_of_f.step(map_of_g.step(x)), map_of_g.step(map_of_f.step(x))
         commutator = [a - b for u, v in zip(f_after_g, g_after_f, strict=True) for a, b in zip(u, v, strict=True)]
-        spanning_equations = independent([*equations, *(p for p in commutator if isinstance(p, fmpq_mpoly))])
+        spanning_equations = echelon_basis([*equations, *(p for p in commutator if isinstance(p, fmpq_mpoly))])
         idle_count = idle_count + 1 if len(spanning_equations) == len(equations) else 0
         equations = spanning_equations
     return equations

@@ -23,10 +23,10 @@ from kahanmaps.algebra.integers import (
     SMALL_PRIMES,
     common_part,
     content,
+    coprime_part,
     over_common_denominator,
     radical,
     split_by_primes,
-    without,
 )
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
@@ -107,10 +107,10 @@ class AlgebraBlock(LevelBlock):
             norm += entry * multiple.polynomial[0]
             multiple = multiple * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        coprime_part, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
+        coprime_content, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         # One common factor is removed from all coordinates: reducing each fraction separately costs as many gcds.
         common_factor = common_part([norm.p, *numerators], self.bad**4 * other_part)
-        return [entry // common_factor for entry in numerators], norm.p // common_factor, coprime_part
+        return [entry // common_factor for entry in numerators], norm.p // common_factor, coprime_content
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
         """Return a number divisible by all primes at which form and denominator may cancel; None if all primes may.
@@ -199,7 +199,7 @@ class ShortElements:
         for signs in _sign_vectors(degree):
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
             candidate = self._algebra.convert(fmpq_poly(row))
-            if without(self._algebra.norm(candidate).p, self._bad_power) in (1, -1):
+            if coprime_part(self._algebra.norm(candidate).p, self._bad_power) in (1, -1):
                 multiplier = candidate * fmpq(denominator, bad_part)
                 return value * multiplier, 1 / multiplier
         if denominator == 1:

@@ -19,7 +19,7 @@ from typing import Any
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_common_denominator, radical
+from kahanmaps.algebra.integers import content, divide_exactly, has_full_multiplicity, over_common_denominator, radical
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -187,7 +187,7 @@ class PlanesPoint:
             power = modulus
             while common_factor != 1:
                 numerator, denominator = numerator // common_factor, denominator // common_factor
-                if is_all(common_factor, power):
+                if has_full_multiplicity(common_factor, power):
                     break
                 power = power * power  # a prime may occur with a high exponent
                 common_factor = _common_part(numerator, denominator, power)
