@@ -205,7 +205,7 @@ from .plots.portraits.portrait import plot_portrait as plot_portrait
 from .plots.portraits.portrait import portrait_of as portrait_of
 from .plots.portraits.trajectories import ensemble_of_file as ensemble_of_file
 from .plots.portraits.trajectories import field_of as field_of
-from .plots.portraits.trajectories import walked as walked
+from .plots.portraits.trajectories import follow_orbits as follow_orbits
 from .plots.portraits.windows import Window as Window
 from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window

@@ -100,7 +100,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         color = lib.requested_function(file, eps, color)
     levels = None if options["levels"] is None else lib.requested_axis(file, eps, options["levels"])
     axes = _requested_axes(file, eps, options)
-    orbits = lib.walked(
+    orbits = lib.follow_orbits(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
         steps,
         lambda step: progress(f"step {step} of {steps}"),
@@ -115,7 +115,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     if options["euler"]:
         # `file.system` raises InputError if there is no quadratic vector field.
         by_euler = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
-        euler = lib.walked(lib.MethodEnsemble(*by_euler, kernel="numpy"), steps)
+        euler = lib.follow_orbits(lib.MethodEnsemble(*by_euler, kernel="numpy"), steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
     shown = lib.portrait_of(orbits, axes, color=color, window=window, euler=euler, join=options["lines"])
