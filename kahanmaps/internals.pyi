@@ -54,7 +54,7 @@ from .documents.families import FAMILIES as FAMILIES
 from .documents.files import MAX_FILE_BYTES as MAX_FILE_BYTES
 from .documents.files import SystemFile as SystemFile
 from .documents.files import float_normal_form as float_normal_form
-from .documents.files import matched as matched
+from .documents.files import match_variables as match_variables
 from .documents.files import parse_system as parse_system
 from .documents.inline import inline_file as inline_file
 from .documents.iterates import iterates_in as iterates_in

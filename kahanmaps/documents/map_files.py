@@ -18,7 +18,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.composed import ComposedMap, MapFactor, composed_map
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import ElementaryMap, ImplicitMap, Map, MapFamily
+from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily
 from kahanmaps.maps.inverse import Rows
 from kahanmaps.maps.kahan import KahanFamily
 
@@ -50,18 +50,17 @@ def without_eps(map_: Map) -> MapFamily:
     """Convert a map over Q at one eps, or a composition of maps at several, to a map that does not depend on eps."""
     if map_.field is not QQ:
         raise InputError(f"found {map_!r}, expected a map over the rational numbers")
-    variables = map_.variables or tuple(f"x{k + 1}" for k in range(map_.dim))
-    factors = [_factor(factor, variables) for factor in map_.factors]
+    variables = tuple(map_.variables or (f"x{k + 1}" for k in range(map_.dim)))
+    factors = []
+    for factor in map_.factors:
+        is_linear = factor.equation.degree == 1
+        backward = None if is_linear else _equation_rows(factor.inverse.equation, variables)
+        rows = _equation_rows(factor.equation, variables)
+        factors.append(ImplicitMap(variables, rows, "map at one eps", backward=backward))
     return factors[0] if len(factors) == 1 else ComposedMap(variables, [MapFactor(f, False) for f in factors], ())
 
 
-def _factor(factor: ElementaryMap, variables: Sequence[str]) -> ImplicitMap:
-    is_linear = factor.equation.degree == 1
-    backward = None if is_linear else _rows(factor.inverse.equation, variables)
-    return ImplicitMap(tuple(variables), _rows(factor.equation, variables), "map at one eps", backward=backward)
-
-
-def _rows(equation: Equation, variables: Sequence[str]) -> Rows:
+def _equation_rows(equation: Equation, variables: Sequence[str]) -> Rows:
     context = ring((*variables, "eps"))
     monomials = [(*map(int, exponent[:-1]), 0) for exponent in equation.exponents]
     return tuple(tuple(context.from_dict({monomials[k]: c for k, c in form}) for form in row) for row in equation.terms)

@@ -30,11 +30,11 @@ def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     """
     file = as_file(system)
     symbols = [GENERATOR] if GENERATOR in file.parameters else []
-    lifted = over_algebra(with_symbols(file, symbols), chi)
+    system_over_Q = over_algebra(with_symbols(file, symbols), chi)
     document: dict[str, Any] = {
         "name": f"{file.name} over Q[t]/({format_univariate(chi)})",
-        "variables": list(lifted.variables),
-        "system": {"rhs": [format_polynomial(polynomial) for polynomial in lifted.rhs]},
+        "variables": list(system_over_Q.variables),
+        "system": {"rhs": [format_polynomial(polynomial) for polynomial in system_over_Q.rhs]},
     }
     if not symbols:
         try:

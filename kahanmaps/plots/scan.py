@@ -72,14 +72,14 @@ def plot_scan(
         unassigned = {degrees: list(points) for degrees, points in sweeps[modulo].classes.items()}
         special = []
         for name, components in growths.items():
-            dots, labels = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
+            dots, captions = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
             for component in components:
                 candidates = unassigned.get(component.degrees, [])
                 unassigned[component.degrees] = points_outside(candidates, [component], modulo) if candidates else []
                 members = sorted(set(candidates) - set(unassigned[component.degrees]))
                 dots += members
-                labels += [(component.text, [members[len(members) // 2]])] if members and name != _EXPONENTIAL else []
-            special.append(_ColorGroup(name, dots, [], labels))
+                captions += [(component.text, [members[len(members) // 2]])] if members and name != _EXPONENTIAL else []
+            special.append(_ColorGroup(name, dots, [], captions))
         if unassigned_points := [point for points in unassigned.values() for point in points]:
             special.append(_ColorGroup("on no component", unassigned_points, [], []))
         return _draw(scan, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")

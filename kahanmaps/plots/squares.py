@@ -17,7 +17,7 @@ import numpy as np
 from flint import arb, fmpq
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure
 from kahanmaps.maps.floats.float_conversion import to_floats
@@ -173,7 +173,7 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
     """Return the pair of two systems of equal dimension; with `eps2` the second system is scaled by eps2/eps."""
     g: QuadraticSystem | MapFamily
-    g, note = matched(file, other)
+    g, note = match_variables(file, other)
     if eps2 is not None:
         if not other.is_quadratic or not isinstance(g, KahanFamily):
             raise InputError(f"found eps2 with {other.map.kind}, expected it with a quadratic vector field")

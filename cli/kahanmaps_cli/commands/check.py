@@ -102,7 +102,9 @@ def _measured_commutator(
         start = start.real_approximation()
     first, other = file.real_approximation, second.real_approximation
     steps, ratio = options["steps"], 1 if eps2 is None else eps2 / eps
-    return lib.commutator(first.map, lib.matched(first, other)[0], eps, start, 1000 if steps is None else steps, ratio)
+    return lib.commutator(
+        first.map, lib.match_variables(first, other)[0], eps, start, 1000 if steps is None else steps, ratio
+    )
 
 
 class _PairCommand(click.Command):

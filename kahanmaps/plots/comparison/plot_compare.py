@@ -74,12 +74,14 @@ def plot_comparison(
         if show == "error":
             # A dotted line for each order, a little below the best method of this order; a mark at the requested step.
             low, high = axes.get_ylim()
-            for order, (x, error) in sorted(line_starts.items()):
+            for order, (step, error) in sorted(line_starts.items()):
                 y = error / 3
-                end = max(axes.get_xlim()[0], x * (low / y) ** (1 / order))
-                axes.plot([x, end], [y, y * (end / x) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1)
+                end = max(axes.get_xlim()[0], step * (low / y) ** (1 / order))
+                axes.plot(
+                    [step, end], [y, y * (end / step) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1
+                )
                 # Label the lines at small steps, where lines of different orders are far apart.
-                write_beside(axes, str(order), (end, y * (end / x) ** order), (13, 0), color="0.4", fontsize="small")
+                write_beside(axes, str(order), (end, y * (end / step) ** order), (13, 0), color="0.4", fontsize="small")
             axes.set_ylim(low, high)
             axes.axvline(abs(to_float(time_step(result.eps))), color="0.85", linewidth=0.8, zorder=0)
             axes.set_xlabel("time step $h$")

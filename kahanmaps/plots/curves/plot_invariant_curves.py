@@ -71,8 +71,8 @@ def plot_invariant_curves(
         if original is not None:
             axes = next(grid)
             clouds = [(x[:, original[0]], x[:, original[1]]) for x in curves.originals]
-            names = label_of(curves.variables[original[0]]), label_of(curves.variables[original[1]])
-            Rectangle.around(clouds).prepare(axes, names)
+            axis_labels = label_of(curves.variables[original[0]]), label_of(curves.variables[original[1]])
+            Rectangle.around(clouds).prepare(axes, axis_labels)
             axes.set_title("orbit")
             for number, cloud in enumerate(clouds):
                 pen.orbit(axes, *cloud, number, None)
