@@ -23,7 +23,7 @@ from .algebra.work import LEAST_EFFORT as LEAST_EFFORT
 from .algebra.work import MOST_EFFORT as MOST_EFFORT
 from .algebra.work import Budget as Budget
 from .atomic_files import atomic_write as atomic_write
-from .atomic_files import resolved as resolved
+from .atomic_files import resolve_path as resolve_path
 from .atomic_files import write_atomically as write_atomically
 from .certificates.certificate import certificate as certificate
 from .certificates.identities import FalseClaim as FalseClaim

@@ -123,10 +123,10 @@ def page_template() -> Any:
         needed = "a report needs Jinja2 and latex2mathml"
         raise InputError(f"{needed} ({error}): pip install 'kahanmaps[report]'") from error
 
-    def shown(value: Any) -> Any:
+    def printable_value(value: Any) -> Any:
         return value if hasattr(value, "__html__") else printable(markup.shortened(value, CHARACTERS))
 
-    environment = Environment(autoescape=True, finalize=shown, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(autoescape=True, finalize=printable_value, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string((resources.files("kahanmaps.reports") / "page.html").read_text(encoding="utf-8"))
 
 
@@ -139,12 +139,12 @@ def mathml(latex: str) -> str:
     from latex2mathml.converter import convert
 
     # A name of several letters would look like a product: set it upright, with spaces around it.
-    prepared = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
-    prepared = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", prepared)
-    for command, other in _TEXT_COMMANDS.items():
-        prepared = prepared.replace(command, other)
+    source = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
+    source = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", source)
+    for command, replacement in _TEXT_COMMANDS.items():
+        source = source.replace(command, replacement)
     try:
-        text = convert(prepared)
+        text = convert(source)
         is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
     except Exception:  # an exception of latex2mathml, KeyError, IndexError or ParseError
         is_known = False

@@ -99,18 +99,16 @@ class Pictures:
                 starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
             orbits = follow_orbits(ensemble_for(real_approximation.map, eps_value, starts, _STEPS), _STEPS)
             functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
-            drawn_portrait = portrait_of(orbits, functions)
+            portrait = portrait_of(orbits, functions)
             if is_field:
-                drawn_portrait = replace(
-                    drawn_portrait, flow=plane_flow(real_approximation.system, range(file.dim), drawn_portrait.window)
+                portrait = replace(
+                    portrait, flow=plane_flow(real_approximation.system, range(file.dim), portrait.window)
                 )
             for reason, count in orbits.ended.items():
                 remarks.append(f"{count} of {counted(orbits.orbits, 'orbit')} ended early: {reason}.")
-            if drawn_portrait.left_out:
-                remarks.append(
-                    f"{drawn_portrait.left_out} of {orbits.points[..., 0].size} points lie outside the window."
-                )
-            return plot_portrait(drawn_portrait, style)
+            if portrait.left_out:
+                remarks.append(f"{portrait.left_out} of {orbits.points[..., 0].size} points lie outside the window.")
+            return plot_portrait(portrait, style)
 
         axis_names = " and ".join(axes)
         sentence = f"{eps_suffix(eps_value, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")

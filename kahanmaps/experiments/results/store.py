@@ -33,7 +33,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from kahanmaps.atomic_files import resolved
+from kahanmaps.atomic_files import resolve_path
 from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
 from kahanmaps.experiments.results.records import (
@@ -207,7 +207,7 @@ class Store(HtmlDisplay):
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
         try:
-            store.path = resolved(store.name)
+            store.path = resolve_path(store.name)
             with store._translate_errors():
                 store._open(create)
         except BaseException as error:
