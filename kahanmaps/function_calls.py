@@ -134,8 +134,8 @@ def _wrong_call(
     for argument in () if takes_options else kwargs:
         if argument not in names:
             replacement = _ARGUMENT_HINTS.get(argument, "")
-            shown = replacement.partition("=")[0]
-            is_applicable = bool(replacement) and (not shown.isidentifier() or shown in names)
+            hinted_name = replacement.partition("=")[0]
+            is_applicable = bool(replacement) and (not hinted_name.isidentifier() or hinted_name in names)
             hint = f": {replacement}" if is_applicable else suggestion(argument, names)
             return f"km.{name} has no argument {argument}={hint}; it has {', '.join(names)}"
     advice = _MISSING_HINTS.get(str(error).rpartition(": ")[2].strip("'"), "")

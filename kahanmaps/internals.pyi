@@ -146,7 +146,6 @@ from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.classical import METHODS as METHODS
 from .maps.floats.classical import MethodEnsemble as MethodEnsemble
-from .maps.floats.commutator import Commutator as Commutator
 from .maps.floats.commutator import commutator as commutator
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float

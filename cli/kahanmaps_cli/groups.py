@@ -25,10 +25,10 @@ class SuggestingGroup(click.Group):
             raise click.UsageError(f"There is no command {quoted(args[0])}.{self.hint(args[0], names)}", ctx)
         return super().resolve_command(ctx, args)
 
-    def hint(self, written: str, known: list[str]) -> str:
+    def hint(self, written: str, names: list[str]) -> str:
         """Return ' Did you mean ...?', or an empty text if no command is similar."""
-        extensions = [name for name in known if len(written) > 2 and name.startswith(f"{written}-")]
-        similar_names = extensions or similar_words_of(written, known, 0.5)
+        extensions = [name for name in names if len(written) > 2 and name.startswith(f"{written}-")]
+        similar_names = extensions or similar_words_of(written, names, 0.5)
         return f" Did you mean {' or '.join(similar_names)}?" if similar_names else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -43,13 +43,13 @@ class SuggestingGroup(click.Group):
             formatter.write_dl(rows)
 
 
-def similar_words_of(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Return up to three words of `known`: the word most similar to `written`, and words nearly as similar."""
+def similar_words_of(written: str, words: list[str], cutoff: float = 0.6) -> list[str]:
+    """Return up to three words of `words`: the word most similar to `written`, and words nearly as similar."""
     from difflib import SequenceMatcher, get_close_matches
 
-    similar_words = get_close_matches(written, known, n=3, cutoff=cutoff)
-    ratios = [SequenceMatcher(None, word, written).ratio() for word in similar_words]
-    return [word for word, ratio in zip(similar_words, ratios, strict=True) if ratio > ratios[0] - 0.15]
+    similar_words = get_close_matches(written, words, n=3, cutoff=cutoff)
+    ratios = [SequenceMatcher(None, candidate, written).ratio() for candidate in similar_words]
+    return [candidate for candidate, ratio in zip(similar_words, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
 # removed option as (command, option) -> what to use instead

@@ -119,14 +119,14 @@ class LazyGroup(SuggestingGroup):
         command: click.Command = module.command(cmd_name) if cmd_name in CHECKS else module.command
         return with_common_rules(command)
 
-    def hint(self, written: str, known: list[str]) -> str:
+    def hint(self, written: str, command_names: list[str]) -> str:
         from kahanmaps.documents.catalog import names
 
         if written in names() or written.endswith(".toml"):
             return f" To see what the map of {written} preserves: {as_typed(['kahanmaps', 'analyze', written])}"
         if written == "help":
             return " For help: kahanmaps --help, or kahanmaps COMMAND --help."
-        return super().hint(written, known)
+        return super().hint(written, command_names)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         from click.shell_completion import CompletionItem

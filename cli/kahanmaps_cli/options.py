@@ -394,7 +394,7 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
         folder, name = os.path.split(reference)
         try:
             toml_files = sorted(
-                entry.removesuffix(".toml") for entry in os.listdir(folder or ".") if entry.endswith(".toml")
+                path.removesuffix(".toml") for path in os.listdir(folder or ".") if path.endswith(".toml")
             )
             similar = similar_words_of(name.removesuffix(".toml"), toml_files)
             hint = f", did you mean {' or '.join(os.path.join(folder, f'{match}.toml') for match in similar)}?"

@@ -49,7 +49,7 @@ def verdict_html(finding: Finding) -> str:
 def finding_html(finding: Finding) -> str:
     """Return a claim with its verdict, evidence and witness."""
     rows = [("verdict", verdict_html(finding)), *evidence_rows(finding)]
-    return markup.titled(markup.shortened(finding.claim, _MAX_TEXT), markup.definitions(rows))
+    return markup.block(markup.abbreviate(finding.claim, _MAX_TEXT), markup.definitions(rows))
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
@@ -89,7 +89,7 @@ def eps_sentence(report: Report) -> str:
     context = report.context
     if "eps" not in context:
         return ""
-    second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
+    second = f", second map at eps2 = {markup.abbreviate(context['eps2'])}" if "eps2" in context else ""
     return markup.eps_phrase(context) + second
 
 
@@ -126,7 +126,7 @@ def report_html(report: Report) -> str:
         pieces.append(f"<p>… and {len(shown_findings) - _MAX_CLAIMS} more claims</p>")
     notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]
     pieces += [f"<p>{_escaped(note)}</p>" for note in notes]
-    return markup.titled(markup.shortened(title, 200), "\n".join(pieces), eps_sentence(report))
+    return markup.block(markup.abbreviate(title, 200), "\n".join(pieces), eps_sentence(report))
 
 
 def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
@@ -147,7 +147,7 @@ def _witness_html(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
 
 
 def _escaped(text: str, width: int = _MAX_TEXT) -> str:
-    return markup.escape(markup.shortened(text, width))
+    return markup.escape(markup.abbreviate(text, width))
 
 
 # -- as text

@@ -16,10 +16,10 @@ def store_html(store: Store) -> str:
     try:
         status = store.status()
     except StoreError as error:  # the store is closed
-        return markup.titled("database of results", f"<p>{markup.escape(error)}</p>")
+        return markup.block("database of results", f"<p>{markup.escape(error)}</p>")
     rows = [
         (
-            markup.escape(markup.shortened(experiment.name)),
+            markup.escape(markup.abbreviate(experiment.name)),
             str(experiment.tasks),
             str(experiment.missing),
             "<br/>".join(f"{count} {markup.escape(word)}" for word, count in sorted(experiment.outcomes.items())),
@@ -30,7 +30,7 @@ def store_html(store: Store) -> str:
     content = markup.table(["experiment", "tasks", "missing", "outcomes", "verdicts"], rows)
     if len(status) > _MAX_ROWS:
         content += f"\n<p>… and {len(status) - _MAX_ROWS} more experiments</p>"
-    return markup.titled("database of results", content)
+    return markup.block("database of results", content)
 
 
 @html_form.register
@@ -42,7 +42,7 @@ def summary_html(summary: Summary) -> str:
         pieces.append(markup.table(table.columns, rows, table.title))
         if more := len(table.rows) - len(rows):
             pieces.append(f"<p>… and {more} more rows</p>")
-    return markup.titled("summary", "\n".join(pieces))
+    return markup.block("summary", "\n".join(pieces))
 
 
 def summary_markdown(summary: Summary) -> str:

@@ -115,11 +115,11 @@ def result_html(result: Any, map_: MapFamily | None = None) -> str:
     title, subtitle = _TITLES[type(result)](result)
     if map_ is not None:
         subtitle = eps_sentence(result.eps, map_)
-    return markup.titled(title, (markup.folded(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + more, subtitle)
+    return markup.block(title, (markup.folded_table(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + more, subtitle)
 
 
 def _html(text: str, width: int = _MAX_TEXT) -> str:
-    return markup.escape(markup.shortened(text, width))
+    return markup.escape(markup.abbreviate(text, width))
 
 
 # -- complete analyses
@@ -159,10 +159,10 @@ def analysis_html(analysis: Analysis) -> str:
     pieces = [
         f"<p>{map_html(analysis.file.map)}</p>",
         f"<p><strong>{_html(conclusion.kind)}</strong>: {_html(conclusion.sentence, 800)}</p>",
-        markup.folded(rows, ["", "known how", ""]) + more,
+        markup.folded_table(rows, ["", "known how", ""]) + more,
     ]
     subtitle = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
-    return markup.titled(markup.shortened(analysis.file.name), "\n".join(pieces), subtitle)
+    return markup.block(markup.abbreviate(analysis.file.name), "\n".join(pieces), subtitle)
 
 
 # -- preserved structures
@@ -326,10 +326,10 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
         yield "proved", "f = 0 and its map is x -> x: every g commutes"
-    listed: list[QuadraticSystem] = []
+    shown_systems: list[QuadraticSystem] = []
     for g in systems.nontrivial:
-        if g.system.scaled(-1) not in listed:
-            listed.append(g.system)
+        if g.system.scaled(-1) not in shown_systems:
+            shown_systems.append(g.system)
             yield g.finding.verdict, "g and -g", _as_options(g, systems.root)
             yield "", g.finding.evidence.summary
     for family in systems.families:
@@ -349,7 +349,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
     if systems.every_g_commutes:
         yield ("# complete: every g commutes",)
     elif systems.complete:
-        has_others = bool(listed or systems.families or systems.irrational)
+        has_others = bool(shown_systems or systems.families or systems.irrational)
         exceptions = "these, 0, f and -f" if has_others else "0, f and -f"
         yield (f"# complete: among the {systems.kind_text} only {exceptions} commute with f",)
     else:
@@ -374,7 +374,7 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 def _title(subject: str, result: Any, *subtitle: str) -> tuple[str, str]:
     """Return a title that contains the name of the system, and a subtitle that ends with eps."""
     phrases = (*subtitle, eps_sentence(result.eps, result.file.map))
-    return f"{subject} of {markup.shortened(result.file.name)}", "; ".join(filter(None, phrases))
+    return f"{subject} of {markup.abbreviate(result.file.name)}", "; ".join(filter(None, phrases))
 
 
 # Titles and subtitles of the results that are displayed as lines.

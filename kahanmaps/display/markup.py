@@ -63,10 +63,10 @@ def code(text: object) -> str:
     return f"{fence}{margin}{line}{margin}{fence}"
 
 
-def shortened(text: object, width: int = _MAX_LETTERS) -> str:
+def abbreviate(text: object, width: int = _MAX_LETTERS) -> str:
     """Shorten a text that is longer than `width` to its beginning, its end and its length, without escaping it.
 
-    >>> shortened("1" * 100, 20)
+    >>> abbreviate("1" * 100, 20)
     '11111111…11111111 (100 characters)'
     """
     whole_text = str(text)
@@ -82,8 +82,8 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
     >>> eps_phrase({"eps": "1/10", "time_step": "1/5"})
     'eps = 1/10 (time step 2 eps = 1/5)'
     """
-    step = record["time_step"] and shortened(record["time_step"])
-    return eps_record_suffix({**record, "eps": shortened(record["eps"]), "time_step": step}).removeprefix(", ")
+    step = record["time_step"] and abbreviate(record["time_step"])
+    return eps_record_suffix({**record, "eps": abbreviate(record["eps"]), "time_step": step}).removeprefix(", ")
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
@@ -107,11 +107,11 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str =
     return "\n".join([f"<table>{title}{names}<tbody>", *lines, "</tbody></table>"])
 
 
-def folded(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     """Return a table that shows the first 12 rows; a click on the number of further rows shows all.
 
-    >>> print(folded([["a"]]) == table((), [["a"]]), folded([["a"]] * 15).count("<summary>3 more lines</summary>"))
-    True 1
+    >>> folded_table([["a"]]) == table((), [["a"]]), "<summary>3 more lines</summary>" in folded_table([["a"]] * 15)
+    (True, True)
     """
     open_rows, more_rows = rows[:_OPEN_ROWS], rows[_OPEN_ROWS:]
     if not more_rows:
@@ -130,7 +130,7 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
     return "\n".join(["<table><tbody>", *lines, "</tbody></table>"])
 
 
-def listed(entries: Iterable[str]) -> str:
+def bullet_list(entries: Iterable[str]) -> str:
     """Return an HTML list of entries, which are HTML."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
 
@@ -149,7 +149,7 @@ def verdict(word: object) -> str:
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 
 
-def titled(title: str, inside: str, more: str = "") -> str:
+def block(title: str, content: str, remark_text: str = "") -> str:
     """Return a block of HTML with a title and an optional remark, both text."""
-    remark = f" — {escape(more)}" if more else ""
-    return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{inside}\n</div>"
+    remark = f" — {escape(remark_text)}" if remark_text else ""
+    return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{content}\n</div>"

@@ -69,15 +69,15 @@ def map_html(map_: MapFamily) -> str:
     """Return the equations of the vector field of a Kahan map, or the equations of another map."""
     if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
-    return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
+    return "<br/>\n".join(markup.escape(markup.abbreviate(line, CHARACTERS)) for line in str(map_).split("\n"))
 
 
 def equations_html(
     system: QuadraticSystem, characters: int | None = CHARACTERS, max_count: int = _MAX_EQUATIONS
 ) -> str:
     """Return at most `max_count` equations as HTML, each cut after about `characters` characters."""
-    shown = equations(system.variables[:max_count], system.rhs[:max_count], characters)
-    return shown if system.dim <= max_count else f"{shown}<br/>\n… ({system.dim} equations)"
+    text = equations(system.variables[:max_count], system.rhs[:max_count], characters)
+    return text if system.dim <= max_count else f"{text}<br/>\n… ({system.dim} equations)"
 
 
 @html_form.register
@@ -85,20 +85,20 @@ def file_html(file: SystemFile) -> str:
     """Return the equations, parameters and claims of a system file."""
     rows = [("equations", map_html(file.map))]
     if file.parameters:
-        values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
+        values = (f"{name} = {markup.abbreviate(format_number(v))}" for name, v in list(file.parameters.items())[:20])
         rows.append(("parameters", markup.escape(", ".join(values))))
     if file.member is not None:
         rows.append(("member of the commuting family", matrix(file.member.A, "A")))
     if file.hamiltonian is not None:
         rows.append(("Hamiltonian", formula(file.hamiltonian.H, "H", CHARACTERS)))
     rows += [
-        (f"integral {markup.shortened(name)}".strip(), formula(function, characters=CHARACTERS))
+        (f"integral {markup.abbreviate(name)}".strip(), formula(function, characters=CHARACTERS))
         for name, function in [*file.integrals.items(), *file.integrals_in_iterates.items()][:10]
     ]
     if file.density is not None:
         rows.append(("density (claimed)", formula(file.density, "phi", CHARACTERS)))
     title = file.catalog.get("title", "")
-    return markup.titled(markup.shortened(file.name), markup.definitions(rows), markup.shortened(str(title), 200))
+    return markup.block(markup.abbreviate(file.name), markup.definitions(rows), markup.abbreviate(str(title), 200))
 
 
 @html_form.register
@@ -110,18 +110,18 @@ def member_html(member: FamilyMember) -> str:
     rows = [
         ("A", matrix(member.A)),
         ("H", formula(member.H, characters=CHARACTERS)),
-        ("chi", markup.escape(markup.shortened(factors, _MAX_TEXT))),
+        ("chi", markup.escape(markup.abbreviate(factors, _MAX_TEXT))),
         ("signs", markup.escape(member.chosen.label)),
         ("associated systems over Q", str(2 ** (len(member.factors) - 1))),
     ]
-    return markup.titled(f"member of the commuting family, m = {member.m}", markup.definitions(rows))
+    return markup.block(f"member of the commuting family, m = {member.m}", markup.definitions(rows))
 
 
 @html_form.register
 def associated_html(system: AssociatedSystem) -> str:
     """Return B, K and the equations of an associated system."""
     powers = [
-        f"{markup.shortened(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
+        f"{markup.abbreviate(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
         for k, c in enumerate(system.coefficients[:12])
         if c != 0
     ]
@@ -130,21 +130,21 @@ def associated_html(system: AssociatedSystem) -> str:
         ("K", formula(system.K, characters=CHARACTERS)),
         ("equations", equations_html(system.system)),
     ]
-    return markup.titled(f"associated system {system.label}", markup.definitions(rows))
+    return markup.block(f"associated system {system.label}", markup.definitions(rows))
 
 
 @html_form.register
 def normal_form_html(form: NormalForm) -> str:
     """Return chi, h, D and the planes over Q of a normal form."""
     texts = {"chi(t)": form.chi_text, "h(X, Y)": form.h_text, "D(X, Y)": form.D_text}
-    rows = [(name, markup.escape(markup.shortened(text, _MAX_TEXT))) for name, text in texts.items()]
+    rows = [(name, markup.escape(markup.abbreviate(text, _MAX_TEXT))) for name, text in texts.items()]
     rows.append(("S", matrix(form.S)))
     rows += [
-        (f"plane at t = {markup.shortened(format_number(part.root), 20)}", formula(part.h, "h", CHARACTERS))
+        (f"plane at t = {markup.abbreviate(format_number(part.root), 20)}", formula(part.h, "h", CHARACTERS))
         for part in form.parts[:8]
     ]
     more = "x = S z, a planar system over K = Q[t]/chi"
-    return markup.titled(f"normal form, m = {form.m}", markup.definitions(rows), more)
+    return markup.block(f"normal form, m = {form.m}", markup.definitions(rows), more)
 
 
 _COORDINATES = 8
@@ -163,7 +163,7 @@ def map_latex(kahan: KahanMap) -> str:
     if system.dim > _MAX_LATEX_EQUATIONS:
         rows.append((r"\vdots", rf"\text{{({system.dim} equations)}}"))
     with field.working():
-        eps, step = (markup.shortened(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
+        eps, step = (markup.abbreviate(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
     over_field = "" if str(field) == "QQ" else rf"\text{{ over {_tex(field)}}}"
     rows.append(
         (
@@ -231,10 +231,10 @@ def orbit_html(orbit: Orbit) -> str:
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
     eps, flow = orbit.map.eps, orbit.map.flow  # None for compositions of maps with different eps or vector fields
-    at_eps = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
-    at_eps += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
+    at_eps = "" if eps is None else f" eps = {markup.abbreviate(field.format(eps))},"
+    at_eps += "" if flow is None else f" time step {markup.abbreviate(field.format(flow[1]))},"
     title = f"orbit{direction},{at_eps} over {field}"
-    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
+    return markup.block(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
 
 
 @html_form.register
@@ -252,7 +252,7 @@ def trajectory_html(orbit: Trajectory) -> str:
     else:
         status = f"{markup.verdict(orbit.end.status)}: {markup.escape(orbit.end.message)}"
     title = f"orbit, {orbit.arithmetic} arithmetic, {orbit.method} method"
-    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>")
+    return markup.block(title, f"{markup.table(head, rows)}\n<p>{status}</p>")
 
 
 def _point_cells(point: OrbitPoint, count: int) -> list[str]:
@@ -267,8 +267,8 @@ def _point_cells(point: OrbitPoint, count: int) -> list[str]:
 def period_html(period: OrbitPeriod) -> str:
     """Return the period of an orbit and the periods in its planes."""
     sentence, *planes = period.text.split("\n")
-    inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
-    return markup.titled(markup.shortened(sentence, 200), inside)
+    planes_html = markup.bullet_list(markup.escape(markup.abbreviate(line, 200)) for line in planes[:20])
+    return markup.block(markup.abbreviate(sentence, 200), planes_html)
 
 
 @text_form.register
@@ -298,6 +298,6 @@ def geometry_text(geometry: LevelGeometry | OrbitCurve) -> str:
 def geometry_html(geometry: LevelGeometry | OrbitCurve) -> str:
     """Return the curves, translations and rotation numbers in the planes of an orbit as an HTML list."""
     lines = (
-        markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
+        markup.escape(markup.abbreviate(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
     )
-    return markup.titled("geometry of the level set", markup.listed(lines))
+    return markup.block("geometry of the level set", markup.bullet_list(lines))

@@ -406,14 +406,14 @@ class DocumentReader(PartReader):
         factors = self._read_each("composition.of", entries, self._read_part)
         if factors is None or self.has_bad_parameter:
             return None
-        if sum(abs(part.power) for part in factors) > _MAX_FACTORS:
+        if sum(abs(factor.power) for factor in factors) > _MAX_FACTORS:
             return self._refuse(
                 "composition.of", f"found more than {_MAX_FACTORS} steps, expected at most {_MAX_FACTORS}"
             )
-        self.document = {**self.document, "composition": {"of": [part.table for part in factors]}}
-        values = [part.values for part in factors]
+        self.document = {**self.document, "composition": {"of": [factor.table for factor in factors]}}
+        values = [factor.values for factor in factors]
         make_map = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
-        return self._try_make("composition.of", make_map, *((part.map, part.power) for part in factors))
+        return self._try_make("composition.of", make_map, *((factor.map, factor.power) for factor in factors))
 
     def _read_part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):

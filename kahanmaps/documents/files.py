@@ -230,8 +230,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         document: dict[str, Any] = {"name": name, "family": section}
         if member.variables != default_variables(member.dim):
             document["variables"] = list(member.variables)
-        chosen = member.chosen
-        return cls(name, "family", {}, KahanFamily(chosen.system), chosen.hamiltonian, member, {}, None, document)
+        associate = member.chosen
+        return cls(name, "family", {}, KahanFamily(associate.system), associate.hamiltonian, member, {}, None, document)
 
     @classmethod
     def from_conjugate(cls, associate: ConjugateAssociate, name: str = "conjugate") -> SystemFile:

@@ -72,8 +72,8 @@ def _document(map_: MapFamily) -> dict[str, Any]:
     if isinstance(map_, KahanFamily):
         return {"variables": variables, "system": {"rhs": [format_polynomial(f) for f in map_.system.rhs]}}
     if isinstance(map_, ComposedMap):
-        parts = [{"map": _document(part.map), "inverse": part.is_inverse} for part in map_.parts]
-        return {"variables": variables, "composition": {"of": parts}}
+        factors = [{"map": _document(factor.map), "inverse": factor.is_inverse} for factor in map_.parts]
+        return {"variables": variables, "composition": {"of": factors}}
     if map_.image is None and all(sum(m[:n]) <= 1 for row in map_.rows for entry in row for m in entry.monoms()):
         equations: Sequence[fmpq_mpoly] = map_.equations  # type: ignore[attr-defined]  # an ImplicitMap
         section = {

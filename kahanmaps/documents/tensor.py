@@ -39,9 +39,9 @@ def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     if not symbols:
         try:
             integrals = {
-                f"{name}_{k}": format_rational_function(part)
+                f"{name}_{k}": format_rational_function(component)
                 for name, function in file.integrals.items()
-                for k, part in enumerate(inherited_integrals(function, chi))
+                for k, component in enumerate(inherited_integrals(function, chi))
             }
             if integrals:
                 document["integrals"] = integrals

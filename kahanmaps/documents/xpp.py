@@ -138,9 +138,9 @@ class _OdeReader:
 
     def expand(self, tokens: list[str]) -> str:
         """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
-        parts = [self.definitions.get(token, token) for token in tokens]
-        if sum(map(len, parts)) > LIMITS.characters:
+        pieces = [self.definitions.get(token, token) for token in tokens]
+        if sum(map(len, pieces)) > LIMITS.characters:
             raise InputError(
                 f"found a formula of more than {LIMITS.characters} characters after its definitions are inserted"
             )
-        return "".join(parts).strip()
+        return "".join(pieces).strip()

@@ -123,7 +123,7 @@ def _find_mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyP
 
 def key_of(path: KeyPath) -> str:
     """Return a path as text; positions in lists are counted from 1, as in experiments.a.zip[1]."""
-    return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
 
 
 class SpecDocument:
@@ -252,7 +252,7 @@ class ExperimentReader:
             return None  # the meaning of options depends on the task
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
         keys: dict[str, str] = {}
-        for option, option_key, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
+        for option, option_key, _ in [entry for table in ("options", "axes") for entry in self.entries(table)]:
             if option in keys:
                 option_names = {option_key.rpartition(".")[2], keys[option].rpartition(".")[2]}
                 hint = " (the time step is 2 eps)" if TIME_STEP in option_names and len(option_names) > 1 else ""
@@ -306,32 +306,32 @@ class ExperimentReader:
         """Return the value at a path in this table; None if it is missing or has a wrong shape."""
         return self.spec.valid_value("experiments", self.name, *path)
 
-    def entries(self, part: str) -> list[tuple[str, str, Any]]:
-        """Return a canonical name, a key and a value for each entry of the table `part` (options or axes)."""
+    def entries(self, table: str) -> list[tuple[str, str, Any]]:
+        """Return a canonical name, a key and a value for each entry of the table `table` (options or axes)."""
         entries: list[tuple[str, str, Any]] = []
-        for key, raw in (self.valid_value(part) or {}).items():
+        for key, raw in (self.valid_value(table) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
-                entries += [(f"{PARAMETERS}{name}", f"{part}.{key}.{name}", value) for name, value in raw.items()]
+                entries += [(f"{PARAMETERS}{name}", f"{table}.{key}.{name}", value) for name, value in raw.items()]
             else:
-                entries.append(("eps" if key == TIME_STEP else key, f"{part}.{key}", raw))
+                entries.append(("eps" if key == TIME_STEP else key, f"{table}.{key}", raw))
         return entries
 
     def given(self) -> dict[str, str]:
         """Map the canonical name of each option in the spec, valid or not, to its key."""
-        return {name: key for part in ("axes", "options") for name, key, _ in self.entries(part)}
+        return {name: key for table in ("axes", "options") for name, key, _ in self.entries(table)}
 
-    def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
-        """Map the canonical name of each option in the table `part` to its valid values, and report invalid ones."""
+    def _read_values(self, kind: TaskKind, table: str) -> dict[str, AxisValues]:
+        """Map the canonical name of each option in the table `table` to its valid values, and report invalid ones."""
         valid: dict[str, AxisValues] = {}
-        for name, key, raw in self.entries(part):
+        for name, key, raw in self.entries(table):
             with self._report_errors_at(key):
                 if name == "parameters" and self.has_parameters:
                     raise InputError(f"found {show(raw)}, expected a table of parameters")
-                option = self._find_option(kind, name, key.removeprefix(f"{part}."))
-                if part == "options" and isinstance(raw, list):
+                option = self._find_option(kind, name, key.removeprefix(f"{table}."))
+                if table == "options" and isinstance(raw, list):
                     raise InputError("found a list, expected one value; lists and ranges go to axes")
                 values = self._read_axis(key, option, raw)
-                if values is not None and part == "options" and len(values) > 1:
+                if values is not None and table == "options" and len(values) > 1:
                     raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
                 if values is not None:
                     valid[name] = values
@@ -424,7 +424,7 @@ class ExperimentReader:
         return zips
 
     def _require_options(self, kind: TaskKind) -> None:
-        if any(self.valid_value(part) is None and part in self.raw for part in ("options", "axes")):
+        if any(self.valid_value(table) is None and table in self.raw for table in ("options", "axes")):
             return  # an option that seems to be missing may be in a table of wrong shape
         keys = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)

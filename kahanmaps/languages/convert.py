@@ -156,14 +156,14 @@ class _Writer:
             self._write_part(part)
         language, formulas = self.language, self.formulas
         lines = formulas.header(command)
-        renamed = [f"{name} is called {new}" for name in formulas.names if (new := self.spelling[name]) != name]
-        if renamed:
-            lines.append(f"Names that {language['title']} cannot use or reads otherwise: {', '.join(renamed)}")
+        renamings = [f"{name} is called {new}" for name in formulas.names if (new := self.spelling[name]) != name]
+        if renamings:
+            lines.append(f"Names that {language['title']} cannot use or reads otherwise: {', '.join(renamings)}")
         if self.names["kahan_map"] in self.written:
             values = [str(k) for k in range(1, formulas.dim + 1)]
             more = "".join(f", {value}" for value in [*[language["tenth"]] * len(self.eps), *self.symbols])
-            shown = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
-            lines.append(f"For example: {self._fill('usage', values=shown, more=more)}")
+            example_values = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
+            lines.append(f"For example: {self._fill('usage', values=example_values, more=more)}")
         needs_solver = any(self.placeholders["solve"] in text for text in self.written.values())
         pieces = [
             "\n".join(map(self._comment, lines)),
@@ -313,8 +313,8 @@ class _Writer:
     def _fill_solver(self, template: str, right: str = "") -> str:
         return self._fill(template, M=self._call("kahan_matrix", "point"), right=right)
 
-    def _fill(self, template: str, **more: str) -> str:
-        return Template(self.language[template]).substitute(self.placeholders | more)
+    def _fill(self, template: str, **values: str) -> str:
+        return Template(self.language[template]).substitute(self.placeholders | values)
 
     def _comment(self, line: str) -> str:
         # A backslash at the end would continue a comment in C and Maple; the brackets end a comment in Mathematica.

@@ -63,7 +63,16 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
         rows.append((_X, f"({', '.join(map(latex_name, formulas.variables))})"))
         return rf"The Kahan map ${_X} \mapsto {_Y}$", rows
     if part == "map":
-        return "The map", _equations(formulas)
+        rows = []
+        for row in formulas.equation:
+            entries = [(e, name) for e, name in zip(row, formulas.variables, strict=False) if not e.is_zero()]
+            if len(entries) == 1:
+                ((denominator, name),) = entries
+                rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", RationalFunction(row[-1], denominator))
+            else:
+                terms = (rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
+                rows.append((" + ".join(terms), latex_polynomial(row[-1])))
+        return "The map", rows
     if part == "inverse" and formulas.rhs:
         return "Its inverse", [(_X, rf"{_Y} - 2 \varepsilon (I + \varepsilon f'({_Y}))^{{-1}} f({_Y})")]
     if part == "inverse":
@@ -96,19 +105,6 @@ def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Ro
     return [row for name, function in components for row in _quotient(rf"\widetilde{{{latex_name(name)}}}", function)]
 
 
-def _equations(formulas: Formulas) -> Rows:
-    rows: Rows = []
-    for row in formulas.equation:
-        entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]
-        if len(entries) == 1:
-            ((denominator, name),) = entries
-            rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", RationalFunction(row[-1], denominator))
-        else:
-            left = " + ".join(rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
-            rows.append((left, latex_polynomial(row[-1])))
-    return rows
-
-
 def _matrix(matrix: fmpq_mat) -> str:
     entries = r" \\ ".join(" & ".join(map(str, row)) for row in matrix.tolist())
     return rf"\begin{{pmatrix}} {entries} \end{{pmatrix}}"
@@ -119,7 +115,7 @@ def _integral_label(name: str) -> str:
 
     Letters that are not ASCII are written as numbers, since not every TeX supports them.
 
-    >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
+    >>> print(_integral_label("F1"), _integral_label("a_b"), _integral_label("H~ é"))
     F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}
     """
     ascii_name = "".join(c if c.isascii() else f"[U+{ord(c):04X}]" for c in name)

@@ -145,12 +145,12 @@ def escape_dollars(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def wrapped(text: str, width: float, size: float, max_lines: int = 3) -> str:
+def wrap_text(text: str, width: float, size: float, max_lines: int = 3) -> str:
     """Break plain text into at most `max_lines` lines of about `width` points for letters of `size` points.
 
     Longer text is cut, and ends in dots.
 
-    >>> wrapped("relative error of a_very_very_long_name", width=80, size=8)
+    >>> wrap_text("relative error of a_very_very_long_name", width=80, size=8)
     'relative error of\\na_very_very_long_...'
     """
     letters = max(8, int(width / (LETTER_WIDTH * size)))
@@ -175,7 +175,7 @@ def write_title(figure: Figure, text: str, style: Style) -> None:
     """Put a title above all panels, broken into lines that fit into the width of the figure."""
     size = style.font_size + 1
     with drawing(style):
-        figure.suptitle(escape_dollars(wrapped(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
+        figure.suptitle(escape_dollars(wrap_text(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
 
 
 def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:

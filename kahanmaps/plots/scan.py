@@ -26,7 +26,7 @@ from kahanmaps.plots.figures import (
     write_beside,
 )
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.windows import Window, inside, window_of
+from kahanmaps.plots.portraits.windows import Window, is_inside, window_of
 from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def plot_scan(
     if modulo is not None:
         sweeps = {component.prime: component for component in scan.sweeps if component.complete}
         if modulo not in sweeps:
-            tried = ", ".join(map(str, sweeps)) or "none were tried"
-            raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
+            primes = ", ".join(map(str, sweeps)) or "none were tried"
+            raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {primes}")
         # The special members, each with the growth of a component that contains the member and has its degrees.
         unassigned = {degrees: list(points) for degrees, points in sweeps[modulo].classes.items()}
         special = []
@@ -125,7 +125,8 @@ def _draw(scan: Scan, style: Style, groups: list[_ColorGroup], window: Window, l
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
-    names = [group.name for group in groups if group.curves or any(inside(np.array(group.points, dtype=float), window))]
+    points = [np.array(group.points, dtype=float) for group in groups]
+    names = [g.name for g, x in zip(groups, points, strict=True) if g.curves or any(is_inside(x, window))]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(names, style))
         axes = figure.subplots()
@@ -162,8 +163,8 @@ def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: 
     """
     em = _CONDITION_SIZE * style.font_size
     em_x, em_y = (em / (72 * _AXES_SHARE * inches) for inches in style.inches(_ASPECT))
-    labels = [(*entry, COLORS[k % len(COLORS)]) for k, group in enumerate(groups) for entry in group.labels]
-    labels.sort(key=lambda entry: (" = " not in entry[0], -COLORS.index(entry[2])))
+    labels = [(*item, COLORS[k % len(COLORS)]) for k, group in enumerate(groups) for item in group.labels]
+    labels.sort(key=lambda item: (" = " not in item[0], -COLORS.index(item[2])))
 
     def scaled(position: Sequence[float]) -> tuple[float, ...]:
         return tuple((c - low) / (end - low) for c, (low, end) in zip(position, window, strict=True))
@@ -181,19 +182,19 @@ def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: 
             x, y = scaled(position)
             low, bottom = x + (0.4 * em_x if side > 0 else -0.4 * em_x - width), y + up * 0.7 * em_y - 0.6 * em_y
             box = (low, low + width, bottom, bottom + 1.2 * em_y)
-            covered_count = sum(_overlap(box, entry) for entry in mark_boxes)
+            covered_count = sum(_overlap(box, item) for item in mark_boxes)
             if (
                 min(box) < 0
                 or max(box) > 1
-                or any(_overlap(box, entry) for entry in boxes)
+                or any(_overlap(box, item) for item in boxes)
                 or (covered_count and not is_curve)
             ):
                 continue
-            is_inside = (samples.reshape(-1, 2) > (box[0], box[2])) & (samples.reshape(-1, 2) < (box[1], box[3]))
-            crossings = int(is_inside.all(axis=1).sum())
+            is_in_box = (samples.reshape(-1, 2) > (box[0], box[2])) & (samples.reshape(-1, 2) < (box[1], box[3]))
+            crossings = int(is_in_box.all(axis=1).sum())
             candidates.append((covered_count, crossings, len(candidates), position, side, up, box))
         if candidates:
-            *_, position, side, up, box = min(candidates, key=lambda entry: entry[:3])
+            *_, position, side, up, box = min(candidates, key=lambda item: item[:3])
             boxes.append(box)
             alignment = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)

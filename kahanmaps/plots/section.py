@@ -75,8 +75,8 @@ def curves_on(
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
-    restricted = (restrict(requested_axis(file, eps, name), hyperplane, plane) for name in file.integrals)
-    return [function for function in restricted if function is not None]
+    restrictions = (restrict(requested_axis(file, eps, name), hyperplane, plane) for name in file.integrals)
+    return [function for function in restrictions if function is not None]
 
 
 def section_of(

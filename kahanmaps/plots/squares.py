@@ -24,8 +24,8 @@ from kahanmaps.maps.floats.float_conversion import to_floats
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats
-from kahanmaps.plots.figures import drawing, escape_dollars, label_of, new_figure, wrapped, write_beside
-from kahanmaps.plots.portraits.windows import outside, window_of
+from kahanmaps.plots.figures import drawing, escape_dollars, label_of, new_figure, wrap_text, write_beside
+from kahanmaps.plots.portraits.windows import count_outside, window_of
 from kahanmaps.plots.style import COLORS, Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -269,12 +269,12 @@ def _draw_panel(axes: Axes, squares: Squares, plane: tuple[int, int], caption: s
     axes.locator_params(nbins=5)
     if caption:
         equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-        title = escape_dollars(wrapped(equations, style.font_size / em, style.font_size))
+        title = escape_dollars(wrap_text(equations, style.font_size / em, style.font_size))
         title = re.sub(r"\b([fg])(?=[:\xa0])", r"$\1$", title)
     else:
         f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
         title = f"$f = {f}$,  $g = {g}$"
-    outside_count = outside(all_points, tuple(map(tuple, window)))
+    outside_count = count_outside(all_points, tuple(map(tuple, window)))
     note = f"\n{outside_count} of {len(all_points)} points outside" if outside_count else ""
     axes.set_title(f"{title}\n{squares.verdict}{note}")
     _draw_lattices(axes, gf, fg)
@@ -368,9 +368,9 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
     if count > 1:
         width = 1.6 * em * count
         ha = side or "center"
-        left = {"left": 0.0, "center": width / 2, "right": width}[ha]
+        left_part = {"left": 0.0, "center": width / 2, "right": width}[ha]
         share = (x - low[0]) / length[0]
-        x = low[0] + length[0] * min(max(share, left + 0.02), max(left, 0.98 - width + left))
+        x = low[0] + length[0] * min(max(share, left_part + 0.02), max(left_part, 0.98 - width + left_part))
         offset = 0.0, 9.0 if outward[1] >= 0 else -9.0
     else:
         ha = "center" if abs(outward[0]) < 0.4 else "left" if outward[0] > 0 else "right"

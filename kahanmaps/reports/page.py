@@ -89,7 +89,7 @@ def page(
         lead=lead,
         sections=[section for section in sections if section],
         remake=remake,
-        system_file="" if file is None else Html(markup.escape(markup.shortened(file.to_toml(), _MAX_SYSTEM))),
+        system_file="" if file is None else Html(markup.escape(markup.abbreviate(file.to_toml(), _MAX_SYSTEM))),
         script=Html(script),
         script_hash=f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}" if script else "",
         version=__version__,
@@ -124,7 +124,7 @@ def page_template() -> Any:
         raise InputError(f"{needed} ({error}): pip install 'kahanmaps[report]'") from error
 
     def printable_value(value: Any) -> Any:
-        return value if hasattr(value, "__html__") else printable(markup.shortened(value, CHARACTERS))
+        return value if hasattr(value, "__html__") else printable(markup.abbreviate(value, CHARACTERS))
 
     environment = Environment(autoescape=True, finalize=printable_value, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string((resources.files("kahanmaps.reports") / "page.html").read_text(encoding="utf-8"))
@@ -157,7 +157,7 @@ def mathml(latex: str) -> str:
 
 def text(words: object) -> Html:
     """Return text as HTML, shortened if it is too long for a page."""
-    return Html(markup.escape(markup.shortened(words, CHARACTERS)))
+    return Html(markup.escape(markup.abbreviate(words, CHARACTERS)))
 
 
 def wide(table: str) -> Html:
@@ -176,7 +176,7 @@ def system_section(file: SystemFile) -> Section:
         pieces.append(Html(f"<p>with {text(values)}</p>"))
     if file.hamiltonian is not None:
         kind = "the standard J" if file.hamiltonian.is_standard else "a constant J of the file"
-        shown = formula(file.hamiltonian.H, "H", CHARACTERS)
+        H_html = formula(file.hamiltonian.H, "H", CHARACTERS)
         flow = typeset(r"\dot{x} = J \nabla H", False)
-        pieces.append(Html(f"<p>{flow} with {kind}, {shown}</p>"))
+        pieces.append(Html(f"<p>{flow} with {kind}, {H_html}</p>"))
     return Section("system", "The system", pieces=pieces)

@@ -185,8 +185,8 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
             at_eps = f" at eps = {format_number(run.eps)}" if file.map.has_eps else ""
             folded.append((f"Hypersurfaces{at_eps}", wide(result_html(run, file.map))))
         if name == "growth" and growth is not None:
-            first = ", ".join(map(str, growth.degrees[:8]))
-            alt = f"Degrees of the iterates against their number, from {first}: {growth.growth_text}"
+            first_degrees = ", ".join(map(str, growth.degrees[:8]))
+            alt = f"Degrees of the iterates against their number, from {first_degrees}: {growth.growth_text}"
             caption = "Degrees of the iterates"
             caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
             figures.append(pictures.draw("degrees", caption, alt, partial(plot_degrees, {label: growth})))
@@ -215,7 +215,7 @@ def _catalogue_section(file: SystemFile) -> Section:
         claims.append(formula(file.density, "phi", CHARACTERS))
     convention = file.catalog.get("convention", "")
     facts = file.catalog.get("facts", [])
-    sources = markup.listed(text(source(key)) for key in file.catalog.get("sources", []))
+    sources = markup.bullet_list(text(source(key)) for key in file.catalog.get("sources", []))
     pieces = [Html(f"<h3>Sources</h3>\n{sources}")] if file.catalog.get("sources") else []
     title = f"What {'the catalogue' if file.catalog else 'the file'} says"
     if not (facts or claims or convention or pieces):
@@ -229,7 +229,7 @@ def _catalogue_section(file: SystemFile) -> Section:
         paragraphs=[remark, *[f"Step: {convention}"] * bool(convention)],
         items=facts,
         pieces=pieces,
-        folded=[(f"Its claims: {counted(len(claims), 'formula')}", Html(markup.listed(claims)))] if claims else [],
+        folded=[(f"Its claims: {counted(len(claims), 'formula')}", Html(markup.bullet_list(claims)))] if claims else [],
     )
 
 
@@ -342,7 +342,7 @@ def _claim_data(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
         "verdict": Html(checks.verdict_html(finding)),
         "place": location,
         "words": finding.claim.removeprefix(f"{location}: "),
-        "rows": [(label, Html(what)) for label, what in checks.evidence_rows(finding, _LIMITS)],
+        "rows": [(label, Html(html)) for label, html in checks.evidence_rows(finding, _LIMITS)],
     }
 
 

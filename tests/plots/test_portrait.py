@@ -14,7 +14,7 @@ from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import COUNT, automatic_starts, equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, follow_orbits
-from kahanmaps.plots.portraits.windows import fullest_axes, outside, window_of
+from kahanmaps.plots.portraits.windows import count_outside, fullest_axes, window_of
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -145,14 +145,14 @@ def test_points_that_are_together_are_all_inside_and_missing_ones_change_nothing
     window = window_of(CIRCLE)
     missing = np.concatenate([CIRCLE, [[np.nan, np.nan]]])
     assert window_of(missing) == window
-    assert outside(missing, window) == 0
+    assert count_outside(missing, window) == 0
 
 
 def test_a_few_points_far_away_are_left_out_and_counted():
     points = np.concatenate([CIRCLE, [[1e9, 0.0], [0.0, -1e12]]])
     window = window_of(points)
     assert all(high - low < 6 for low, high in window)
-    assert outside(points, window) == 2
+    assert count_outside(points, window) == 2
 
 
 def test_starts_stay_in_sight_where_the_orbit_soon_rests():

@@ -217,10 +217,10 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 )
         for name, plan in planned.items():
             if not plan.is_resumed:
-                parts = [_count_tasks(plan.total)]
-                parts += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
-                parts += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
-                progress.print(f"{name}: {', '.join(parts)}")
+                phrases = [_count_tasks(plan.total)]
+                phrases += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
+                phrases += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
+                progress.print(f"{name}: {', '.join(phrases)}")
         expected_count = f"{_count_tasks(progress.expected_count)} to do, results go to {db}"
         progress.print(expected_count if progress.expected_count else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
@@ -246,11 +246,11 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 was_interrupted = batch.was_interrupted
         missing = store.count_pending(**selection)
         data = _status_record(store, names or ())
-    interrupted = was_interrupted and missing > 0
-    failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
+    is_interrupted = was_interrupted and missing > 0
+    failed_count = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
     if options["as_json"]:
         run_entries = {"command": "batch run", "spec": path, "done": dict(progress.outcomes), "missing": missing}
-        print_json({**data, **run_entries, "interrupted": interrupted, "seconds": round(progress.seconds, 3)})
+        print_json({**data, **run_entries, "interrupted": is_interrupted, "seconds": round(progress.seconds, 3)})
     elif not options["as_jsonl"]:
         _print_status(data)
     if progress.done:
@@ -269,14 +269,14 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         command_words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
     same_command = as_typed(command_words)
     if missing:
-        prefix = "interrupted: " if interrupted else ""
+        prefix = "interrupted: " if is_interrupted else ""
         progress.print(f"{prefix}{_count_tasks(missing)} without a result yet; to continue: {same_command}")
-    if failed:
+    if failed_count:
         why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-        progress.print(f"{_count_tasks(failed)} failed, why: {why}; to try again: {same_command} --retry-failed")
-    if interrupted:
+        progress.print(f"{_count_tasks(failed_count)} failed, why: {why}; to try again: {same_command} --retry-failed")
+    if is_interrupted:
         return 130
-    return 3 if failed or missing else 0
+    return 3 if failed_count or missing else 0
 
 
 def _count_tasks(number: int) -> str:

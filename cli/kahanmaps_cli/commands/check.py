@@ -28,7 +28,7 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        is_swapped, measured = False, None
+        is_swapped, commutator = False, None
         require_every_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
@@ -50,7 +50,7 @@ def command(name: str) -> click.Command:
                     steps = 1000 if options["steps"] is None else options["steps"]
                     eps_ratio = 1 if eps2 is None else eps2 / eps
                     g_map = lib.match_variables(f, g)[0]
-                    measured = lib.commutator(f.map, g_map, eps, initial_point, steps, eps_ratio)
+                    commutator = lib.commutator(f.map, g_map, eps, initial_point, steps, eps_ratio)
                     options |= {"start": None, "steps": None}  # `start` and `steps` concern only the float orbit
                 settings = opt.settings_from(options, progress, options["start"] and start)
                 report = check(file, second_file, settings, eps2)
@@ -64,7 +64,7 @@ def command(name: str) -> click.Command:
                 elif option is not None:
                     claim = option.read(file, claim) if claim else None
                 report = check(file, settings, claim, **check_options)
-        status = print_report(report, options["as_json"], options["verbose"], options["quiet"], measured)
+        status = print_report(report, options["as_json"], options["verbose"], options["quiet"], commutator)
         return write_certificate(options, file.name, report.certificate, status)
 
     run = opt.check_options(certificate_option(run))

@@ -119,11 +119,11 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     first_orbit = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
     first_near = None if first_orbit is None else {"orbit": first_orbit, "step": int(near_at[first_orbit])}
     # The largest drift of each integral over the completed orbits.
-    completed = (ensemble.failed_at < 0).nonzero()[0]
+    completed_orbits = (ensemble.failed_at < 0).nonzero()[0]
     statistics = ensemble.statistics()
-    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed)} for drift in ensemble.drift]
-    for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed) else (), strict=False):
-        worst_orbit = int(completed[drift.largest[completed].argmax()])
+    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed_orbits)} for drift in ensemble.drift]
+    for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed_orbits) else (), strict=False):
+        worst_orbit = int(completed_orbits[drift.largest[completed_orbits].argmax()])
         record_of_drift |= {"largest": lib.json_float(drift.largest[worst_orbit]), "orbit": worst_orbit}
         record_of_drift["initial"] = json_number(drift.initial[worst_orbit])
         record_of_drift["distribution"] = {key: lib.json_float(x) for key, x in statistics[drift.name].items()}
@@ -138,11 +138,11 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         "drift": drifts,
     }
     if options["radius"] is not None:
-        escaped = ensemble.escaped_at >= 0
+        has_escaped = ensemble.escaped_at >= 0
         results["escaped"] = {
             "radius": lib.format_number(options["radius"]),
-            "orbits": int(escaped.sum()),
-            "completed": int((escaped & (ensemble.failed_at < 0)).sum()),
+            "orbits": int(has_escaped.sum()),
+            "completed": int((has_escaped & (ensemble.failed_at < 0)).sum()),
             "step": statistics["escape step"],
         }
     if as_json:

@@ -118,7 +118,7 @@ def command(system: str | None, **options: Any) -> int:
                 reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
             else:
                 reports = []
-                for name, check in sorted(lib.CHECKS.items(), key=lambda named: named[1].is_of_pair):
+                for name, check in sorted(lib.CHECKS.items(), key=lambda item: item[1].is_of_pair):
                     search(name)
                     try:
                         reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))

@@ -43,8 +43,8 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
     if options["start"]:
         for x in options["start"]:
             if len(x) != dim:
-                found = counted(len(x), "coordinate")
-                raise InputError(f"found an initial point with {found}, expected {dim}: {', '.join(file.variables)}")
+                size = counted(len(x), "coordinate")
+                raise InputError(f"found an initial point with {size}, expected {dim}: {', '.join(file.variables)}")
         return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, dim)
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
@@ -122,9 +122,9 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
             continue
         is_first = False
         if len(cells) != width:
-            what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
+            count_text = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
             names = "" if columns is not None else f": {', '.join(variables)}"
-            raise InputError(f"{where}:{number}: found {what}, expected {width}{names}")
+            raise InputError(f"{where}:{number}: found {count_text}, expected {width}{names}")
         row: list[float] = []
         for k in range(len(cells)) if columns is None else columns:
             try:

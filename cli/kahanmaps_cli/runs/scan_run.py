@@ -60,11 +60,11 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
             "system files contain no eps: leave eps out of --over, or leave out --toml and --write-to"
         )
     file = opt.load_system(system, {**options, "quiet": quiet})
-    has_begun, interrupted = Event(), Event()
+    has_begun, stop_requested = Event(), Event()
 
     def on_progress(sentence: str) -> None:
         has_begun.set()
-        if interrupted.is_set():
+        if stop_requested.is_set():
             raise lib.TimeOver
         search(sentence)
 
@@ -74,7 +74,7 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
             # compiler would swallow an exception.
             os.write(2, b"interrupted\n")
             os._exit(INTERRUPTED)
-        interrupted.set()
+        stop_requested.set()
 
     with SearchProgress({**options, "quiet": quiet}) as search, interruptible(interrupt):
         result = lib.scan(

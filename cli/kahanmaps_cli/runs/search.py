@@ -75,9 +75,9 @@ def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:
     }
 
 
-def record(name: str, result: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
+def record(name: str, result: Any, search: SearchProgress, **entries: Any) -> dict[str, Any]:
     """Return the JSON record of a search."""
-    return {**heading(name, result, search), **result.to_json(), **more, "document": dict(result.file.document)}
+    return {**heading(name, result, search), **result.to_json(), **entries, "document": dict(result.file.document)}
 
 
 def print_search(

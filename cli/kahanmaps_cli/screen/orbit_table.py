@@ -38,7 +38,7 @@ class OrbitTable(Writer):
         for name, cell in zip((*self.variables, *self.integrals), cells, strict=True):
             print_raw(f"  {name} = {_shorten_cell(cell, max(_MIN_WIDTH, self._width - len(name) - 5))}")
 
-    def end(self, end: lib.OrbitEnd, more: Mapping[str, Any]) -> None:
+    def end(self, end: lib.OrbitEnd, details: Mapping[str, Any]) -> None:
         print_stdout(f"# {end.text}")
         if self._has_digits:
             print_stdout("# (30/28): digits of numerator and denominator; (30): the larger of the two")

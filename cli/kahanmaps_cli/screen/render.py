@@ -29,10 +29,10 @@ def envelope(command: str) -> dict[str, str]:
     return {"command": command, "version": lib.__version__}
 
 
-def record_of(command: str, file: lib.SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
+def record_of(command: str, file: lib.SystemFile, arithmetic: str, **entries: Any) -> dict[str, Any]:
     """Return the JSON object of a command for a system, with the system file."""
     common = {"system": file.name, "convention": lib.convention(file.map), "arithmetic": arithmetic}
-    return {**envelope(command), **common, **more, "document": dict(file.document)}
+    return {**envelope(command), **common, **entries, "document": dict(file.document)}
 
 
 def print_json(data: Mapping[str, Any]) -> None:

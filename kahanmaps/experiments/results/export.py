@@ -87,7 +87,7 @@ def names_of(entry: Entry) -> tuple[str, str]:
 def to_text(value: Any) -> str:
     """Return a value as text: integers and texts unchanged, the empty text for None, lists as JSON.
 
-    >>> [plain(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
+    >>> [to_text(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
     ['', 'true', '100000000000000000000', '0.1', '7/3', '[1, 8]']
     """
     if value is None:
@@ -116,7 +116,7 @@ def is_number(value: Any) -> bool:
 def nearest_double(value: Any) -> float:
     """Return the double nearest to an exact number; infinite if the number exceeds all doubles.
 
-    >>> nearest("7/3"), nearest("0.1"), nearest(-(10**400))
+    >>> nearest_double("7/3"), nearest_double("0.1"), nearest_double(-(10**400))
     (2.3333333333333335, 0.1, -inf)
     """
     numerator, _, denominator = str(value).partition("/") if isinstance(value, str) else (value, "", "")
@@ -234,7 +234,7 @@ class _Layout:
         for name in (name for name in self.names if name in entry_of):
             value_kinds = kinds[entry_of[name]] - {"none"}
             if value_kinds:  # the first type that fits; a column without values has the type string
-                self.types[name] = next(type_ for type_, known in _KINDS_OF_TYPE.items() if value_kinds <= known)
+                self.types[name] = next(type_ for type_, fitting in _KINDS_OF_TYPE.items() if value_kinds <= fitting)
             if {"number"} <= value_kinds <= _NUMBER_KINDS:
                 self.numbers.append(name)
 

@@ -438,10 +438,10 @@ class Store(HtmlDisplay):
             if stored is not None and stored[0] == digest(definition):
                 sql = "UPDATE experiment SET limits = ? WHERE name = ?"
                 self._execute(sql, (canonical(asdict(limits)), experiment))
-                planned = Planned(stored[1], stored[2], 0, 0, is_resumed=True)
+                result = Planned(stored[1], stored[2], 0, 0, is_resumed=True)
             else:
                 texts = ((task.key, task.text) for task in tasks)
-                planned = self._replace_plan(experiment, definition, limits, texts)
+                result = self._replace_plan(experiment, definition, limits, texts)
                 for name, text in documents.items():
                     if name != digest(text):
                         raise StoreError(
@@ -449,7 +449,7 @@ class Store(HtmlDisplay):
                         )
                     self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, text))
             self._replace_skipped(experiment, skipped)
-            return planned
+            return result
 
     def _replace_skipped(self, experiment: str, skipped: Iterable[tuple[str, str]]) -> None:
         (id,) = self._execute("SELECT id FROM experiment WHERE name = ?", (experiment,)).fetchone()
@@ -511,20 +511,20 @@ class Store(HtmlDisplay):
         With `retry_failed` failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
         i-th of n disjoint parts of the tasks.
         """
-        sql, chosen = self._pending_query(experiments, retry_failed, shard)
+        sql, queries = self._pending_query(experiments, retry_failed, shard)
         sql = sql.format("t.key, t.text", "JOIN task AS t ON t.id = p.task")
         return (
             Job(self._task(key, text), experiment.limits)
-            for experiment, *values in chosen
+            for experiment, *values in queries
             for rows in self._fetch_plan(sql, experiment, PLAN_CHUNK, *values)
             for key, text in rows
         )
 
     def count_pending(self, experiments: Sequence[str] | None = None, **options: Any) -> int:
         """Return the number of jobs that `pending` yields with these arguments."""
-        sql, chosen = self._pending_query(experiments, **options)
+        sql, queries = self._pending_query(experiments, **options)
         sql = sql.format("count(*)", "")
-        return sum(self._fetch(sql, (e.id, 0, e.total, *values))[0][0] for e, *values in chosen)
+        return sum(self._fetch(sql, (e.id, 0, e.total, *values))[0][0] for e, *values in queries)
 
     def _pending_query(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
@@ -588,14 +588,14 @@ class Store(HtmlDisplay):
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
-        chosen = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
+        stored = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED_COLUMNS}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         return (
             Row(experiment.name, number, self._task(key, text), self._record(key, cells))
-            for experiment in chosen
+            for experiment in stored
             for rows in self._fetch_plan(sql, experiment, RESULT_CHUNK)
             for number, key, text, *cells in rows
             if missing or cells[0] is not None

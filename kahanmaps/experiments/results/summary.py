@@ -177,7 +177,7 @@ def summarise(
     has_results = False
     for row in rows:
         entry_values: dict[str, Any] = {}
-        measured = {} if stable or row.record is None else {name: getattr(row.record, name) for name in RUN_COLUMNS}
+        numbers = {} if stable or row.record is None else {name: getattr(row.record, name) for name in RUN_COLUMNS}
         for entry, value in entries(row):
             seen_entries.add(entry)
             short_name, long_name = names_of(entry)
@@ -186,7 +186,7 @@ def summarise(
                     entry_values.setdefault(name, value)  # if entries have the same name, the first one keeps it
             if entry[0] == "result":
                 has_results = True
-                measured[long_name if short_name in RUN_COLUMNS else short_name] = value
+                numbers[long_name if short_name in RUN_COLUMNS else short_name] = value
         keys_and_values = [_sort_key_and_value(row, name, entry_values.get(name)) for name in by]
         group_key = tuple(key for key, _ in keys_and_values)
         group = groups.get(group_key)
@@ -195,7 +195,7 @@ def summarise(
         group.counts["missing" if row.record is None else row.record.outcome] += 1
         if row.record is not None and row.record.verdict is not None:
             group.verdicts[row.record.verdict] += 1
-        for name, value in measured.items():
+        for name, value in numbers.items():
             if is_number(value):
                 numeric_names.add(name)
                 if name in by if values is None else name not in values:

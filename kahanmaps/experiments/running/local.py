@@ -469,8 +469,8 @@ def _limit_memory(memory: int | None, idle: int | None) -> None:
     with suppress(OSError, ValueError):  # the system refuses a limit below the current size
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard
-        if memory is not None and (used := idle or _address_space()) is not None:
-            soft = used + memory
+        if memory is not None and (base := idle or _address_space()) is not None:
+            soft = base + memory
             soft = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 

@@ -156,8 +156,8 @@ def _jobs(spec: Spec, names: Sequence[str], shard: tuple[int, int]) -> Iterator[
     """Yield the jobs of a spec in order, each task once."""
     seen_keys = set()
     part, parts = shard
-    chosen = [experiment for experiment in spec.experiments if experiment.name in names]
-    rows = ((experiment, task) for experiment in chosen for task in experiment.tasks())
+    experiments = [experiment for experiment in spec.experiments if experiment.name in names]
+    rows = ((experiment, task) for experiment in experiments for task in experiment.tasks())
     for number, (experiment, task) in enumerate(rows):
         if task.key not in seen_keys:
             seen_keys.add(task.key)

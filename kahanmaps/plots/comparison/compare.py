@@ -356,9 +356,9 @@ def compare(
         failures = sum(end.status == "singular" for end in ends) if name in IMPLICIT else 0
         runs.append(MethodRun(name, ends, evaluations, systems, repeated, failures, errors, order, seconds))
     labels = {function.name: function.label for function in functions}
-    kept = {name: origins[name] for name in labels}
+    origins = {name: origins[name] for name in labels}
     return Comparison(
-        file, eps, starts, steps, labels, kept, relative, tuple(runs), tuple(curves), time, skipped, tuple(notes)
+        file, eps, starts, steps, labels, origins, relative, tuple(runs), tuple(curves), time, skipped, tuple(notes)
     )
 
 
@@ -427,7 +427,7 @@ def _choose_methods(
     if isinstance(normal_form, NoNormalForm) and "normal-form" in names:
         skipped["normal-form"] = normal_form.reason
     if len(skipped) == len(names):
-        problems = [f"the method {name} is not available: {why}" for name, why in skipped.items()]
+        problems = [f"the method {name} is not available: {reason}" for name, reason in skipped.items()]
         raise InputError("; ".join(problems) or f"found no method, expected some of {', '.join(METHODS)}")
     points = np.array([to_floats(start) for start in starts])
 
@@ -557,5 +557,5 @@ class _Bins:
 
     def curve(self, method: str, function: str) -> DriftCurve:
         """Return the curve of the largest errors, without empty bins."""
-        used = self._largest >= 0
-        return DriftCurve(method, function, self._steps[used], self._largest[used], self._undefined, self._last)
+        is_used = self._largest >= 0
+        return DriftCurve(method, function, self._steps[is_used], self._largest[is_used], self._undefined, self._last)

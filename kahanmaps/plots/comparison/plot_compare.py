@@ -20,7 +20,7 @@ from kahanmaps.plots.figures import (
     letter_count,
     log_scale_with_zero,
     new_figure,
-    wrapped,
+    wrap_text,
     write_beside,
 )
 from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
@@ -153,7 +153,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
                 label = f"{kind} error of{chr(10) if is_long else ' '}{function}"
             else:
                 label = f"{kind} error of " + function.replace(" ", "\N{NO-BREAK SPACE}")
-                label = wrapped(label, height, style.font_size, max_lines=2)
+                label = wrap_text(label, height, style.font_size, max_lines=2)
             axes.set_ylabel(label)
         for k, axes in enumerate(panels):
             if k >= count:

@@ -19,7 +19,7 @@ from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPl
 from kahanmaps.plots.curves.level_sets import zero_curves
 from kahanmaps.plots.curves.plane_cubics import THREE_LINES, Floats, PlaneCubic
 from kahanmaps.plots.figures import MAX_VECTOR_POINTS, drawing, escape_dollars, label_of, new_figure, write_beside
-from kahanmaps.plots.portraits.windows import Window, outside, window_of
+from kahanmaps.plots.portraits.windows import Window, count_outside, window_of
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class Rectangle:
     @classmethod
     def of(cls, clouds: Sequence[Cloud], window: Window) -> Rectangle:
         """Return a window with the number of these dots outside it."""
-        return cls(window, outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
+        return cls(window, count_outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
 
     @classmethod
     def around(cls, clouds: Sequence[Cloud]) -> Rectangle:

@@ -20,7 +20,7 @@ from kahanmaps.plots.figures import MAX_VECTOR_POINTS, dot_size, draw_points, dr
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.flow import CENTER, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.trajectories import Trajectories
-from kahanmaps.plots.portraits.windows import Window, inside, main_range, outside, window_of
+from kahanmaps.plots.portraits.windows import Window, count_outside, is_inside, main_range, window_of
 from kahanmaps.plots.style import COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def portrait_of(
         shown_window,
         values,
         label,
-        left_out=outside(flat, shown_window),
+        left_out=count_outside(flat, shown_window),
         undefined=int(is_defined.sum() - is_shown.sum()),
         euler=None if euler is None else _projected(euler, axes),
         joined=tuple(map(neighbours, trajectories.points.swapaxes(0, 1))) if join and STEP not in axes else (),
@@ -357,7 +357,7 @@ def _draw_colored(
 
 
 def _hide_outside(points: FloatArray, window: Window) -> FloatArray:
-    return np.where(inside(points, window)[..., None], points, np.nan)
+    return np.where(is_inside(points, window)[..., None], points, np.nan)
 
 
 def _format_axes_in_space(axes: Any, window: Window | None) -> None:

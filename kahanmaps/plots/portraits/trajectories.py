@@ -87,8 +87,8 @@ def follow_orbits(ensemble: FloatEnsemble, steps: int, progress: Callable[[int],
     require_steps(steps)
     bound = min(MAX_POINTS, _MAX_COORDINATES // ensemble.system.dim)
     if (steps + 1) * ensemble.n > bound:
-        found = f"{steps} steps of {ensemble.n} orbits"
-        raise InputError(f"found {found}, expected at most {bound} points: use fewer steps")
+        request = f"{steps} steps of {ensemble.n} orbits"
+        raise InputError(f"found {request}, expected at most {bound} points: use fewer steps")
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
     texts = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
     ended = {text: int((ensemble.status == status).sum()) for status, text in texts.items()}

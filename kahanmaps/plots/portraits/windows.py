@@ -90,15 +90,15 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
     return window
 
 
-def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
+def is_inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
     """Return which points (..., d) lie in the window; NaN counts as outside."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
-def outside(points: FloatArray, window: Window) -> int:
+def count_outside(points: FloatArray, window: Window) -> int:
     """Return the number of points (n, d) outside the window, without counting NaN."""
-    return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
+    return int((~np.isnan(points).any(axis=1) & ~is_inside(points, window)).sum())
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
