@@ -38,7 +38,7 @@ from kahanmaps.checks.claims import Certainty, Finding, Report
 from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
 from kahanmaps.documents.expressions import formula_text
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.analysis import Analysis
@@ -335,7 +335,7 @@ def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label:
         maps: list[MapFamily] = [as_map(system) for system in systems]
     else:
         other_file = as_file(other)
-        g, _ = matched(file, other_file)
+        g, _ = match_variables(file, other_file)
         if g.variables != file.map.variables or not hasattr(g, "rows") or g.symbols:
             raise InputError(f"expected two single maps in the same variables, got {file.name} and {other_file.name}")
         maps = [file.map, g]

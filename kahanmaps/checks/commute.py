@@ -14,7 +14,7 @@ from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.settings import Settings, run_orbit
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
@@ -113,7 +113,7 @@ def check_commute(
         return _check_member(file, file.member, settings)
     other_file = as_file(other)
     f = file.map
-    g, note = matched(file, other_file)
+    g, note = match_variables(file, other_file)
     notes = [note] if note else []
     is_same_order = set(f.variables) != set(other_file.variables) or f.variables == other_file.variables
     ratio, is_same_step = SAME_STEP, True

@@ -86,11 +86,11 @@ def command(system: str | None, checker: str, output: str | None, as_json: bool,
         raise click.UsageError("give --commute or --equivalent, not both")
     if (options["by"] is None) != (options["equivalent"] is None):
         raise click.UsageError("--equivalent OTHER and --by EXPRS belong together")
-    other, loading = options["commute"] or options["equivalent"], {**options, "quiet": quiet}
+    other, load_options = options["commute"] or options["equivalent"], {**options, "quiet": quiet}
     if other in (None, "associates"):
-        file = load_system(system, loading)
+        file = load_system(system, load_options)
     else:
-        file, other = load_pair(system, other, loading)
+        file, other = load_pair(system, other, load_options)
     integrals = {name or f"I{k}": text for k, (name, text) in enumerate(options["integrals"], 1)}
     command_words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
     command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []

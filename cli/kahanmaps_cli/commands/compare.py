@@ -60,15 +60,15 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
         if not quiet:
             print_stderr(f"{output}: {counted(len(result.rows()), 'row')}")
     if as_json:
-        more = {**lib.eps_record(result.eps), "seed": options["seed"], **result.to_json()}
-        print_json(record_of("compare", result.file, "float", **more))
+        entries = {**lib.eps_record(result.eps), "seed": options["seed"], **result.to_json()}
+        print_json(record_of("compare", result.file, "float", **entries))
     else:
         print_stdout(result.text.partition("\n")[0])
         for table in result.tables():
             print_table(table)
         for sentence in result.remarks():
             print_stdout(sentence)
-    early = early_messages(result)
-    for sentence in () if quiet else early:
+    messages = early_messages(result)
+    for sentence in () if quiet else messages:
         print_stderr(sentence)
-    return 3 if early else 0
+    return 3 if messages else 0

@@ -91,9 +91,8 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     Exit status: 0 done, 2 usage error, 3 stopped early (indeterminacy point, digit limit, ...), 130 interrupted.
     """
-    _require_consistent(options)
     output = None if output == "-" else output
-    form = _form(options, output)
+    form = _requested_format(options, output)
     options["quiet"] = quiet
     file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
     eps = opt.eps_of(file, options)
@@ -127,7 +126,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
             member=file.member,
             accuracy=options["accuracy"] or 15,
             progress=progress,
-            **opt.given(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
+            **opt.pick(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
         )
     trajectory.integrals = functions
     reason = trajectory.why
@@ -135,11 +134,11 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         print_stderr(reason)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
-    target: Any = sys.stdout if output is None else output
+    destination: Any = sys.stdout if output is None else output
     if is_table:
         from kahanmaps_cli.screen.orbit_table import OrbitTable  # this import loads the library
 
-        target = OrbitTable(target, file.variables, list(functions))
+        destination = OrbitTable(destination, file.variables, list(functions))
     last_step = trajectory.header()["steps"]
     time_left = TimeLeft(last_step)
     is_unread = False  # whether the reader of the pipe (such as head) has closed it
@@ -155,7 +154,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         interruptible(trajectory.interrupt),
         Progress(quiet or on_terminal) as progress,
     ):  # on a terminal the printed points already show the progress
-        end = trajectory.write(target, form, file.name, on_step)
+        end = trajectory.write(destination, form, file.name, on_step)
     if verbose and not quiet and trajectory.why != reason:
         print_stderr(trajectory.why)
     if output is not None and not quiet:
@@ -165,7 +164,8 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
-def _require_consistent(options: dict[str, Any]) -> None:
+def _requested_format(options: dict[str, Any], output: str | None) -> str:
+    """Return the requested format, by default that of the suffix of the output file; refuse contradictory options."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):
         raise click.UsageError("give either --steps N or --at N1,N2,...")
@@ -177,10 +177,6 @@ def _require_consistent(options: dict[str, Any]) -> None:
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"].kind != "float":
         raise click.UsageError("--kernel is for --arithmetic float")
-
-
-def _form(options: dict[str, Any], output: str | None) -> str:
-    """Return the requested format, by default the format given by the suffix of the output file."""
     form: str | None = options["form"]
     if options["as_json"]:
         if form not in (None, "json"):
