@@ -62,7 +62,7 @@ def _nullity(map_: ModularMap, degree: int) -> int:
     rng = random.Random(degree)
     x: tuple[int, ...] | None = tuple(rng.randrange(p) for _ in range(map_.dim))
     exponents = [m for d in range(degree + 1) for m in monomials(map_.dim, d)]
-    rows = []
+    rows: list[list[int]] = []
     while len(rows) < unknowns + _SPARE:
         assert x is not None  # no point of a random orbit modulo p is singular
         values: dict[tuple[int, ...], int] = {}

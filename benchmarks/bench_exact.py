@@ -110,7 +110,8 @@ def fmpz_solve(work: Work, steps: int) -> tuple[float, Pairs]:
             matrix = fmpz_mat(n, n, (tensor * column * -eps.p).entries())
             for i in range(n):
                 matrix[i, i] += eps.q * common * below
-            column, below = matrix.solve(column * (eps.q * common)).numer_denom()
+            solution: Any = matrix.solve(column * (eps.q * common))
+            column, below = solution.numer_denom()
             content = below
             for entry in column.entries():
                 content = content.gcd(entry)

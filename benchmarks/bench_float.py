@@ -24,7 +24,7 @@ from flint import fmpq
 
 from kahanmaps import System, lyapunov, normal_form, random_member_with_eigenvalues
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit
-from kahanmaps.maps.floats.planar_blocks import planar_blocks
+from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks
 from kahanmaps.maps.kernels import has_numba
 
 EPS = fmpq(1, 10)
@@ -106,7 +106,7 @@ def _pointer(array: Any) -> Any:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def _planar_coefficients(blocks: Any) -> Any:
+def _planar_coefficients(blocks: PlanarBlocks) -> Any:
     return np.ascontiguousarray(blocks.coefficients.real)
 
 
@@ -116,11 +116,11 @@ def _timed(function: Callable[[], Any]) -> float:
     return time.perf_counter() - begin
 
 
-def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: Any) -> None:
+def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: PlanarBlocks) -> None:
     steps = 3_000_000
     start = [fmpq(1, 100 + k) for k in range(6)]
     k = _planar_coefficients(blocks)
-    z0 = blocks.to_state @ np.array([float(entry.p) / float(entry.q) for entry in start])
+    z0 = blocks.x_to_state @ np.array([float(entry.p) / float(entry.q) for entry in start])
     ensemble = FloatEnsemble(system, EPS, [start], form=form, kernel="numpy")
     ensemble.advance(10)
     expected = ensemble.x[0]
@@ -132,7 +132,7 @@ def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: Any) 
 
         z = z0.copy()
         getattr(library, name)(_pointer(z), _pointer(k), ctypes.c_size_t(10))
-        _agree(blocks.to_x @ z, expected, name)
+        _agree(blocks.state_to_x @ z, expected, name)
         return run
 
     def by_us(kernel: str, form: Any, count: int) -> Callable[[], float]:
@@ -175,10 +175,10 @@ def _every_point(table: Table, system: Any, form: Any) -> None:
     table.add("Python floats, normal form", POINTS, 30_000, run("numpy", 30_000))
 
 
-def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: Any, starts: Any) -> None:
+def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: PlanarBlocks, starts: Any) -> None:
     steps = 4000
     k = _planar_coefficients(blocks)
-    z0 = np.ascontiguousarray(blocks.to_state @ starts.T)
+    z0 = np.ascontiguousarray(blocks.x_to_state @ starts.T)
     size = ctypes.c_size_t
     checked = FloatEnsemble(system, EPS, starts, form=form, kernel="numpy")
     checked.advance(20)
@@ -190,7 +190,7 @@ def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: Any, 
 
         z = z0.copy()
         take(z, 20)
-        _agree((blocks.to_x @ z).T, expected, name)
+        _agree((blocks.state_to_x @ z).T, expected, name)
 
         def run() -> float:
             z = z0.copy()
@@ -270,7 +270,7 @@ TOP = {"x": "y*z", "y": "-2*z*x", "z": "x*y"}
 def _top(table: Table, library: Any) -> None:
     """A system of dimension 3 that is treated like any other."""
     count, steps, long, size = 1_000_000, 100, 10_000_000, ctypes.c_size_t
-    top, e = System(TOP), ctypes.c_double(0.1)
+    top, e = System(TOP).system, ctypes.c_double(0.1)
     starts = np.random.default_rng(7).uniform(-1, 1, (count, 3))
     checked = FloatEnsemble(top, EPS, starts, kernel="numpy")
     checked.advance(10)

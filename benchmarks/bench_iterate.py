@@ -195,7 +195,7 @@ def in_balls(work: Work, n: int = 10**6, bits: int = 400, check: int = 80) -> li
     iterate = NthIterate(work.normal_form, work.eps, field)
     exact = NthIterate(work.normal_form, work.eps, QQ).value(work.start, check)
     assert isinstance(exact, PlanesPoint)
-    short = iterate.value(work.start, check)
+    short: Any = iterate.value(work.start, check)
     with field.working():
         good = all(ball.overlaps(field.convert(x)) for ball, x in zip(short, exact.rationals(), strict=True))
     require_equal("the iterate in balls", good, True)

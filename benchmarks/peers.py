@@ -192,11 +192,11 @@ def asked(programs: dict[str, Path], program: str, question: str, entry: dict[st
         if program == "Macaulay2":
             file.write(script_for(question, entry))
             file.flush()
-            command = [programs["M2"], "--script", file.name]
+            command = [str(programs["M2"]), "--script", file.name]
         else:
             command = [
-                programs["python"],
-                HERE / ("peer_sage.py" if program == "SageMath" else "peer_pari.py"),
+                str(programs["python"]),
+                str(HERE / ("peer_sage.py" if program == "SageMath" else "peer_pari.py")),
                 question,
             ]
         done = subprocess.run(
