@@ -3,6 +3,7 @@
 import gc
 import importlib
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -83,6 +84,14 @@ def test_a_benchmark_changes_no_setting_of_python_by_being_imported(name):
     before = settings()
     importlib.import_module(name)
     assert settings() == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", ["exact", "fields", "catalogue", "iterate", "degrees", "analysis", "memory", "units"])
+def test_a_part_of_the_benchmarks_runs_in_its_quick_form(part):
+    command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--only", part]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, f"== {part}" in done.stdout + done.stderr) == (0, True), done.stderr[-1000:]
 
 
 def test_other_answers_of_other_programs_are_noticed():
