@@ -1,5 +1,5 @@
 """The commands find-...: what they print is accepted by the checks and can be pasted, JSON has all that is needed to
-search again, and what stays open gives 3. Witnesses of checks are verified by `kahanmaps orbit`.
+search again, and what stays open gives 3.
 """
 
 import shlex

@@ -1,8 +1,4 @@
-"""kahanmaps period: the order of the translation, told with its planes and poles, and never a traceback.
-
-Walking the orbit gives the same number where that is short enough; at a pole the walk stops and the period is that of
-the orbit continued.
-"""
+"""kahanmaps period: members that do not say so; what it says of others is in said.txt."""
 
 M3 = "paper_m3 --start 1,2,3,4,5,6 --eps 1/11"
 
