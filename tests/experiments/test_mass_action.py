@@ -1,4 +1,4 @@
-"""examples/mass_action: networks are read as text, and the README has the counts of the results."""
+"""examples/mass_action: networks are read as text."""
 
 import subprocess
 import sys

@@ -1,32 +1,24 @@
-"""A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only.
+"""A search recorded and repeated on other maps; spaces with zeros at the same places are told apart for every seed."""
 
-Spaces with zeros at the same places are told apart by their coefficients, whatever the primes and the order.
-"""
-
-import random
 from functools import cache
-from types import SimpleNamespace
 
 import pytest
-from flint import nmod
 from helpers import quick
 from search_helpers import system, values_on_orbits
 
-from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import candidates
-from kahanmaps.laboratory.preserve.search import find_branches, may_be_conjugate, repeat_search, search_spaces
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat_search, search_spaces
 
 
 def searched(file, eps=None):
@@ -84,33 +76,6 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
         search_spaces(laboratory.maps[0], profile, known, budget=Budget())
 
 
-# The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
-def pencil_at(prime, values):
-    a, eps = values
-    below = nmod(3 * eps - 1, prime)
-    if below == 0:
-        return None
-    entries = {(0, 0): nmod(1, prime), (1, 0): nmod(a * a, prime) / below}
-    support = exponents_up_to(2, 2)
-    vectors = [[int(entries.get(m, 0)) for m in support], [int(m == (0, 2)) for m in support]]
-    return [DarbouxSpace.spanned_by(2, 2, vectors, prime)]
-
-
-MODEL = pencil_at(2**61 - 1, (12345, 67890))
-
-
-def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
-    """What a laboratory makes of spaces that are given by the prime and the values, and not found on maps."""
-    laboratory = SimpleNamespace(map_for=lambda *place: place, symbols=symbols, root=None, seed=0)
-    return Laboratory.formulas(laboratory, model, lambda place: spaces_at(*place), budget, variables, eps_enters)
-
-
-def test_coefficients_are_interpolated():
-    formulas = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert [format_polynomial(P) for P in formulas.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
-    assert formulas.reason == ""
-
-
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the
 # other: (K + const)/(1 - eps^2 (a (dK/dz)^2 ...)) has its zeros where the other one has them.
 DX, DY = "(2*a1*x + a2*y + a4)", "(a2*x + 2*a3*y + a5)"
@@ -137,57 +102,3 @@ def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
     for text in texts:
         values = values_on_orbits(FAMILY, text, ["1/9"], starts=1, steps=2, a3=5, b3=-4)
         assert {len(each) for each in values} == {1}
-
-
-def spaces(prime, values, numbers, order):
-    """Spaces 1, x + c y of degree 1 in the plane with these c, shuffled."""
-    results = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
-    random.Random(f"{order} {prime} {values}").shuffle(results)
-    return results
-
-
-def root_of(n, prime):
-    """A square root of n modulo a prime, None where there is none."""
-    from flint import nmod_poly
-
-    factors = nmod_poly([-n % prime, 0, 1], prime).factor()[1]
-    return None if len(factors) == 1 and factors[0][0].degree() == 2 else int(-factors[0][0][0])
-
-
-@pytest.mark.parametrize("order", range(3))
-def test_shuffled_spaces_are_put_in_order_on_every_map(order):
-    numbers = [
-        lambda p, a, eps: a * pow(1 + eps * eps * a, -1, p),
-        lambda p, a, eps: -a * eps * pow(2, -1, p),
-        lambda p, a, eps: 7 * pow(3, -1, p),
-    ]
-    first, second = Laboratory(system("x y", "a*y", "x", a="2"), ["a"]).maps
-    model = spaces(first.prime, (*first.values, first.eps), numbers, order)
-    branches = find_branches(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
-    assert branches is not None
-    assert branches.place == (1, 1)
-    ordered = [
-        branches.in_order(spaces(m.prime, (*m.values, m.eps), numbers, order + 5), m) for m in (first, first, second)
-    ]
-    assert ordered[0] == ordered[1]
-    which = [
-        [
-            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == entry.basis[1][1])
-            for entry in g
-        ]
-        for m, g in zip((first, second), ordered[1:], strict=True)
-    ]
-    assert which[0] == which[1]
-    assert sorted(which[0]) == [0, 1, 2]
-
-
-@pytest.mark.parametrize("names", [(), ("a",)])
-def test_spaces_that_are_conjugate_have_no_order(names):
-    """x + sqrt(2) y, or x + sqrt(2) a y, and its conjugate: two spaces modulo the primes where 2 is a square."""
-
-    def alike(prime, values):
-        root = root_of(2, prime)
-        return None if root is None else spaces(prime, values, [lambda p, a=1: root * a, lambda p, a=1: -root * a], 0)
-
-    prime = next(map_.prime for map_ in Laboratory(FAMILY).other_maps(20) if root_of(2, map_.prime) is not None)
-    assert find_branches(alike(prime, (3,) * len(names)), alike, names, 0, Budget()) is None
