@@ -23,6 +23,7 @@ from kahanmaps.laboratory.modular_points import (
     gradient_values,
     monomial_values,
 )
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import TwoPointBasis, TwoPointMap
 
 SMALL = 101
 residues = st.integers(0, SMALL - 1)
@@ -87,6 +88,18 @@ def test_a_map_defined_nowhere_is_reported():
         with pytest.raises(NoPoint, match="not defined at random points"):
             look()
     assert singular.step((1, 1)) is None
+
+
+@pytest.mark.parametrize("kind", ["map", "flow", "lifted"])
+def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
+    system = load("lotka_volterra").system
+    map_ = ModularFlow(system, PRIME) if kind == "flow" else ModularMap(system, PRIME, 7)
+    map_ = TwoPointMap(map_, TwoPointBasis(1, 1)) if kind == "lifted" else map_
+    ((x, image),) = map_.pairs(1)
+    plain, weighed = map_.monomials_at_both(x, image, 2), map_.monomials_at_both(x, image, 2, (3, 5))
+    for values, more, number in zip(plain, weighed, (3, 5), strict=True):
+        assert [number * int(value) % PRIME for value in values] == [int(value) % PRIME for value in more]
+    assert plain[0] != plain[1]
 
 
 def test_the_series_of_a_solution_solve_the_equation():
