@@ -1,5 +1,6 @@
 """A search recorded and repeated on other maps; spaces with zeros at the same places are told apart for every seed."""
 
+import random
 from functools import cache
 
 import pytest
@@ -14,11 +15,11 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import gradient_rank
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import candidates
-from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat_search, search_spaces
+from kahanmaps.laboratory.preserve.search import find_branches, may_be_conjugate, repeat_search, search_spaces
 
 
 def searched(file, eps=None):
@@ -102,3 +103,37 @@ def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
     for text in texts:
         values = values_on_orbits(FAMILY, text, ["1/9"], starts=1, steps=2, a3=5, b3=-4)
         assert {len(each) for each in values} == {1}
+
+
+def spaces(prime, values, numbers, order):
+    """Spaces 1, x + c y of degree 1 in the plane with these c, shuffled."""
+    results = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
+    random.Random(f"{order} {prime} {values}").shuffle(results)
+    return results
+
+
+@pytest.mark.parametrize("order", range(3))
+def test_shuffled_spaces_are_put_in_order_on_every_map(order):
+    numbers = [
+        lambda p, a, eps: a * pow(1 + eps * eps * a, -1, p),
+        lambda p, a, eps: -a * eps * pow(2, -1, p),
+        lambda p, a, eps: 7 * pow(3, -1, p),
+    ]
+    first, second = Laboratory(system("x y", "a*y", "x", a="2"), ["a"]).maps
+    model = spaces(first.prime, (*first.values, first.eps), numbers, order)
+    branches = find_branches(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
+    assert branches is not None
+    assert branches.place == (1, 1)
+    ordered = [
+        branches.in_order(spaces(m.prime, (*m.values, m.eps), numbers, order + 5), m) for m in (first, first, second)
+    ]
+    assert ordered[0] == ordered[1]
+    which = [
+        [
+            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == entry.basis[1][1])
+            for entry in g
+        ]
+        for m, g in zip((first, second), ordered[1:], strict=True)
+    ]
+    assert which[0] == which[1]
+    assert sorted(which[0]) == [0, 1, 2]
