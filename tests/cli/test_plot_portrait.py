@@ -67,7 +67,9 @@ def test_starts_come_from_a_file_or_at_random(kahanmaps, drawn, tmp_path):
 
 
 def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):
-    command = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --no-field --levels modified_H"
+    command = (
+        f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --no-field --levels modified_H"
+    )
     kahanmaps(command)
     outcome = kahanmaps(command + " --levels-at=-1/2,1000")
     through, at = (portrait.levels for portrait, _ in drawn)
