@@ -120,7 +120,7 @@ def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: Any) 
     steps = 3_000_000
     start = [fmpq(1, 100 + k) for k in range(6)]
     k = _planar_coefficients(blocks)
-    z0 = blocks.into @ np.array([float(entry.p) / float(entry.q) for entry in start])
+    z0 = blocks.to_state @ np.array([float(entry.p) / float(entry.q) for entry in start])
     ensemble = FloatEnsemble(system, EPS, [start], form=form, kernel="numpy")
     ensemble.advance(10)
     expected = ensemble.x[0]
@@ -132,7 +132,7 @@ def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: Any) 
 
         z = z0.copy()
         getattr(library, name)(_pointer(z), _pointer(k), ctypes.c_size_t(10))
-        _agree(blocks.out @ z, expected, name)
+        _agree(blocks.to_x @ z, expected, name)
         return run
 
     def by_us(kernel: str, form: Any, count: int) -> Callable[[], float]:
@@ -178,7 +178,7 @@ def _every_point(table: Table, system: Any, form: Any) -> None:
 def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: Any, starts: Any) -> None:
     steps = 4000
     k = _planar_coefficients(blocks)
-    z0 = np.ascontiguousarray(blocks.into @ starts.T)
+    z0 = np.ascontiguousarray(blocks.to_state @ starts.T)
     size = ctypes.c_size_t
     checked = FloatEnsemble(system, EPS, starts, form=form, kernel="numpy")
     checked.advance(20)
@@ -190,7 +190,7 @@ def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: Any, 
 
         z = z0.copy()
         take(z, 20)
-        _agree((blocks.out @ z).T, expected, name)
+        _agree((blocks.to_x @ z).T, expected, name)
 
         def run() -> float:
             z = z0.copy()

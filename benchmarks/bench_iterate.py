@@ -147,8 +147,8 @@ def on_elliptic_curves(n: int) -> list[Row]:
     for name in ("euler_top", "nahm_tetrahedral", "qrt_asymmetric", "todd", "repaired_octahedral"):
         map_over = load(name).map.at(EPS)
 
-        def last(wanted: Callable[[int], bool] | None, map_over: Any = map_over) -> Any:
-            *_, point = Orbit(map_over, START[: map_over.dim], n, max_digits=None, wanted=wanted)
+        def last(is_requested: Callable[[int], bool] | None, map_over: Any = map_over) -> Any:
+            *_, point = Orbit(map_over, START[: map_over.dim], n, max_digits=None, is_requested=is_requested)
             return point.value
 
         seconds, point = timed(lambda last=last: last({n}.__contains__))

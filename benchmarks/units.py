@@ -22,7 +22,7 @@ from kahanmaps import analyze, load
 from kahanmaps.algebra import modular_matrices
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.small_systems import independent, solve_system
+from kahanmaps.algebra.small_systems import echelon_basis, solve_system
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import names, titles
 from kahanmaps.laboratory.analysis import Analysis
@@ -88,7 +88,7 @@ def kinds() -> Iterator[Sized]:
     for dim, degree in ((2, 4), (3, 3), (4, 2)):
         context = ring([f"x{i}" for i in range(dim)])
         support = [m for k in range(degree + 1) for m in monomials(dim, k)]
-        equations = independent(context.from_dict({m: fmpq(rng.randint(-9, 9)) for m in support}) for _ in range(dim))
+        equations = echelon_basis(context.from_dict({m: fmpq(rng.randint(-9, 9)) for m in support}) for _ in range(dim))
         yield (
             "small systems",
             f"{dim} equations of degree {degree}",

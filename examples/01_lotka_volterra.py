@@ -12,7 +12,7 @@ import numpy as np
 
 import kahanmaps as km
 from kahanmaps.maps.floats.classical import MethodEnsemble
-from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, follow_orbits
 
 lotka_volterra = km.load("lotka_volterra")
 system = lotka_volterra.system
@@ -24,13 +24,13 @@ def energy(x, y):
 
 
 starts = np.array([[1.25, 1.0], [1.5, 1.0], [1.75, 1.0]])
-kahan = walked(ensemble_for(system, "1/10", starts, 2000), 2000)
+kahan = follow_orbits(ensemble_for(system, "1/10", starts, 2000), 2000)
 print("time step 2/10, 2000 steps of Kahan: the range of the energy")
 for k, start in enumerate(starts):
     values = [energy(*x) for x in kahan.points[:, k]]
     print(f"  from ({start[0]}, {start[1]}): {min(values):.3f} to {max(values):.3f}")
 
-euler = walked(MethodEnsemble(system, "1/100", starts[:1], "euler", kernel="numpy"), 20000).points[:, 0]
+euler = follow_orbits(MethodEnsemble(system, "1/100", starts[:1], "euler", kernel="numpy"), 20000).points[:, 0]
 print(f"time step 2/100, 20000 steps of Euler: from {energy(*euler[0]):.3f} to {energy(*euler[-1]):.3f}")
 
 for finding in km.check_measure(lotka_volterra).findings:

@@ -1,8 +1,7 @@
 """The discrete Euler top of Hirota and Kimura: an exact orbit, two integrals, and a function that is not an integral.
 
 Every iterate is a triple of rational numbers, and both integrals keep their exact value. The map does not conserve the
-integral of the differential equation, which differs from one of the map by a term in eps^2: it is refuted with a
-witness.
+integral of the differential equation, which differs from one of the map by a term in eps^2: a witness refutes it.
 """
 
 import kahanmaps as km

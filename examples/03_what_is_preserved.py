@@ -1,8 +1,8 @@
 """What does this Kahan map preserve, and is it integrable? The input is only the right-hand sides.
 
-Integrals are found in closed form, with symbolic parameters, and proved. The degrees of the iterates distinguish
-integrable maps from others, independently of integrals: zhukovski_volterra_2 has an integral and is not integrable. At
-a single eps a map may look integrable by accident.
+Formulas of integrals are found, with symbolic parameters, and proved. The degrees of the iterates distinguish
+integrable maps from other maps, independently of integrals: zhukovski_volterra_2 has an integral and is not
+integrable. At a single eps a map may look integrable by accident.
 """
 
 import kahanmaps as km

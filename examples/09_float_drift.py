@@ -1,9 +1,9 @@
 """Drift of exactly conserved integrals in floating-point arithmetic.
 
-First the Euler top by three methods with the same time step: Kahan's map conserves its integrals up to rounding errors,
-Runge-Kutta and the implicit midpoint rule do not. Then a member of the commuting family, whose orbits pass close to
-indeterminacy points of the map, where digits are lost; the normal form loses fewer. Writes drift.pdf if matplotlib is
-installed.
+The first experiment integrates the Euler top by three methods with the same time step: Kahan's map conserves its
+integrals up to rounding errors, Runge-Kutta and the implicit midpoint rule do not. The second one is for a member of
+the commuting family. Its orbits pass close to indeterminacy points of the map, where digits are lost; steps in normal
+form lose fewer digits. Writes drift.pdf if matplotlib is installed.
 """
 
 from importlib.util import find_spec

@@ -46,12 +46,12 @@ for integral in km.find_integrals(top):
     values = integral(km.orbit(top, x0=[1, 0.5, 0.25], h=0.1, n=1000, exact=False).x, 0.05)
     print(integral.text, "drifts by less than 1e-12:", bool(np.ptp(values) < 1e-12))
 
-# A thousand orbits at once.
+# A thousand orbits, computed together.
 x0 = np.random.default_rng(seed=1).uniform(0.5, 1.5, (1000, 2))
 many = km.ensemble(system, x0=x0, h=0.1, n=500, kernel="numpy")
 print(many, many.x.shape)
 
-# A grid of them: which leave a ball, and how is the drift of the integrals distributed?
+# Orbits from a grid of points: which leave a ball, and how is the drift of the integrals distributed?
 grid = km.ensemble(top, "x1=0:1:10, x2=0:1:10, x3=1/2", 0.05, 500, integrals=top.integrals, radius=1)
 print((grid.escaped_at >= 0).sum(), "of", grid.n, "leave the ball")
 print("95 % drift by less than 1e-14:", grid.statistics()["F1"]["95%"] < 1e-14)

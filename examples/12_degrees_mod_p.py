@@ -1,8 +1,9 @@
 """Degrees over finite fields: exponential growth over Q may be quadratic or bounded modulo a prime.
 
-Three lines with the exponents (6, 3, 2) have the degrees 2^n over Q. Modulo p every fraction is congruent to an
-integer, so that singularities may be confined that are not confined over Q. Over GF(5) and GF(11) the degrees are
-periodic, over GF(7) they grow quadratically, like those of an integrable map, and over GF(17) no degree drops.
+The planar system with three invariant lines of exponents (6, 3, 2) has the degrees 2^n over Q. Modulo p every fraction
+is congruent to an integer, so that singularities may be confined that are not confined over Q. Over GF(5) and GF(11)
+the degrees are periodic, over GF(7) they grow quadratically, like those of an integrable map, and over GF(17) no degree
+drops.
 
 A line over GF(p^k), with p^k about 2^60, is mapped as polynomials, and common factors are divided out. This follows the
 definition of the degrees, and shares no code with `kahanmaps degrees`. Other systems (files, names of the catalogue,

@@ -1,4 +1,4 @@
-"""Certify the integrals in the tables of the examples 13 and 14: another program checks each, without kahanmaps.
+"""Certify the integrals in the tables of the examples 13 and 14: another program checks each of them without kahanmaps.
 
     python 15_certified_classes.py          SymPy checks; two minutes
     python 15_certified_classes.py gp       PARI/GP checks

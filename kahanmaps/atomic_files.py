@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import NamedTemporaryFile, TemporaryFile
 from typing import IO, Any
 
 
@@ -20,15 +18,18 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: its
     content is written at the end of the block. Raises OSError that names `path`.
     """
-    with named(path):
+    from shutil import copyfileobj  # imported here: tempfile and shutil load modules for random numbers and compression
+    from tempfile import NamedTemporaryFile, TemporaryFile
+
+    with with_file_name(path):
         if os.path.exists(path) and not os.path.isfile(path):
             with TemporaryFile() as buffer:
                 yield buffer
                 buffer.seek(0)
                 with open(path, "wb") as stream:
-                    shutil.copyfileobj(buffer, stream)
+                    copyfileobj(buffer, stream)
             return
-        target = resolved(path)
+        target = resolve_path(path)
         os.umask(umask := os.umask(0o022))  # the umask cannot be read without setting it
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
         try:
@@ -36,15 +37,15 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
             temporary = NamedTemporaryFile(dir=target.parent, prefix=prefix, delete=False)  # noqa: SIM115
         except OSError as error:  # name the requested file, not the temporary one
             raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
-        with temporary as part:
+        with temporary as new_file:
             try:
-                yield part
-                os.chmod(part.name, mode)
-                sync(part)
-                os.replace(part.name, target)
+                yield new_file
+                os.chmod(new_file.name, mode)
+                sync(new_file)
+                os.replace(new_file.name, target)
             except BaseException:
                 with suppress(OSError):
-                    os.unlink(part.name)
+                    os.unlink(new_file.name)
                 raise
         # Write the new directory entry to the disk too; some file systems do not support this.
         with suppress(OSError):
@@ -61,13 +62,13 @@ def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
 
     Raises OSError that names `path`.
     """
-    with named(path), open(path, "w", encoding="utf-8", errors="backslashreplace") as stream:
+    with with_file_name(path), open(path, "w", encoding="utf-8", errors="backslashreplace") as stream:
         yield stream
         sync(stream)
 
 
 @contextmanager
-def named(path: str | os.PathLike[str]) -> Iterator[None]:
+def with_file_name(path: str | os.PathLike[str]) -> Iterator[None]:
     """Add the name of the file to an OSError raised in the block; Python's error for a full disk names no file."""
     try:
         yield
@@ -89,7 +90,7 @@ def sync(stream: IO[Any]) -> None:
         os.fsync(stream.fileno())
 
 
-def resolved(path: str | os.PathLike[str]) -> Path:
+def resolve_path(path: str | os.PathLike[str]) -> Path:
     """Resolve symbolic links. Raises OSError if they form a cycle, or if no file can have this name."""
     try:
         target = os.path.realpath(path)

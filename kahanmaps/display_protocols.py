@@ -97,13 +97,13 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
                 verdicts = [str(self.verdict)]
             number = f"{len(self) or 'no'} {self._noun[len(self) > 1]}"
             return f"<{type(self).__name__}: {', '.join([number, *verdicts])}>"
-        first = str(self).partition("\n")[0].replace("\t", " ")
-        return f"<{type(self).__name__}: {shorten(first, 100)}>"
+        first_line = str(self).partition("\n")[0].replace("\t", " ")
+        return f"<{type(self).__name__}: {shorten(first_line, 100)}>"
 
     def _sequence(self) -> Sequence[Any]:
         if not self._parts:
-            what = "rows(), or its attributes" if hasattr(self, "rows") else "its attributes"
-            raise TypeError(f"a {type(self).__name__} is not a sequence: use {what}")
+            alternative = "rows(), or its attributes" if hasattr(self, "rows") else "its attributes"
+            raise TypeError(f"a {type(self).__name__} is not a sequence: use {alternative}")
         parts: Sequence[Any] = getattr(self, self._parts)
         return parts
 
@@ -189,8 +189,8 @@ def shorten(text: str, width: int) -> str:
     """Shorten a long text to its first and last characters, and give its length: 12345...67890 (1234 chars)."""
     if len(text) <= width:
         return text
-    keep = max(4, (width - 18) // 2)
-    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
+    kept_length = max(4, (width - 18) // 2)
+    return f"{text[:kept_length]}...{text[-kept_length:]} ({len(text)} chars)"
 
 
 @singledispatch
@@ -217,8 +217,8 @@ _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
 def _load_displays(value: object) -> None:
     """Import the file of kahanmaps.display with the name of the class's folder, or the name given in `_FILES`."""
     for base in type(value).__mro__:  # a user's subclass is displayed like its base class
-        top, *folders = base.__module__.split(".")
-        if top in ("kahanmaps", "flint"):
-            is_formula = top == "flint" or folders[0] == "algebra"
+        package, *folders = base.__module__.split(".")
+        if package in ("kahanmaps", "flint"):
+            is_formula = package == "flint" or folders[0] == "algebra"
             import_module(f"kahanmaps.display.{'latex' if is_formula else _FILES.get(folders[0], folders[0])}")
             return

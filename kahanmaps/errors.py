@@ -16,6 +16,7 @@ from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
 _MISTAKES_SHOWN = 50
+_CONTEXT_WIDTH = 72  # characters of a text that are shown around a mistake in it
 # Codes of the operating system for a full or broken disk, or for another exhausted resource.
 _MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
 # Messages of the dynamic linker, and of libraries loaded with too little memory.
@@ -57,7 +58,15 @@ class ExpressionError(InputError):
         self.message = message
         self.text = text
         self.column = column
-        super().__init__(message if column is None else f"{message}\n{_caret(text, column)}")
+        if column is not None:
+            # Append the part of `text` around `column`, and below it a caret under the character at `column`.
+            start = max(0, column - _CONTEXT_WIDTH // 2)
+            end = min(len(text), start + _CONTEXT_WIDTH)
+            before, after = "..." * (start > 0), "..." * (end < len(text))
+            # Print every character in one cell, so that the caret is aligned; escape sequences are removed as well.
+            context = "".join(c if c.isprintable() else " " for c in text[start:end])
+            message += f"\n  {before}{context}{after}\n  {' ' * (len(before) + column - start)}^"
+        super().__init__(message)
 
 
 class UnknownName(ExpressionError):
@@ -73,9 +82,9 @@ class SystemFileError(InputError):
     def __init__(self, where: str, mistakes: Sequence[tuple[str, str]]) -> None:
         self.where = where
         self.mistakes = tuple(mistakes)
-        shown = [(key, what.replace("\n", "\n    ")) for key, what in self.mistakes[:_MISTAKES_SHOWN]]
+        mistakes_shown = [(key, sentence.replace("\n", "\n    ")) for key, sentence in self.mistakes[:_MISTAKES_SHOWN]]
         lines = [f"{where}: {counted(len(self.mistakes), 'mistake')}"]
-        lines += [f"  {key}: {indented}" for key, indented in shown]
+        lines += [f"  {key}: {indented}" for key, indented in mistakes_shown]
         if len(self.mistakes) > _MISTAKES_SHOWN:
             lines.append(f"  and {len(self.mistakes) - _MISTAKES_SHOWN} more")
         super().__init__("\n".join(lines))
@@ -112,17 +121,6 @@ class PrecisionLost(KahanmapsError, ArithmeticError):
 
 class UnknownCurve(KahanmapsError):
     """No curve was found that contains an orbit; whether there is one remains undecided."""
-
-
-def _caret(text: str, column: int, width: int = 72) -> str:
-    """Return the part of `text` around `column`, and below it a caret under the character at `column`."""
-    start = max(0, column - width // 2)
-    end = min(len(text), start + width)
-    before = "..." if start > 0 else ""
-    after = "..." if end < len(text) else ""
-    # Print every character in one cell, so that the caret is aligned; escape sequences are removed as well.
-    piece = "".join(c if c.isprintable() else " " for c in text[start:end])
-    return f"  {before}{piece}{after}\n  {' ' * (len(before) + column - start)}^"
 
 
 def show(value: Any, width: int = 60) -> str:
@@ -167,13 +165,13 @@ def bounded(message: str) -> str:
     317
     """
     lines = message.split("\n")
-    shown = [
+    shown_lines = [
         _cut(re.sub(rf"\S{{{_MAX_WORD + 1},}}", lambda word: _cut(word[0], _MAX_WORD), line), _MAX_LINE)
         for line in lines[:_MAX_LINES]
     ]
     if len(lines) > _MAX_LINES:
-        shown.append(f"... and {len(lines) - _MAX_LINES} more lines")
-    return "\n".join(shown)
+        shown_lines.append(f"... and {len(lines) - _MAX_LINES} more lines")
+    return "\n".join(shown_lines)
 
 
 def _cut(text: str, max_length: int) -> str:
@@ -231,5 +229,5 @@ def suggestion(value: Any, known: Sequence[str]) -> str:
     """
     from difflib import get_close_matches
 
-    close = get_close_matches(value, known, n=2, cutoff=0.6) if isinstance(value, str) else []
-    return f"; did you mean {' or '.join(close)}?" if close else ""
+    similar_names = get_close_matches(value, known, n=2, cutoff=0.6) if isinstance(value, str) else []
+    return f"; did you mean {' or '.join(similar_names)}?" if similar_names else ""

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from functools import wraps
-from html import escape
 from importlib import import_module
 from types import FunctionType, ModuleType
 from typing import Any
@@ -23,7 +22,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.errors import InputError, suggestion
 from kahanmaps.hard_stop import TimeLimit
 
-_BEFORE_PROGRESS, _BETWEEN_UPDATES = 2.0, 0.5  # seconds before the first message, and between two messages
+_DELAY, _UPDATE_INTERVAL = 2.0, 0.5  # seconds before the first message, and between two messages
 _ARGUMENT_HINTS = {
     **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
     **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
@@ -66,35 +65,35 @@ class CallError(InputError, TypeError):
 def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     """Return the public version of a function under its public name `name`; it checks its arguments."""
     signature = inspect.signature(function)
-    kinds = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
+    annotation_of = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
     takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())
 
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
-            given = signature.bind(*args, **kwargs).arguments
+            arguments = signature.bind(*args, **kwargs).arguments
         except TypeError as error:
             raise CallError(_wrong_call(name, signature, kwargs, takes_options, error)) from None
-        for argument, value in given.items():
-            if kinds[argument].startswith("bool"):  # any other value would count as true or false
-                _require_kind(argument, value, kinds[argument])
+        for argument, value in arguments.items():
+            if annotation_of[argument].startswith("bool"):  # any other value would count as true or false
+                _require_kind(argument, value, annotation_of[argument])
         try:
             # A person waits for the answer in a notebook or at a Python prompt.
             is_interactive = threading.current_thread() is threading.main_thread()
             is_interactive = is_interactive and (hasattr(sys, "ps1") or _in_notebook())
-            return call_interactively(given, args, kwargs) if is_interactive else function(*args, **kwargs)
+            return call_interactively(arguments, args, kwargs) if is_interactive else function(*args, **kwargs)
         except TypeError as error:
             if not isinstance(error, InputError):  # the function did not check this argument
-                for argument, value in given.items():
-                    _require_kind(argument, value, kinds[argument])
+                for argument, value in arguments.items():
+                    _require_kind(argument, value, annotation_of[argument])
             raise
 
-    def call_interactively(given: dict[str, Any], args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
+    def call_interactively(arguments: dict[str, Any], args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
         results: list[Any] = []
-        if "on_result" in kinds and "on_result" not in given:
+        if "on_result" in annotation_of and "on_result" not in arguments:
             kwargs["on_result"] = results.append
-        with _shown_progress(name) as progress, _interrupt_ends_search() as is_interrupted:
-            if "progress" in kinds and "progress" not in given and kinds["progress"].startswith("Callable[[str]"):
+        with _show_progress(name) as progress, _catch_interrupts() as is_interrupted:
+            if "progress" not in arguments and annotation_of.get("progress", "").startswith("Callable[[str]"):
                 kwargs["progress"] = progress
             try:
                 return function(*args, **kwargs)
@@ -130,29 +129,29 @@ class CallableModule(ModuleType):
 def _wrong_call(
     name: str, signature: inspect.Signature, kwargs: dict[str, Any], takes_options: bool, error: TypeError
 ) -> str:
-    known = [argument for argument in signature.parameters if argument not in ("self", "options")]
+    names = [argument for argument in signature.parameters if argument not in ("self", "options")]
     for argument in () if takes_options else kwargs:
-        if argument not in known:
-            word = _ARGUMENT_HINTS.get(argument, "")
-            subject = word.partition("=")[0]
-            applies = bool(word) and (not subject.isidentifier() or subject in known)
-            hint = f": {word}" if applies else suggestion(argument, known)
-            return f"km.{name} has no argument {argument}={hint}; it has {', '.join(known)}"
-    missing = _MISSING_HINTS.get(str(error).rpartition(": ")[2].strip("'"), "")
-    return f"km.{name}: {error}; its arguments are {', '.join(known)}{missing and f': {missing}'}"
+        if argument not in names:
+            replacement = _ARGUMENT_HINTS.get(argument, "")
+            hinted_name = replacement.partition("=")[0]
+            is_applicable = bool(replacement) and (not hinted_name.isidentifier() or hinted_name in names)
+            hint = f": {replacement}" if is_applicable else suggestion(argument, names)
+            return f"km.{name} has no argument {argument}={hint}; it has {', '.join(names)}"
+    advice = _MISSING_HINTS.get(str(error).rpartition(": ")[2].strip("'"), "")
+    return f"km.{name}: {error}; its arguments are {', '.join(names)}{advice and f': {advice}'}"
 
 
 def _require_kind(name: str, value: Any, annotation: str) -> None:
     """Raise InputError for a value that is not the integer, number, truth value or text that `annotation` requires."""
-    plain = annotation.removesuffix(" | None")
-    if (value is None and plain != annotation) or plain not in ("int", "bool", "str", "float"):
+    kind = annotation.removesuffix(" | None")
+    if (value is None and kind != annotation) or kind not in ("int", "bool", "str", "float"):
         return
-    if plain == "int":
+    if kind == "int":
         integer(value, name)
-    elif plain == "float" and not (isinstance(value, int | float) and not isinstance(value, bool)):
+    elif kind == "float" and not (isinstance(value, int | float) and not isinstance(value, bool)):
         raise InputError(f"found {name} = {value!r}, expected a number")
-    elif plain in ("bool", "str") and type(value).__name__ not in (plain, f"{plain}_"):  # bool_ and str_ of numpy
-        expected = "True or False" if plain == "bool" else "a text"
+    elif kind in ("bool", "str") and type(value).__name__ not in (kind, f"{kind}_"):  # bool_ and str_ of numpy
+        expected = "True or False" if kind == "bool" else "a text"
         raise InputError(f"found {name} = {value!r}, expected {expected}")
 
 
@@ -163,7 +162,7 @@ def _in_notebook() -> bool:
 
 
 @contextmanager
-def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
+def _catch_interrupts() -> Iterator[Callable[[], bool]]:
     """Within the block, let Ctrl-C or a notebook's stop button end a search like a time limit, keeping its results.
 
     A second interrupt raises KeyboardInterrupt. An interrupt handler installed by the caller is not replaced.
@@ -186,7 +185,7 @@ def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
 
 
 @contextmanager
-def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
+def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
     """Show the last message below a notebook cell, from two seconds after the start until the block ends."""
     if not _in_notebook():
         yield lambda _: None
@@ -196,12 +195,12 @@ def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
     messages, is_done = [f"{name} ..."], threading.Event()
 
     def show() -> None:
-        if is_done.wait(_BEFORE_PROGRESS):
+        if is_done.wait(_DELAY):
             return
         with suppress(Exception):  # an error of the display must not end the search
-            handle = ipython.display(ipython.HTML(_bar(messages[-1])), display_id=True)
-            while not is_done.wait(_BETWEEN_UPDATES):
-                handle.update(ipython.HTML(_bar(messages[-1])))
+            handle = ipython.display(ipython.HTML(_progress_bar(messages[-1])), display_id=True)
+            while not is_done.wait(_UPDATE_INTERVAL):
+                handle.update(ipython.HTML(_progress_bar(messages[-1])))
             handle.update(ipython.HTML(""))
 
     thread = threading.Thread(target=copy_context().run, args=(show,), daemon=True)
@@ -213,5 +212,7 @@ def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
         thread.join()
 
 
-def _bar(message: str) -> str:
+def _progress_bar(message: str) -> str:
+    from html import escape
+
     return f'<progress style="width: 6em"></progress> <span>{escape(message)}</span>'

@@ -37,27 +37,27 @@ def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
         raise InputError(f"found {seconds} seconds, expected a positive number")
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         raise InputError("found a time limit in another thread or on Windows, expected the main thread: give effort=")
-    over: list[bool] = []
+    expirations: list[bool] = []
 
     def stop(*_: Any) -> None:
-        over.append(True)
+        expirations.append(True)
         raise TimeLimit(f"the time limit of {seconds:g} s is over")
 
     stop.ends_a_time_limit = True  # type: ignore[attr-defined]
-    outer, interval = signal.getitimer(signal.ITIMER_REAL)
+    outer_seconds, interval = signal.getitimer(signal.ITIMER_REAL)
     previous = signal.getsignal(signal.SIGALRM)
-    is_nested = outer > 0 and getattr(previous, "ends_a_time_limit", False)
-    if is_nested and outer <= seconds:  # the enclosing limit expires first
+    is_nested = outer_seconds > 0 and getattr(previous, "ends_a_time_limit", False)
+    if is_nested and outer_seconds <= seconds:  # the enclosing limit expires first
         yield lambda: False
         return
     signal.signal(signal.SIGALRM, stop)
     try:
         # The alarm is repeated, because an exception raised within a callback of a compiler is lost.
         signal.setitimer(signal.ITIMER_REAL, seconds, _REPEAT_SECONDS)
-        yield lambda: bool(over)
+        yield lambda: bool(expirations)
     finally:
         remaining, _ = signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
-        if outer:  # restart the timer that was set before
-            taken = seconds + _REPEAT_SECONDS * len(over) - remaining
-            signal.setitimer(signal.ITIMER_REAL, max(outer - taken * is_nested, 1e-6), interval)
+        if outer_seconds:  # restart the timer that was set before
+            elapsed = seconds + _REPEAT_SECONDS * len(expirations) - remaining
+            signal.setitimer(signal.ITIMER_REAL, max(outer_seconds - elapsed * is_nested, 1e-6), interval)

@@ -98,11 +98,11 @@ def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
     >>> print(missing_name("module 'kahanmaps'", "equilibria", []))
     module 'kahanmaps' has no attribute 'equilibria': type km.fixed_points(system)
     """
-    public = getattr(sys.modules.get("kahanmaps"), "__all__", ())
-    what = HINTS.get(name, f"km.{name}(...)" if name in public else "")
+    public_names = getattr(sys.modules.get("kahanmaps"), "__all__", ())
+    replacement = HINTS.get(name, f"km.{name}(...)" if name in public_names else "")
     hint = (
-        f": {'' if what[0].isupper() else 'type '}{what}"
-        if what
+        f": {'' if replacement[0].isupper() else 'type '}{replacement}"
+        if replacement
         else suggestion(name, sorted(known)) or f"; see {GUIDE}"
     )
     return MissingName(f"{owner} has no attribute {name!r}{hint}")
@@ -116,9 +116,8 @@ class AttributeHints:
     if not TYPE_CHECKING:  # a type checker that sees __getattr__ accepts every attribute
 
         def __getattr__(self, name: str) -> Any:
-            if name[:1] == "_" or (
-                name.startswith("is_") and name not in HINTS
-            ):  # names that Python, NumPy, SymPy and IPython look up by themselves
+            # Python, NumPy, SymPy and IPython look up such names by themselves.
+            if name[:1] == "_" or (name.startswith("is_") and name not in HINTS):
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            known = (other for other in dir(type(self)) if other[0] != "_")
-            raise missing_name(f"{type(self).__name__!r} object", name, [*known, *getattr(self, "__dict__", ())])
+            attributes = (attribute for attribute in dir(type(self)) if attribute[0] != "_")
+            raise missing_name(f"{type(self).__name__!r} object", name, [*attributes, *getattr(self, "__dict__", ())])

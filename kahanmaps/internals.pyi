@@ -23,7 +23,7 @@ from .algebra.work import LEAST_EFFORT as LEAST_EFFORT
 from .algebra.work import MOST_EFFORT as MOST_EFFORT
 from .algebra.work import Budget as Budget
 from .atomic_files import atomic_write as atomic_write
-from .atomic_files import resolved as resolved
+from .atomic_files import resolve_path as resolve_path
 from .atomic_files import write_atomically as write_atomically
 from .certificates.certificate import certificate as certificate
 from .certificates.identities import FalseClaim as FalseClaim
@@ -54,7 +54,7 @@ from .documents.families import FAMILIES as FAMILIES
 from .documents.files import MAX_FILE_BYTES as MAX_FILE_BYTES
 from .documents.files import SystemFile as SystemFile
 from .documents.files import float_normal_form as float_normal_form
-from .documents.files import matched as matched
+from .documents.files import match_variables as match_variables
 from .documents.files import parse_system as parse_system
 from .documents.inline import inline_file as inline_file
 from .documents.iterates import iterates_in as iterates_in
@@ -146,7 +146,6 @@ from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.classical import METHODS as METHODS
 from .maps.floats.classical import MethodEnsemble as MethodEnsemble
-from .maps.floats.commutator import Commutator as Commutator
 from .maps.floats.commutator import commutator as commutator
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float
@@ -205,7 +204,7 @@ from .plots.portraits.portrait import plot_portrait as plot_portrait
 from .plots.portraits.portrait import portrait_of as portrait_of
 from .plots.portraits.trajectories import ensemble_of_file as ensemble_of_file
 from .plots.portraits.trajectories import field_of as field_of
-from .plots.portraits.trajectories import walked as walked
+from .plots.portraits.trajectories import follow_orbits as follow_orbits
 from .plots.portraits.windows import Window as Window
 from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window

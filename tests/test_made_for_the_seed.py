@@ -55,11 +55,11 @@ def test_no_invariant_line_hides_parallel_to_the_line_that_was_drawn_for_another
     # Invariant lines are read off from where a random line meets them; a x + b y = 7 is invariant here.
     directions = []
 
-    def watched(local, start, direction, free, known=affine_functions._determinant_along):
+    def watched(local, start, direction, free, known=affine_functions._interpolate_determinant):
         directions.append(direction)
         return known(local, start, direction, free)
 
-    monkeypatch.setattr(affine_functions, "_determinant_along", watched)
+    monkeypatch.setattr(affine_functions, "_interpolate_determinant", watched)
     a, b = 2, 3
     for _ in range(ROUNDS + 1):
         line, first = f"({a}*x + ({b})*y - 7)", "(y^2 + x + 1)"

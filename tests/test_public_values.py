@@ -51,6 +51,11 @@ def test_maps_are_called_and_composed():
         phi @ 3
 
 
+def test_a_map_is_shown_with_its_eps_if_it_has_one():
+    assert repr(km.map_at("lorenz", eps="1/10")) == "KahanMap(x, y, z; eps=1/10, over QQ)"
+    assert repr(km.map_at("lyness")) == "ElementaryMap(x, y; over QQ)"
+
+
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_systems_maps_and_orbits_are_copied_and_pickled(again):
     for name in ("lorenz", "paper_m3", "lyness", "henon_heiles", "lv(5,1)"):

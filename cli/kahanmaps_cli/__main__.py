@@ -40,10 +40,10 @@ class _MemoryCheck:
 def main() -> int:
     """Run the command line and return its exit status."""
     default_handlers = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
-    handled = [
+    handled_signals = [
         number for number, action in default_handlers.items() if _signal.getsignal(number) == action
     ]  # signals that the parent process does not ignore
-    for number in handled:
+    for number in handled_signals:
         _signal.signal(number, _end)
     import atexit
     import gc
@@ -56,10 +56,10 @@ def main() -> int:
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         sys.meta_path.insert(0, _MemoryCheck())
-    for number in handled:  # at exit Python removes handlers; ignore signals, since the status is known
+    for number in handled_signals:  # at exit Python removes handlers; ignore signals, since the status is known
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
-        for number in handled:
+        for number in handled_signals:
             handle(number, raise_interrupt)
         status = run()
         if status == _INTERRUPTED:
@@ -70,7 +70,7 @@ def main() -> int:
         raise
     finally:
         end_interrupts()
-        for number in handled:
+        for number in handled_signals:
             _signal.signal(number, _end)
 
 

@@ -18,18 +18,18 @@ class SuggestingGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        known = self.list_commands(ctx)
-        if args and args[0] not in known and not args[0].startswith("-") and not ctx.resilient_parsing:
+        names = self.list_commands(ctx)
+        if args and args[0] not in names and not args[0].startswith("-") and not ctx.resilient_parsing:
             if args[0] in self.removed:
                 raise click.UsageError(f"{args[0]} was removed in 0.3.0: {self.removed[args[0]]}.", ctx)
-            raise click.UsageError(f"There is no command {quoted(args[0])}.{self.hint(args[0], known)}", ctx)
+            raise click.UsageError(f"There is no command {quoted(args[0])}.{self.hint(args[0], names)}", ctx)
         return super().resolve_command(ctx, args)
 
-    def hint(self, written: str, known: list[str]) -> str:
+    def hint(self, written: str, names: list[str]) -> str:
         """Return ' Did you mean ...?', or an empty text if no command is similar."""
-        begin = [name for name in known if len(written) > 2 and name.startswith(f"{written}-")]
-        close = begin or close_to(written, known, 0.5)
-        return f" Did you mean {' or '.join(close)}?" if close else ""
+        extensions = [name for name in names if len(written) > 2 and name.startswith(f"{written}-")]
+        similar_names = extensions or similar_words_of(written, names, 0.5)
+        return f" Did you mean {' or '.join(similar_names)}?" if similar_names else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands with complete first sentences, which click would cut."""
@@ -43,13 +43,13 @@ class SuggestingGroup(click.Group):
             formatter.write_dl(rows)
 
 
-def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Return up to three words of `known`: the word most similar to `written`, and words nearly as similar."""
+def similar_words_of(written: str, words: list[str], cutoff: float = 0.6) -> list[str]:
+    """Return up to three words of `words`: the word most similar to `written`, and words nearly as similar."""
     from difflib import SequenceMatcher, get_close_matches
 
-    close = get_close_matches(written, known, n=3, cutoff=cutoff)
-    ratios = [SequenceMatcher(None, word, written).ratio() for word in close]
-    return [word for word, ratio in zip(close, ratios, strict=True) if ratio > ratios[0] - 0.15]
+    similar_words = get_close_matches(written, words, n=3, cutoff=cutoff)
+    ratios = [SequenceMatcher(None, candidate, written).ratio() for candidate in similar_words]
+    return [candidate for candidate, ratio in zip(similar_words, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
 # removed option as (command, option) -> what to use instead
@@ -69,13 +69,13 @@ REMOVED_OPTIONS = {
 }
 
 
-def rephrased(error: click.ClickException) -> click.ClickException:
+def rephrase(error: click.ClickException) -> click.ClickException:
     """Return an error of click in the form "found X, expected Y", with a suggestion for a misspelt choice."""
     if isinstance(error, click.NoSuchOption) and error.ctx is not None:
         command = error.ctx.command_path.removeprefix("kahanmaps ")
-        instead = REMOVED_OPTIONS.get((command, error.option_name))
-        if instead is not None:
-            return click.UsageError(f"{error.option_name} was removed in 0.3.0: {instead}.", error.ctx)
+        replacement = REMOVED_OPTIONS.get((command, error.option_name))
+        if replacement is not None:
+            return click.UsageError(f"{error.option_name} was removed in 0.3.0: {replacement}.", error.ctx)
         return error
     if not isinstance(error, click.BadParameter) or error.param is None:
         return error
@@ -89,8 +89,8 @@ def rephrased(error: click.ClickException) -> click.ClickException:
     elif match := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
         message = f"found {match[1][:40]}, expected {match[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
     elif isinstance(error.param.type, click.Choice) and (match := re.match(r"'([^']*)' is not one of ", message)):
-        close = close_to(match[1].lower(), [str(choice) for choice in error.param.type.choices])
-        message += f" Did you mean {' or '.join(close)}?" if close else ""
+        similar_choices = similar_words_of(match[1].lower(), [str(choice) for choice in error.param.type.choices])
+        message += f" Did you mean {' or '.join(similar_choices)}?" if similar_choices else ""
     if message == error.message:
         return error
     return click.BadParameter(message, error.ctx, error.param, error.param_hint)

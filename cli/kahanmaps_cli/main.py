@@ -18,7 +18,7 @@ import click
 from kahanmaps.checks.table import CHECKS
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps.hard_stop import TimeLimit
-from kahanmaps_cli.groups import SuggestingGroup, rephrased
+from kahanmaps_cli.groups import SuggestingGroup, rephrase
 from kahanmaps_cli.params import HELP_OPTIONS, with_common_rules
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
 from kahanmaps_cli.screen.streams import discard_unwritable_output, output_was_lost, prepare_standard_streams
@@ -28,7 +28,7 @@ from kahanmaps_cli.signals import INTERRUPTED, end_interrupts
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL = 0, 1, 2, 3, 70
+SUCCESS, REFUTED, USAGE_ERROR, UNDECIDED, INTERNAL_ERROR = 0, 1, 2, 3, 70
 
 COMPLETION = "_KAHANMAPS_COMPLETE"  # environment variable, set by the shell to request completions
 
@@ -119,14 +119,14 @@ class LazyGroup(SuggestingGroup):
         command: click.Command = module.command(cmd_name) if cmd_name in CHECKS else module.command
         return with_common_rules(command)
 
-    def hint(self, written: str, known: list[str]) -> str:
+    def hint(self, written: str, command_names: list[str]) -> str:
         from kahanmaps.documents.catalog import names
 
         if written in names() or written.endswith(".toml"):
             return f" To see what the map of {written} preserves: {as_typed(['kahanmaps', 'analyze', written])}"
         if written == "help":
             return " For help: kahanmaps --help, or kahanmaps COMMAND --help."
-        return super().hint(written, known)
+        return super().hint(written, command_names)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         from click.shell_completion import CompletionItem
@@ -183,22 +183,22 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise click.UsageError("found a zero byte in an argument, expected text without one")
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
         sys.stdout.flush()
-        status = result if isinstance(result, int) else HOLDS
-        if status == HOLDS and output_was_lost():
+        status = result if isinstance(result, int) else SUCCESS
+        if status == SUCCESS and output_was_lost():
             print_stderr("Error: standard output is closed and the output is lost: redirect it with >, or give -o FILE")
             return UNDECIDED
         return status
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:
-        shown = io.StringIO()
-        rephrased(error).show(shown)
-        print_stderr(bounded(shown.getvalue().removesuffix("\n")))
-        return WRONG_USE
+        message = io.StringIO()
+        rephrase(error).show(message)
+        print_stderr(bounded(message.getvalue().removesuffix("\n")))
+        return USAGE_ERROR
     except (click.Abort, KeyboardInterrupt) as stop:  # click turns KeyboardInterrupt into Abort
-        return _interrupted(stop.__cause__ or stop)
+        return _report_interrupt(stop.__cause__ or stop)
     except SystemExit as stop:  # raised by click: 0 after a completion, 1 after a broken pipe
-        return UNDECIDED if stop.code else HOLDS
+        return UNDECIDED if stop.code else SUCCESS
     except BrokenPipeError:
         return UNDECIDED
     except Exception as error:
@@ -207,31 +207,31 @@ def main(argv: Sequence[str] | None = None) -> int:
         while cause is not None and not isinstance(cause, KeyboardInterrupt):
             cause = cause.__cause__ or cause.__context__
         if cause is not None:
-            return _interrupted(cause)
-        return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # completion prints nothing
+            return _report_interrupt(cause)
+        return INTERNAL_ERROR if os.environ.get(COMPLETION) else _report_error(error)  # completion prints nothing
     finally:
         discard_unwritable_output()
 
 
-def _interrupted(stop: BaseException) -> int:
+def _report_interrupt(stop: BaseException) -> int:
     end_interrupts()
     is_over = isinstance(stop, TimeLimit)  # --seconds expired at the very end of a search
     print_stderr(f"stopped: {stop} (--seconds)" if is_over else "interrupted")
     return UNDECIDED if is_over else INTERRUPTED
 
 
-def _report(error: Exception) -> int:
+def _report_error(error: Exception) -> int:
     if os.environ.get("KAHANMAPS_DEBUG"):
         import traceback
 
         traceback.print_exc()
     if isinstance(error, KahanmapsError):
         print_stderr(f"Error: {error}")
-        return WRONG_USE if isinstance(error, InputError) else UNDECIDED
+        return USAGE_ERROR if isinstance(error, InputError) else UNDECIDED
     if is_out_of_memory(error):
-        why = f" ({error})" if str(error) else ""
+        detail = f" ({error})" if str(error) else ""
         remedy = "reduce the number of steps or --max-digits, or allow more memory (ulimit -v)"
-        print_stderr(bounded(f"Error: out of memory{why}: {remedy}"))
+        print_stderr(bounded(f"Error: out of memory{detail}: {remedy}"))
         return UNDECIDED
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
@@ -239,7 +239,7 @@ def _report(error: Exception) -> int:
         is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
         hint = f" (there is no folder {folder}: create it, or check the name)" if is_missing else ""
         print_stderr(bounded(f"Error: {error.strerror or error}{where}{hint}"))
-        return UNDECIDED if is_of_the_machine(error) else WRONG_USE
+        return UNDECIDED if is_of_the_machine(error) else USAGE_ERROR
     if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
         print_stderr(bounded(f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again"))
         return UNDECIDED
@@ -247,7 +247,7 @@ def _report(error: Exception) -> int:
     sources = " and ".join(getattr(error, "__notes__", ()))
     cause = f"Either {sources}, which was being read, is damaged, or this" if sources else "This"
     print_stderr(bounded(f"{cause} is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."))
-    return INTERNAL
+    return INTERNAL_ERROR
 
 
 if __name__ == "__main__":

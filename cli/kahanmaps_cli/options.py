@@ -12,7 +12,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
-from kahanmaps_cli.groups import close_to
+from kahanmaps_cli.groups import similar_words_of
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
 from kahanmaps_cli.screen.progress import print_stderr
 
@@ -49,19 +49,19 @@ system_argument: Callable[[F], F] = click.argument("system", required=False, she
 
 def _split_pairs(ctx: click.Context, param: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
     """Split the values of all -p into pairs NAME=VALUE: one -p may set several parameters, as in -p a=1,b=2."""
-    split = []
+    settings = []
     for name, value in pairs:
-        head, *more = value.split(",")
-        for piece in more:
+        text, *pieces = value.split(",")
+        for piece in pieces:
             if "=" in piece:
-                split.append((name, head.strip()))
-                name, head = (side.strip() for side in piece.split("=", 1))
+                settings.append((name, text.strip()))
+                name, text = (side.strip() for side in piece.split("=", 1))
             else:
-                head += f",{piece}"
-        split.append((name, head.strip()))
-    if not all(value and name.isprintable() for name, value in split):
+                text += f",{piece}"
+        settings.append((name, text.strip()))
+    if not all(value and name.isprintable() for name, value in settings):
         raise click.BadParameter("found a name without a value, expected NAME=VALUE", ctx, param)
-    return tuple(split)
+    return tuple(settings)
 
 
 parameter_option: Callable[[F], F] = click.option(
@@ -226,9 +226,9 @@ check_options: Callable[[F], F] = stack(
 )
 
 
-def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, Any]:
-    """Return the values of options as keyword arguments; `given(options, "seed", terms="max")` renames max to terms."""
-    return {name: options[name] for name in names} | {other: options[name] for other, name in others.items()}
+def pick(options: Mapping[str, Any], *names: str, **renamed: str) -> dict[str, Any]:
+    """Return the values of options as keyword arguments; `pick(options, "seed", terms="max")` renames max to terms."""
+    return {name: options[name] for name in names} | {argument: options[name] for argument, name in renamed.items()}
 
 
 def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
@@ -271,25 +271,29 @@ def load_pair(
     reference: str | None, other: str | None, options: Mapping[str, Any]
 ) -> tuple[lib.SystemFile, lib.SystemFile | None]:
     """Load one or two systems; -p sets a parameter in each system that has it."""
-    given = dict(options.get("parameters", ()))
-    if other is None or not given:
+    values = dict(options.get("parameters", ()))
+    if other is None or not values:
         without_parameters = {"quiet": options.get("quiet")}
         return load_system(reference, options), None if other is None else load_system(other, without_parameters)
     if other == "-":  # standard input can be read only once
         raise click.UsageError("-p with OTHER on standard input is ambiguous: write OTHER to a file")
-    named = [
-        set(given) if are_equations(other_system) else set(_loaded(other_system, {}).document.get("parameters", ()))
-        for other_system in (other, *([] if reference in (None, "-") else [reference]))
-    ]
-    of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
-    if len(named) == 1:  # the first system is inline or on standard input: its parameters are not known yet
-        of_first = options["parameters"]
-    of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
-    shared = [name for name, _ in of_second if (name, given[name]) in of_first]
-    if shared and not options.get("quiet"):
-        print_stderr(f"-p {', '.join(shared)}: set in both systems")
-    second = {"parameters": of_second, "quiet": options.get("quiet")}
-    return load_system(reference, {**options, "parameters": of_first}), load_system(other, second)
+
+    def parameter_names(system: str) -> set[str]:
+        if are_equations(system):
+            return set(values)
+        return set(_load_without_notes(system, {}).document.get("parameters", ()))
+
+    first_parameters, second_names = options["parameters"], parameter_names(other)
+    second_parameters = [pair for pair in options["parameters"] if pair[0] in second_names]
+    # If the first system is inline or on standard input, its parameters are not known yet.
+    if reference is not None and reference != "-":
+        first_names = parameter_names(reference)
+        first_parameters = [pair for pair in first_parameters if pair[0] not in second_names or pair[0] in first_names]
+    shared_names = [name for name, _ in second_parameters if (name, values[name]) in first_parameters]
+    if shared_names and not options.get("quiet"):
+        print_stderr(f"-p {', '.join(shared_names)}: set in both systems")
+    second_options = {"parameters": second_parameters, "quiet": options.get("quiet")}
+    return load_system(reference, {**options, "parameters": first_parameters}), load_system(other, second_options)
 
 
 def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
@@ -297,31 +301,31 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.System
 
     Unless `quiet`, notes on how equations were interpreted are printed on standard error.
     """
-    file = _loaded(reference, options)
+    file = _load_without_notes(reference, options)
     if not options.get("quiet"):
         for note in file.notes:
             print_stderr(note)
     return file
 
 
-def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
+def _load_without_notes(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
     variables, rhs = options.get("variables"), options.get("rhs", ())
     image, inverse = options.get("image", ()), options.get("inverse", ())
     parameters: Sequence[tuple[str, str]] = options.get("parameters", ())
-    given = dict(parameters)
+    values = dict(parameters)
     if are_equations(reference) and not (variables or rhs or image or inverse):
         reference, rhs = None, (str(reference),)
-    if len(given) < len(parameters):
+    if len(values) < len(parameters):
         repeated = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
         raise click.UsageError(f"found -p {repeated}=... twice, expected one value for each parameter")
     if image or inverse:
         if reference is not None or rhs:
-            other = "--rhs" if rhs else f"a SYSTEM ({reference})"
-            raise click.UsageError(f"give {other} or a map (--image), not both")
+            conflict = "--rhs" if rhs else f"a SYSTEM ({reference})"
+            raise click.UsageError(f"give {conflict} or a map (--image), not both")
         if variables is None or not image:
             raise click.UsageError("an inline map needs --vars X,Y,... and one --image EXPR for each variable")
-        section = {"image": _list(image), **({"inverse": _list(inverse)} if inverse else {})}
-        return lib.parse_system(lib.inline_file(variables, given, "map", section), "inline")
+        section = {"image": _split_components(image), **({"inverse": _split_components(inverse)} if inverse else {})}
+        return lib.parse_system(lib.inline_file(variables, values, "map", section), "inline")
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
@@ -331,7 +335,7 @@ def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile
                 "or --rhs \"x' = x*y; y' = -x\""
             )
         return lib.parse_system(
-            lib.inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
+            lib.inline_file(variables, values, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
             "inline",
         )
     if reference is None:
@@ -344,12 +348,12 @@ def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile
         if not text.strip():
             raise lib.InputError("found nothing on standard input, expected a system file")
         with lib.reading("standard input"):
-            return lib.parse_system(text, "standard input", given)
-    return load_reference(reference, given)
+            return lib.parse_system(text, "standard input", values)
+    return load_reference(reference, values)
 
 
 def load_with_start(
-    options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *references: str | None
+    options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *arguments: str | None
 ) -> tuple[Any, Any]:
     """Load one or two systems and the initial point, which may contain parameters.
 
@@ -358,23 +362,25 @@ def load_with_start(
     text = options["start"]
     if not isinstance(text, str):
         return load(options), text
-    words = set(re.findall(r"[A-Za-z_]\w*", text))
-    roots = {name: lib.parse_root(value) for name, value in options["parameters"] if name in words}
+    names = set(re.findall(r"[A-Za-z_]\w*", text))
+    roots = {name: lib.parse_root(value) for name, value in options["parameters"] if name in names}
     parameter_names = set[str]()
-    for other_system in references:
-        if other_system is not None and other_system != "-" and not are_equations(other_system):
-            parameter_names |= set(_loaded(other_system, {}).document.get("parameters", ()))
-    inline = " ".join([*map(str, filter(are_equations, references)), *options["rhs"], *options["image"]])
+    for argument in arguments:
+        if argument is not None and argument != "-" and not are_equations(argument):
+            parameter_names |= set(_load_without_notes(argument, {}).document.get("parameters", ()))
+    inline_text = " ".join([*map(str, filter(are_equations, arguments)), *options["rhs"], *options["image"]])
     # The parameters of a system on standard input are not known yet.
-    parameter_names |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
-    of_start = {name: root for name, root in roots.items() if root is not None and name not in parameter_names}
-    loaded = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
+    parameter_names |= {name for name in roots if "-" in arguments or re.search(rf"\b{name}\b", inline_text)}
+    start_roots = {name: root for name, root in roots.items() if root is not None and name not in parameter_names}
+    loaded_files = load(
+        {**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in start_roots]}
+    )
     constants = dict[str, Any]()
-    for file in loaded if isinstance(loaded, tuple) else (loaded,):
+    for file in loaded_files if isinstance(loaded_files, tuple) else (loaded_files,):
         if file is not None:
             constants |= file.parameters
-            of_start |= dict.fromkeys(file.claim_names[file.dim : -1], file.map.root)
-    return loaded, lib.parse_algebraic_point(text, of_start, constants)
+            start_roots |= dict.fromkeys(file.claim_names[file.dim : -1], file.map.root)
+    return loaded_files, lib.parse_algebraic_point(text, start_roots, constants)
 
 
 def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
@@ -382,22 +388,22 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
     try:
         return lib.load(reference, parameters)
     except lib.InputError as error:
-        looks_like_a_path = reference.endswith((".toml", ".ode")) or os.sep in reference
-        if not looks_like_a_path or os.path.lexists(reference):
+        is_path = reference.endswith((".toml", ".ode")) or os.sep in reference
+        if not is_path or os.path.lexists(reference):
             raise
         folder, name = os.path.split(reference)
         try:
             toml_files = sorted(
-                other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml")
+                path.removesuffix(".toml") for path in os.listdir(folder or ".") if path.endswith(".toml")
             )
-            close = close_to(name.removesuffix(".toml"), toml_files)
-            hint = f", did you mean {' or '.join(os.path.join(folder, f'{like}.toml') for like in close)}?"
+            similar = similar_words_of(name.removesuffix(".toml"), toml_files)
+            hint = f", did you mean {' or '.join(os.path.join(folder, f'{match}.toml') for match in similar)}?"
         except OSError:
-            close, hint = [folder], f" (there is no folder {folder})"
-        raise lib.InputError(f"{error}{hint if close else ''}") from error
+            similar, hint = [folder], f" (there is no folder {folder})"
+        raise lib.InputError(f"{error}{hint if similar else ''}") from error
 
 
-def _list(texts: Sequence[str]) -> list[str]:
+def _split_components(texts: Sequence[str]) -> list[str]:
     return [part.strip() for text in texts for part in text.split(";")]
 
 

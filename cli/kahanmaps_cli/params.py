@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps import internals as lib
+import kahanmaps.internals as lib  # `from kahanmaps import` would first look for a public name and suggest others
 from kahanmaps.errors import ExpressionError, InputError, quoted
 from kahanmaps_cli.screen.terminal import color_option
 
@@ -143,15 +143,15 @@ def ShortInteger() -> ParameterKind:
     return ParameterKind("integer", read)
 
 
-def Whole(least: int = 0) -> ParameterKind:
-    """Return the type of integers that are at least `least`."""
+def Whole(minimum: int = 0) -> ParameterKind:
+    """Return the type of integers that are at least `minimum`."""
 
     def read(text: str) -> int:
         text = _without_exponent(text.strip())
         digits = text.removeprefix("-").removeprefix("+")
         # Python's limit on digits would raise another error.
-        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
-            raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
+        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= minimum):
+            raise InputError(f"found {quoted(text)}, expected an integer, {minimum} or more")
         return int(text)
 
     return ParameterKind("integer", read)
@@ -183,26 +183,25 @@ def _without_exponent(text: str) -> str:
     match = _WITH_EXPONENT.fullmatch(text)
     if match is None:
         return text
-    integer, part, exponent = match[1], match[2] or "", int(match[3])
-    return integer + part.ljust(exponent, "0") if len(part) <= exponent else text
-
-
-def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -> list[str]:
-    """Refuse an option with one value that is given twice: click would silently drop the first value."""
-    _, _, order = command.make_parser(ctx).parse_args(args=list(args))
-    for option in order:
-        takes_one = isinstance(option, click.Option) and not (option.multiple or option.count or option.is_flag)
-        if takes_one and not ctx.resilient_parsing and order.count(option) > 1:
-            raise click.UsageError(f"{option.opts[-1]} is given {order.count(option)} times, expected once", ctx)
-    return args
+    integer, decimals, exponent = match[1], match[2] or "", int(match[3])
+    return integer + decimals.ljust(exponent, "0") if len(decimals) <= exponent else text
 
 
 @cache  # the rules must be applied to a command only once
 def with_common_rules(command: click.Command) -> click.Command:
     """Give a command and its subcommands --color and integers of bounded length; refuse options given twice."""
     parse_args = command.parse_args
-    # click has no hook for this check
-    command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
+
+    def parse_once(ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse an option with one value that is given twice: click would silently drop the first value."""
+        _, _, order = command.make_parser(ctx).parse_args(args=list(args))
+        for option in order:
+            takes_one = isinstance(option, click.Option) and not (option.multiple or option.count or option.is_flag)
+            if takes_one and not ctx.resilient_parsing and order.count(option) > 1:
+                raise click.UsageError(f"{option.opts[-1]} is given {order.count(option)} times, expected once", ctx)
+        return parse_args(ctx, args)
+
+    command.parse_args = parse_once  # type: ignore[method-assign]  # click has no hook for this check
     # click copies the help option from the context in which it is first used, which need not be the context of the
     # group.
     command.context_settings.setdefault("help_option_names", HELP_OPTIONS)

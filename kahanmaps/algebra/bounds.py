@@ -40,8 +40,8 @@ class CoefficientSize:
         return CoefficientSize(self.degree + other.degree, self.bits + other.bits)
 
     def __add__(self, other: CoefficientSize) -> CoefficientSize:
-        low, high = sorted((self.bits, other.bits))
-        bits = high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9
+        min_bits, max_bits = sorted((self.bits, other.bits))
+        bits = max_bits + math.log2(1 + 2 ** (min_bits - max_bits)) if max_bits - min_bits < 200 else max_bits + 1e-9
         return CoefficientSize(max(self.degree, other.degree), bits)
 
     def __pow__(self, exponent: int) -> CoefficientSize:
@@ -62,11 +62,11 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
         A bound for all polynomials that vanish if and only if the pairs are equal, and the degree of the product of
         all polynomials that must not be zero: the divisors, and the elements compared with zero.
     """
-    equation = ONE
+    bound = ONE
     for pair in pairs:
         left, right = (side.entry if isinstance(side, BoundMatrix) else field.convert(side) for side in pair)
-        equation = equation | (left - right).numerator
-    return equation, field.pole_degree
+        bound = bound | (left - right).numerator
+    return bound, field.pole_degree
 
 
 class BoundField(Field):
@@ -108,14 +108,11 @@ class BoundField(Field):
         if isinstance(owner, Bound) and owner.is_common:
             self._denominators.append(size)
             return len(self._denominators) - 1
-        entry = self._index_by_id.get(id(owner))
-        if entry is None:
-            entry = self._index_by_id[id(owner)] = (
-                owner,
-                len(self._denominators),
-            )  # storing the owner keeps its id unique
+        owner_and_index = self._index_by_id.get(id(owner))
+        if owner_and_index is None:
+            owner_and_index = self._index_by_id[id(owner)] = owner, len(self._denominators)  # keeps the id unique
             self._denominators.append(size)
-        return entry[1]
+        return owner_and_index[1]
 
     def product(self, powers: Mapping[int, int]) -> CoefficientSize:
         """Return the size of a product of denominators."""
@@ -146,13 +143,13 @@ class BoundField(Field):
         """Return the matrix whose entries all have the common bound of these entries."""
         # Most entries are the same object, so remove duplicates first.
         elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
-        scale, denominator = 1, dict[int, int]()
+        scale, exponents = 1, dict[int, int]()
         for element in elements:
-            scale, denominator = math.lcm(scale, element.scale), _lcm(denominator, element.denominator)
+            scale, exponents = (math.lcm(scale, element.scale), _lcm_exponents(exponents, element.denominator))
         numerator = ONE
         for element in elements:
-            numerator = numerator | element.over(scale, denominator)
-        return BoundMatrix(self, rows, columns, Bound(self, numerator, scale, denominator))
+            numerator = numerator | element.over(scale, exponents)
+        return BoundMatrix(self, rows, columns, Bound(self, numerator, scale, exponents))
 
     def is_zero(self, element: Any) -> bool:
         """Return False: an element compared with zero is assumed nonzero, and its numerator counts as a divisor."""
@@ -181,31 +178,31 @@ class Bound(Element):
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
         """Return the size of the numerator over a larger denominator, a multiple of the present one."""
-        missing = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
-        return self.numerator * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
+        missing_exponents = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
+        return self.numerator * self.field.product(missing_exponents) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
     def pole_degree(self) -> int:
         """The degree of the denominator."""
         return int(self.field.product(self.denominator).degree)
 
-    def _plus(self, other: Bound) -> Bound:
-        scale, denominator = math.lcm(self.scale, other.scale), _lcm(self.denominator, other.denominator)
+    def _add(self, other: Bound) -> Bound:
+        scale, denominator = math.lcm(self.scale, other.scale), _lcm_exponents(self.denominator, other.denominator)
         return Bound(self.field, self.over(scale, denominator) + other.over(scale, denominator), scale, denominator)
 
     def __neg__(self) -> Bound:
         return self
 
-    def _times(self, other: Bound) -> Bound:
-        denominator = _product(self.denominator, other.denominator)
+    def _multiply(self, other: Bound) -> Bound:
+        denominator = _product_exponents(self.denominator, other.denominator)
         return Bound(self.field, self.numerator * other.numerator, self.scale * other.scale, denominator)
 
-    def _over(self, other: Bound) -> Bound:
+    def _divide(self, other: Bound) -> Bound:
         index = self.field.denominator(other, other.numerator)
         numerator = self.numerator * self.field.product(other.denominator) * CoefficientSize(0, log2(other.scale))
-        return Bound(self.field, numerator, self.scale, _product(self.denominator, {index: 1}))
+        return Bound(self.field, numerator, self.scale, _product_exponents(self.denominator, {index: 1}))
 
-    def _same(self, other: Bound) -> bool:
+    def _equals(self, other: Bound) -> bool:
         return self is other
 
 
@@ -227,7 +224,7 @@ class BoundMatrix:
     def entries(self) -> list[Bound]:
         return [self.entry] * (self._rows * self._columns)
 
-    def __getitem__(self, place: tuple[int, int]) -> Bound:
+    def __getitem__(self, position: tuple[int, int]) -> Bound:
         return self.entry
 
     def transpose(self) -> BoundMatrix:
@@ -257,17 +254,17 @@ class BoundMatrix:
         """Bound the determinant: n! products of n entries."""
         n, entry = self._rows, self.entry
         denominator = {index: n * power for index, power in entry.denominator.items()}
-        return Bound(self.field, self._minor(n), entry.scale**n, denominator)
+        return Bound(self.field, self._minor_bound(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
         """Bound the solution by Cramer's rule: for a matrix N/d the solution is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
-        index = self.field.denominator(self, self._minor(n))
+        index = self.field.denominator(self, self._minor_bound(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
-        inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {index: 1})
-        return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
+        inverse_bound = Bound(self.field, self._minor_bound(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {index: 1})
+        return BoundMatrix(self.field, n, right._columns, inverse_bound * right.entry)
 
-    def _minor(self, size: int) -> CoefficientSize:
+    def _minor_bound(self, size: int) -> CoefficientSize:
         return self.entry.numerator**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
 
 
@@ -284,11 +281,11 @@ def log2(value: fmpz | int) -> float:
     return math.log2((number >> shift) + (1 if shift else 0)) + shift + 1e-9
 
 
-def _lcm(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+def _lcm_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
     """Return the least common multiple of two products of powers of denominators, as exponents by denominator."""
     return {index: max(left.get(index, 0), right.get(index, 0)) for index in {*left, *right}}
 
 
-def _product(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+def _product_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
     """Return the product of two products of powers of denominators, as exponents by denominator."""
     return {index: left.get(index, 0) + right.get(index, 0) for index in {*left, *right}}

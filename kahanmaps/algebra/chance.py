@@ -21,16 +21,16 @@ from kahanmaps.algebra.polynomials import RationalFunction
 PRIME_BITS = 62
 
 
-def derive_seed(seed: int, *subject: Any) -> int:
-    """Derive a seed of 256 bits from the user's seed and the `subject` of a random test.
+def derive_seed(seed: int, *data: Any) -> int:
+    """Derive a seed of 256 bits from the user's seed and the claim that a random test examines.
 
     Args:
         seed: the seed that the user chose.
-        subject: data that determine the claim: text, integers, fmpq, None, fmpq_mpoly, RationalFunction, fmpq_mat,
+        data: what determines the claim: text, integers, fmpq, None, fmpq_mpoly, RationalFunction, fmpq_mat,
             lists of these.
 
     Returns:
-        An integer, the SHA-256 hash of the seed and the subject.
+        An integer, the SHA-256 hash of the seed and the data.
 
     Raises:
         TypeError: for data of another type, whose text might not determine the value.
@@ -44,25 +44,25 @@ def derive_seed(seed: int, *subject: Any) -> int:
     """
     from hashlib import sha256  # imported here, since loading takes milliseconds and a single orbit needs no hash
 
-    return int.from_bytes(sha256(_encode((seed, *subject)).encode()).digest(), "big")
+    return int.from_bytes(sha256(_encode((seed, *data)).encode()).digest(), "big")
 
 
-def _encode(part: Any) -> str:
-    """Return text that differs for different data; each part starts with its length, so that parts cannot merge."""
-    if isinstance(part, int):
-        part = fmpz(part)  # str() of a Python int is limited to 4300 digits
-    if part is None or isinstance(part, str | fmpz | fmpq):
-        text = f"{type(part).__name__} {part}"
-    elif isinstance(part, fmpq_mpoly):
-        text = f"{' '.join(part.context().names())}: {part}"
-    elif isinstance(part, RationalFunction):
-        text = _encode((part.numerator, part.denominator))
-    elif isinstance(part, fmpq_mat):
-        text = f"{part.nrows()} {part.ncols()} {part.entries()}"
-    elif isinstance(part, Sequence):
-        text = "".join(_encode(piece) for piece in part)
+def _encode(value: Any) -> str:
+    """Return text that differs for different values; the length of each entry precedes it: entries cannot merge."""
+    if isinstance(value, int):
+        value = fmpz(value)  # str() of a Python int is limited to 4300 digits
+    if value is None or isinstance(value, str | fmpz | fmpq):
+        text = f"{type(value).__name__} {value}"
+    elif isinstance(value, fmpq_mpoly):
+        text = f"{' '.join(value.context().names())}: {value}"
+    elif isinstance(value, RationalFunction):
+        text = _encode((value.numerator, value.denominator))
+    elif isinstance(value, fmpq_mat):
+        text = f"{value.nrows()} {value.ncols()} {value.entries()}"
+    elif isinstance(value, Sequence):
+        text = "".join(_encode(entry) for entry in value)
     else:
-        raise TypeError(f"found a {type(part).__name__}, expected text, numbers, polynomials, matrices or sequences")
+        raise TypeError(f"found a {type(value).__name__}, expected text, numbers, polynomials, matrices or sequences")
     return f"{len(text)} {text}"
 
 

@@ -97,22 +97,22 @@ class Dual(Element):
         self.value = value
         self.slope = slope
 
-    def _plus(self, other: Dual) -> Dual:
+    def _add(self, other: Dual) -> Dual:
         return Dual(self.field, self.value + other.value, self.slope + other.slope)
 
     def __neg__(self) -> Dual:
         return Dual(self.field, -self.value, -self.slope)
 
-    def _times(self, other: Dual) -> Dual:
+    def _multiply(self, other: Dual) -> Dual:
         return Dual(self.field, self.value * other.value, self.value * other.slope + self.slope * other.value)
 
-    def _over(self, other: Dual) -> Dual:
+    def _divide(self, other: Dual) -> Dual:
         if self.field.base.is_zero(other.value):  # balls of FLINT divide by zero without an error
             raise ZeroDivisionError("division by a dual number with value 0")
         value = self.value / other.value
         return Dual(self.field, value, (self.slope - value * other.slope) / other.value)
 
-    def _same(self, other: Dual) -> bool:
+    def _equals(self, other: Dual) -> bool:
         return bool(self.value == other.value and self.slope == other.slope)
 
 
@@ -140,8 +140,8 @@ class DualMatrix:
         entries, columns = self.entries(), self.ncols()
         return [entries[i * columns : (i + 1) * columns] for i in range(self.nrows())]
 
-    def __getitem__(self, place: tuple[int, int]) -> Dual:
-        return Dual(self.field, self.value[place], self.slope[place])
+    def __getitem__(self, position: tuple[int, int]) -> Dual:
+        return Dual(self.field, self.value[position], self.slope[position])
 
     def transpose(self) -> DualMatrix:
         return DualMatrix(self.field, self.value.transpose(), self.slope.transpose())
@@ -179,18 +179,18 @@ class DualMatrix:
         if isinstance(self.value, EntryMatrix):  # solving is slower than computing more determinants here
             return Dual(self.field, value, self._slope_of_det())
         try:
-            ratio = solve(self.value, self.slope)
+            quotient = solve(self.value, self.slope)
         except (SingularMatrix, PrecisionLost):
             return Dual(self.field, value, self._slope_of_det())
-        return Dual(self.field, value, value * trace(ratio))
+        return Dual(self.field, value, value * trace(quotient))
 
     def _slope_of_det(self) -> Any:
         """Return the sum over all j of det M0 with column j replaced by column j of M1; valid for every M0."""
         n, total = self.nrows(), self.field.base.zero
         value, slope = self.value.entries(), self.slope.entries()
         for k in range(n):
-            replaced = [slope[i] if i % n == k else value[i] for i in range(n * n)]
-            total = total + self.field.base.matrix(n, n, replaced).det()
+            entries = [slope[i] if i % n == k else value[i] for i in range(n * n)]
+            total = total + self.field.base.matrix(n, n, entries).det()
         return total
 
     def solve(self, right: DualMatrix) -> DualMatrix:

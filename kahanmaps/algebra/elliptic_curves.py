@@ -21,7 +21,7 @@ _ACCURACY = 1e-15  # requested accuracy of rotation numbers and heights
 _HEIGHT_TERMS = 40  # terms of the series for a height; they decrease like 4^-n
 _EXACT_TERMS = 4
 _MAX_TORSION = 12  # the largest order of a rational torsion point (mazur-1977)
-_SMOOTH_BITS = 20  # maximal size of the primes by which the coefficients of a model are reduced
+_MAX_PRIME_BITS = 20  # maximal size of the primes by which the coefficients of a model are reduced
 
 
 class EllipticCurve:
@@ -86,22 +86,22 @@ class EllipticCurve:
 
         A and B are minimal unless they have common powers of large primes.
         """
-        third = self.a2 / 3
-        A, B, x, y = self.a4 - self.a2 * third, (2 * third * third - self.a4) * third + self.a6, P[0] + third, P[1]
+        shift = self.a2 / 3
+        A, B, x, y = self.a4 - self.a2 * shift, (2 * shift * shift - self.a4) * shift + self.a6, P[0] + shift, P[1]
         u = A.q.lcm(B.q)
         A, B, scale = A * u**4, B * u**6, fmpq(u)
-        common = (A.p**3).gcd(B.p**2)
-        for factor in _candidates(common):
+        gcd = (A.p**3).gcd(B.p**2)
+        for factor in _candidate_factors(gcd):
             while A.p % factor**4 == 0 and B.p % factor**6 == 0:
                 A, B, scale = A / factor**4, B / factor**6, scale / factor
         return EllipticCurve(fmpq(0), A, B), (x * scale**2, y * scale**3)
 
 
-def _candidates(number: fmpz) -> list[fmpz]:
+def _candidate_factors(number: fmpz) -> list[fmpz]:
     """Return the small prime factors of a number, its cofactor, and the roots of the cofactor, each greater than 1."""
     if number == 0:
         return []
-    factors = [abs(factor) for factor, _ in number.factor_smooth(_SMOOTH_BITS)]
+    factors = [abs(factor) for factor, _ in number.factor_smooth(_MAX_PRIME_BITS)]
     roots = [factor.root(k) for factor in factors for k in (12, 6, 4, 3, 2, 1)]
     return [root for root in roots if root > 1]
 
@@ -130,7 +130,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     '0.02490419865'
     """
     d = fmpq(curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q))
-    for factor in _candidates((curve.a2 * d**2).p.gcd((curve.a4 * d**4).p).gcd((curve.a6 * d**6).p)):
+    for factor in _candidate_factors((curve.a2 * d**2).p.gcd((curve.a4 * d**4).p).gcd((curve.a6 * d**6).p)):
         while all((a * (d / factor) ** k).q == 1 for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6))):
             d /= factor
     a2, a4, a6 = ((a * d**k).p for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6)))
@@ -138,30 +138,30 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     resultant = fmpz((256 * curve.discriminant**2 * d**24).p)
     x = P[0] * d**2
 
-    def doubled(X: Any, Z: Any) -> tuple[Any, Any]:
+    def double(X: Any, Z: Any) -> tuple[Any, Any]:
         return (
             X**4 - b4 * (X * Z) ** 2 - 2 * b6 * X * Z**3 - b8 * Z**4,
             4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
         )
 
-    def factors(terms: int, modulus: fmpz | None) -> list[fmpz]:
-        """The common factors in the first doublings; fewer than `terms` if the modulus determines only some of them."""
-        X, Z, commons = x.p, x.q, list[fmpz]()
-        while len(commons) < terms and (modulus is None or modulus % resultant == 0):
-            X, Z = doubled(X, Z)
-            common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
-            X, Z = X // common, Z // common
+    def common_factors(terms: int, modulus: fmpz | None) -> list[fmpz]:
+        """Return the gcds canceled in the first doublings; fewer than `terms` if the modulus determines only some."""
+        X, Z, gcds = x.p, x.q, list[fmpz]()
+        while len(gcds) < terms and (modulus is None or modulus % resultant == 0):
+            X, Z = double(X, Z)
+            gcd = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
+            X, Z = X // gcd, Z // gcd
             if modulus is not None:
-                modulus //= common
+                modulus //= gcd
                 X, Z = X % modulus, Z % modulus
-            commons.append(common)
-        return commons
+            gcds.append(gcd)
+        return gcds
 
     # The common factors are usually much smaller than R, and as large as the first ones, which need no modulus.
-    usual = reduce(fmpz.lcm, factors(_EXACT_TERMS, None))
-    commons = factors(_HEIGHT_TERMS, resultant * usual**_HEIGHT_TERMS)
-    if len(commons) < _HEIGHT_TERMS:
-        commons = factors(_HEIGHT_TERMS, resultant ** (_HEIGHT_TERMS + 1))
+    typical_factor = reduce(fmpz.lcm, common_factors(_EXACT_TERMS, None))
+    gcds = common_factors(_HEIGHT_TERMS, resultant * typical_factor**_HEIGHT_TERMS)
+    if len(gcds) < _HEIGHT_TERMS:
+        gcds = common_factors(_HEIGHT_TERMS, resultant ** (_HEIGHT_TERMS + 1))
     # R = f F + g G for the forms F, G with cofactors f, g (minors of a matrix with eight rows). So log R <= log |forms|
     # + log |cofactors|, which bounds the terms from below. The sums of the coefficients bound them from above.
     largest = max(abs(c) for c in (fmpz(4), 2 * b4, 2 * b6, b8, b2, b6)) + 1
@@ -170,16 +170,16 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
         sizes = list[arb]()
         with RR(bits).working():
             size = max(abs(x.p), x.q)
-            first, real = arb(size), (arb(x.p) / size, arb(x.q) / size)
+            initial_size, point = arb(size), (arb(x.p) / size, arb(x.q) / size)
             for _ in range(_HEIGHT_TERMS):
-                real = doubled(*real)
-                sizes.append(abs(real[0]).max(abs(real[1])))
-                real = (real[0] / sizes[-1], real[1] / sizes[-1])
+                point = double(*point)
+                sizes.append(abs(point[0]).max(abs(point[1])))
+                point = (point[0] / sizes[-1], point[1] / sizes[-1])
         with RR(128).working():  # summing needs few bits: only the doublings lose digits
-            total, scale = first.log(), arb(1)
-            for size, common in zip(sizes, commons, strict=True):
+            total, scale = initial_size.log(), arb(1)
+            for size, gcd in zip(sizes, gcds, strict=True):
                 scale /= 4
-                total += scale * (size.log() - arb(common).log())
+                total += scale * (size.log() - arb(gcd).log())
             total += arb(0, scale * bound)
             if total.is_finite() and float(total.rad()) < _ACCURACY:
                 return total / 2
@@ -191,33 +191,33 @@ def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
 
     With `has_oval` (positive discriminant) all are real and in decreasing order; otherwise two are complex conjugate.
     """
-    third, A, B = _depressed(curve)
+    shift, A, B = _depressed_cubic(curve)
     s = B * B / 4 + A * A * A / 27
     if has_oval:  # Viete's formula
-        size, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
-        return [acb(size * (angle - 2 * k * arb.pi() / 3).cos() - third) for k in range(3)]
+        radius, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
+        return [acb(radius * (angle - 2 * k * arb.pi() / 3).cos() - shift) for k in range(3)]
     # Cardano's formula, with the one of the two cube roots that suffers no cancellation.
-    cube = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
-    u = -((-cube).root(3)) if cube < 0 else cube.root(3)
+    u_cubed = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
+    u = -((-u_cubed).root(3)) if u_cubed < 0 else u_cubed.root(3)
     v = -A / (3 * u)
-    real, imaginary = (u + v) / 2, (u - v) * arb(3).sqrt() / 2
-    return [acb(2 * real - third), acb(-real - third, imaginary), acb(-real - third, -imaginary)]
+    re, im = (u + v) / 2, (u - v) * arb(3).sqrt() / 2
+    return [acb(2 * re - shift), acb(-re - shift, im), acb(-re - shift, -im)]
 
 
 def complex_roots(curve: EllipticCurve) -> list[acb]:
     """Return the roots of the cubic polynomial with acb coefficients, by Cardano's formula."""
-    third, A, B = _depressed(curve)
-    root = (B * B / 4 + A * A * A / 27).sqrt()
-    cube = max((-B / 2 + root, -B / 2 - root), key=lambda z: abs(z).mid())
-    u, unit = cube.root(3), acb(arb(-1) / 2, arb(3).sqrt() / 2)
+    shift, A, B = _depressed_cubic(curve)
+    sqrt = (B * B / 4 + A * A * A / 27).sqrt()
+    u_cubed = max((-B / 2 + sqrt, -B / 2 - sqrt), key=lambda z: abs(z).mid())
+    u, omega = u_cubed.root(3), acb(arb(-1) / 2, arb(3).sqrt() / 2)
     v = -A / (3 * u)
-    return [u - third + v, u * unit + v / unit - third, u / unit + v * unit - third]
+    return [u - shift + v, u * omega + v / omega - shift, u / omega + v * omega - shift]
 
 
-def _depressed(curve: EllipticCurve) -> tuple[Any, Any, Any]:
+def _depressed_cubic(curve: EllipticCurve) -> tuple[Any, Any, Any]:
     """Return c, A and B with x^3 + a2 x^2 + a4 x + a6 = z^3 + A z + B, z = x + c."""
-    third = curve.a2 / 3
-    return third, curve.a4 - curve.a2 * third, (2 * third * third - curve.a4) * third + curve.a6
+    shift = curve.a2 / 3
+    return shift, curve.a4 - curve.a2 * shift, (2 * shift * shift - curve.a4) * shift + curve.a6
 
 
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
@@ -239,6 +239,6 @@ def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tup
             return arb(0), 2
         steps, x = 2, double[0]
     # Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
-    elapsed = acb.elliptic_rf(x + a, x + b, x + c)
+    integral = acb.elliptic_rf(x + a, x + b, x + c)
     period = 2 * acb.elliptic_rf(acb(0), b - a, c - a)
-    return (elapsed / period).real, steps
+    return (integral / period).real, steps

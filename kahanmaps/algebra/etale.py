@@ -19,9 +19,9 @@ from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
 # For coefficients with more bits, a quotient is computed by a linear system instead of Euclid's algorithm, and a
-# product of polynomials with few coefficients by `_product` instead of FLINT.
-_LONG, _LONG_PRODUCT = 2000, 8000
-_MAX_COEFFICIENTS = 6
+# product of polynomials with few coefficients by Karatsuba's formula instead of FLINT.
+_LONG_BITS, _MIN_KARATSUBA_BITS = 2000, 8000
+_MAX_KARATSUBA_TERMS = 6
 
 
 class EtaleAlgebra(Field):
@@ -120,44 +120,44 @@ class EtaleElement(Element):
     @property
     def matrix(self) -> fmpq_mat:
         """The matrix of the multiplication by this element, in the basis 1, t, ..., t^(degree - 1)."""
-        column, columns = self, []
+        element, columns = self, []
         for _ in range(self.field.degree):
-            columns.append(column.coefficients)
-            column = column * self.field.generator
+            columns.append(element.coefficients)
+            element = element * self.field.generator
         return fmpq_mat(columns).transpose()
 
-    def _plus(self, other: EtaleElement) -> EtaleElement:
+    def _add(self, other: EtaleElement) -> EtaleElement:
         return EtaleElement(self.field, self.polynomial + other.polynomial)
 
     def __neg__(self) -> EtaleElement:
         return EtaleElement(self.field, -self.polynomial)
 
-    def _times(self, other: EtaleElement) -> EtaleElement:
-        first, second = self.polynomial, other.polynomial
+    def _multiply(self, other: EtaleElement) -> EtaleElement:
+        f, g = self.polynomial, other.polynomial
         # Only one coefficient is measured: if the others have another length, the product is merely slower.
-        is_long = first[0].p.bit_length() > _LONG_PRODUCT and second[0].p.bit_length() > _LONG_PRODUCT
-        product = _product(first, second) if is_long and self.field.degree <= _MAX_COEFFICIENTS else first * second
+        is_long = f[0].p.bit_length() > _MIN_KARATSUBA_BITS and g[0].p.bit_length() > _MIN_KARATSUBA_BITS
+        product = _karatsuba_product(f, g) if is_long and self.field.degree <= _MAX_KARATSUBA_TERMS else f * g
         return EtaleElement(self.field, product % self.field.chi)
 
-    def _over(self, other: EtaleElement) -> EtaleElement:
-        if max((max(c.p.bit_length(), c.q.bit_length()) for c in other.polynomial.coeffs()), default=0) > _LONG:
+    def _divide(self, other: EtaleElement) -> EtaleElement:
+        if max((max(c.p.bit_length(), c.q.bit_length()) for c in other.polynomial.coeffs()), default=0) > _LONG_BITS:
             # A linear system over Q is ten times as fast as Euclid's algorithm for long coefficients.
             try:
                 solution = other.matrix.solve(fmpq_mat(self.field.degree, 1, self.coefficients))
             except ZeroDivisionError as error:
                 raise ZeroDivisionError(f"division by a zero divisor in {self.field}") from error
             return EtaleElement(self.field, fmpq_poly(solution.entries()))
-        common, inverse, _ = other.polynomial.xgcd(self.field.chi)
-        if common.degree() != 0:
+        gcd, inverse, _ = other.polynomial.xgcd(self.field.chi)
+        if gcd.degree() != 0:
             divisor = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
             raise ZeroDivisionError(f"division by {divisor}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
 
-    def _same(self, other: EtaleElement) -> bool:
+    def _equals(self, other: EtaleElement) -> bool:
         return bool(self.polynomial == other.polynomial)
 
 
-def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
+def _karatsuba_product(f: fmpq_poly, g: fmpq_poly) -> fmpq_poly:
     """Multiply polynomials with few long coefficients.
 
     FLINT multiplies all pairs of coefficients, which takes two products for each pair i < j. By
@@ -166,15 +166,15 @@ def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
 
     one product suffices for each pair (Karatsuba).
     """
-    count = max(first.length(), second.length())
-    a, b = ([numerator[k] for k in range(count)] for numerator in (first.numer(), second.numer()))
-    squares = [x * y for x, y in zip(a, b, strict=True)]
+    count = max(f.length(), g.length())
+    a, b = ([numerator[k] for k in range(count)] for numerator in (f.numer(), g.numer()))
+    diagonal = [x * y for x, y in zip(a, b, strict=True)]
     terms = [fmpz(0)] * (2 * count - 1)
     for i in range(count):
-        terms[2 * i] += squares[i]
+        terms[2 * i] += diagonal[i]
         for j in range(i):
-            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - squares[i] - squares[j]
-    return fmpq_poly(terms, first.denom() * second.denom())
+            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - diagonal[i] - diagonal[j]
+    return fmpq_poly(terms, f.denom() * g.denom())
 
 
 class EtaleMatrix(EntryMatrix):

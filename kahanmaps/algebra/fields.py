@@ -52,16 +52,16 @@ def rational(value: Any) -> fmpq:
         raise InputError(f"found {value}, expected a number")
     if isinstance(value, int | fmpz):
         return fmpq(value)
-    kind = _numpy_kind(value)
-    if kind and kind in "biuO":
+    numpy_kind = _numpy_kind(value)
+    if numpy_kind and numpy_kind in "biuO":
         return rational(value.item())
-    if kind and kind not in "fc":
+    if numpy_kind and numpy_kind not in "fc":
         raise InputError(f"found {value!r} of numpy, expected one exact number")
     if isinstance(value, Decimal) and value.is_finite():
         return fmpq(*value.as_integer_ratio())
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
-    if isinstance(value, float | complex) or kind:
+    if isinstance(value, float | complex) or numpy_kind:
         example = str(value)  # nan, inf and 1j are no exact numbers and get no example
         try:
             parse_number(example)
@@ -192,25 +192,25 @@ class Element(ABC):
     field: Any
 
     @abstractmethod
-    def _plus(self, other: Self) -> Self:
+    def _add(self, other: Self) -> Self:
         """Return the sum of two elements of one field."""
 
     @abstractmethod
-    def _times(self, other: Self) -> Self:
+    def _multiply(self, other: Self) -> Self:
         """Return the product of two elements of one field."""
 
     @abstractmethod
-    def _over(self, other: Self) -> Self:
+    def _divide(self, other: Self) -> Self:
         """Return the quotient of two elements of one field. Raises ZeroDivisionError."""
 
     @abstractmethod
-    def _same(self, other: Self) -> bool:
+    def _equals(self, other: Self) -> bool:
         """Whether two elements of one field are equal."""
 
     @abstractmethod
     def __neg__(self) -> Self: ...
 
-    def _pair(self, other: Any) -> tuple[Self, Self] | None:
+    def _common_operands(self, other: Any) -> tuple[Self, Self] | None:
         """Convert both operands to one of their two fields; return None if that is impossible."""
         if isinstance(other, type(self)) and other.field is self.field:
             return self, other
@@ -222,54 +222,54 @@ class Element(ABC):
         return None if left is None else (left, other)
 
     def __add__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[0]._plus(pair[1])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[0]._add(operands[1])
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[0]._plus(-pair[1])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[0]._add(-operands[1])
 
     def __rsub__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[1]._plus(-pair[0])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[1]._add(-operands[0])
 
     def __mul__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[0]._times(pair[1])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[0]._multiply(operands[1])
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[0]._over(pair[1])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[0]._divide(operands[1])
 
     def __rtruediv__(self, other: Any) -> Self:
-        pair = self._pair(other)
-        return NotImplemented if pair is None else pair[1]._over(pair[0])
+        operands = self._common_operands(other)
+        return NotImplemented if operands is None else operands[1]._divide(operands[0])
 
     def __pow__(self, exponent: int) -> Self:
         if isinstance(exponent, bool) or not isinstance(exponent, int):
             return NotImplemented
         one: Self = self.field.one
         if exponent < 0:
-            return one._over(self) ** -exponent
+            return one._divide(self) ** -exponent
         power, square = one, self
         while exponent:
             if exponent % 2:
-                power = power._times(square)
+                power = power._multiply(square)
             exponent //= 2
             if exponent:
-                square = square._times(square)
+                square = square._multiply(square)
         return power
 
     def __eq__(self, other: object) -> bool:
         try:
-            pair = self._pair(other)
+            operands = self._common_operands(other)
         except InputError:
             return NotImplemented
-        return NotImplemented if pair is None else pair[0]._same(pair[1])
+        return NotImplemented if operands is None else operands[0]._equals(operands[1])
 
     __hash__ = None  # type: ignore[assignment]  # an element may equal a number that has another hash
 
@@ -323,13 +323,13 @@ class PrimeField(Field):
         self.prime = prime
         self.characteristic = prime
         self.name = f"GF({prime})"
-        self._large = fmpz_mod_ctx(prime) if prime >= 2**63 else None
+        self._context = fmpz_mod_ctx(prime) if prime >= 2**63 else None
         self._zero = self._element(0)
         self._one = self._element(1)
 
     def _element(self, value: int | fmpz) -> Any:
-        if self._large is not None:
-            return self._large(value)
+        if self._context is not None:
+            return self._context(value)
         return nmod(value, self.prime)
 
     @property
@@ -342,7 +342,7 @@ class PrimeField(Field):
 
     def convert(self, value: Any) -> Any:
         if isinstance(value, nmod):
-            if self._large is None and value.modulus() == self.prime:
+            if self._context is None and value.modulus() == self.prime:
                 return value
             raise InputError(f"found an element of another field, expected one of {self.name}")
         if isinstance(value, fmpz_mod):
@@ -356,7 +356,7 @@ class PrimeField(Field):
         try:
             return (
                 self._element(number.p) / self._element(number.q)
-                if self._large is not None
+                if self._context is not None
                 else nmod(number, self.prime)
             )
         except ZeroDivisionError:
@@ -370,8 +370,8 @@ class PrimeField(Field):
         return self._element(rng.randrange(self.prime))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        if self._large is not None:
-            return fmpz_mod_mat(rows, columns, [self.convert(entry) for entry in entries], self._large)
+        if self._context is not None:
+            return fmpz_mod_mat(rows, columns, [self.convert(entry) for entry in entries], self._context)
         p, convert = self.prime, self.convert  # local names: large systems spend much time in the next loop
         elements = [e if type(e) is nmod and e.modulus() == p else convert(e) for e in entries]
         return nmod_mat(rows, columns, elements, p)
@@ -391,24 +391,24 @@ class _Balls(Field):
 
     exact = False
     characteristic = 0
-    _letters: str
-    _ball: Callable[..., Any]
-    _matrix: Callable[..., Any]
+    _symbol: str
+    _element_type: Callable[..., Any]
+    _matrix_type: Callable[..., Any]
 
     def __init__(self, bits: int) -> None:
         self.bits = bits
-        self.name = f"{self._letters}({bits})"
+        self.name = f"{self._symbol}({bits})"
 
     @property
     def zero(self) -> Any:
-        return self._ball(0)
+        return self._element_type(0)
 
     @property
     def one(self) -> Any:
-        return self._ball(1)
+        return self._element_type(1)
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        return self._matrix(rows, columns, [self.convert(entry) for entry in entries])
+        return self._matrix_type(rows, columns, [self.convert(entry) for entry in entries])
 
     def format(self, element: Any) -> str:
         """Return midpoint and radius as text, e.g. `[0.333333 +/- 1.0e-6]`."""
@@ -432,16 +432,16 @@ class _Balls(Field):
         return flint.ctx.workprec(self.bits)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Balls) and (other._letters, other.bits) == (self._letters, self.bits)
+        return isinstance(other, _Balls) and (other._symbol, other.bits) == (self._symbol, self.bits)
 
     def __hash__(self) -> int:
-        return hash((self._letters, self.bits))
+        return hash((self._symbol, self.bits))
 
 
 class BallField(_Balls):
     """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`."""
 
-    _letters, _ball, _matrix = "RR", arb, arb_mat
+    _symbol, _element_type, _matrix_type = "RR", arb, arb_mat
 
     def convert(self, value: Any) -> arb:
         if isinstance(value, arb):
@@ -453,7 +453,7 @@ class BallField(_Balls):
 class ComplexBallField(_Balls):
     """Complex numbers, each enclosed in a rectangle of two real balls; elements are acb. Made by `CC`."""
 
-    _letters, _ball, _matrix = "CC", acb, acb_mat
+    _symbol, _element_type, _matrix_type = "CC", acb, acb_mat
 
     def convert(self, value: Any) -> acb:
         """Convert an exact number, a real ball or a complex ball to an element."""

@@ -9,7 +9,6 @@ each operation is slower, but quotients with many factors stay small. Work is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from hashlib import sha256
 from itertools import chain
 from threading import Lock
 from typing import Any
@@ -29,7 +28,7 @@ DEFAULT_BUDGET = 100_000_000  # products of terms: about a second, for coefficie
 _MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # number of matrices whose minors are cached; terms of all minors: 30 MB
 _MAX_ROWS_BY_MINORS = 7  # up to 7 rows, minors (2^n n/2 products by single entries) are faster than elimination
 
-_TOO_MANY = "expanding the identity would take too many products of terms"
+_BUDGET_MESSAGE = "expanding the identity would take too many products of terms"
 _Key = bytes | tuple[bytes, int]  # hash of a matrix; after a failure, with the budget that was too small
 _cache: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, number of products of terms, units of work
 _cache_lock = Lock()
@@ -109,7 +108,7 @@ class FunctionField(Field):
         """Charge this number of products of terms to the budget. Raises BudgetExceeded if it is too small."""
         self.budget -= products
         if self.budget < 0:
-            raise BudgetExceeded(_TOO_MANY)
+            raise BudgetExceeded(_BUDGET_MESSAGE)
         count_work(1 + products / 100)
 
     def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
@@ -123,9 +122,9 @@ class FunctionField(Field):
             if numerator.is_zero():
                 return self.zero
             count_work(10 + (len(numerator) + len(denominator)) / 2)
-            common = numerator.gcd(denominator)
-            if not common.is_constant():
-                return Function(self, numerator / common, denominator / common)
+            gcd = numerator.gcd(denominator)
+            if not gcd.is_constant():
+                return Function(self, numerator / gcd, denominator / gcd)
         return Function(self, numerator, denominator)
 
     def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
@@ -135,37 +134,35 @@ class FunctionField(Field):
         """
         if self.reduces:
             return None
-        columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
-        operands = [(point[k], powers) for k, powers in columns if any(powers)]
+        exponent_columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
+        entries_with_exponents = [(point[k], powers) for k, powers in exponent_columns if any(powers)]
         denominators: list[fmpq_mpoly] = []  # no element divides another one
-        for entry, _ in sorted(operands, key=lambda operand: -int(operand[0].denominator.total_degree())):
+        for entry, _ in sorted(entries_with_exponents, key=lambda pair: -int(pair[0].denominator.total_degree())):
             if (
                 all(self.quotient(D, entry.denominator) is None for D in denominators)
                 and not entry.denominator.is_constant()
             ):
                 denominators.append(entry.denominator)
         exponents = [[0] * len(polynomial) for _ in denominators]
-        rows = []
-        for entry, powers in operands:
-            factor = entry.numerator / entry.denominator.leading_coefficient()
+        factor_rows = []
+        for entry, powers in entries_with_exponents:
+            numerator = entry.numerator / entry.denominator.leading_coefficient()
             if not entry.denominator.is_constant():
                 quotients = ((k, self.quotient(D, entry.denominator)) for k, D in enumerate(denominators))
                 index, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
-                factor = self.times(entry.numerator, quotient)
+                numerator = self.times(entry.numerator, quotient)
                 exponents[index] = [a - e for a, e in zip(exponents[index], powers, strict=True)]
-            rows.append((factor, powers))
-        largest_powers = [-min(row) for row in exponents]
-        rows += [
-            (D, tuple(largest_power + a for a in row))
-            for D, largest_power, row in zip(denominators, largest_powers, exponents, strict=True)
+            factor_rows.append((numerator, powers))
+        max_powers = [-min(row) for row in exponents]
+        factor_rows += [
+            (D, tuple(max_power + a for a in row))
+            for D, max_power, row in zip(denominators, max_powers, exponents, strict=True)
         ]
-        # The longest factor comes last: then the innermost sum multiplies it by short operands only.
-        rows.sort(key=lambda row: len(row[0]))
-        terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
-        total = self._horner(terms, [factor for factor, _ in rows])
-        powers = tuple(
-            (D, largest_power) for D, largest_power in zip(denominators, largest_powers, strict=True) if largest_power
-        )
+        # The longest polynomial comes last: then the innermost sum multiplies it by short polynomials only.
+        factor_rows.sort(key=lambda row: len(row[0]))
+        terms = {tuple(powers[m] for _, powers in factor_rows): c for m, c in enumerate(polynomial.coeffs())}
+        total = self._horner(terms, [numerator for numerator, _ in factor_rows])
+        powers = tuple((D, max_power) for D, max_power in zip(denominators, max_powers, strict=True) if max_power)
         return Function(self, total, self.product_of(powers), powers)
 
     def product_of(self, powers: Sequence[tuple[fmpq_mpoly, int]]) -> fmpq_mpoly:
@@ -180,25 +177,25 @@ class FunctionField(Field):
         """Return the sum of coefficients times powers of `factors`; `terms` maps exponents to coefficients."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
-        by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
-        for (power, *others), coefficient in terms.items():
-            by_power.setdefault(power, {})[tuple(others)] = coefficient
+        terms_by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
+        for (power, *other_exponents), coefficient in terms.items():
+            terms_by_power.setdefault(power, {})[tuple(other_exponents)] = coefficient
         total = self.context.constant(0)
-        for power in range(max(by_power, default=-1), -1, -1):
+        for power in range(max(terms_by_power, default=-1), -1, -1):
             total = self.times(total, factors[0])
-            if power in by_power:
-                total += self._horner(by_power[power], factors[1:])
+            if power in terms_by_power:
+                total += self._horner(terms_by_power[power], factors[1:])
         return total
 
-    def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
-        """Return large / small if it is a polynomial, else None; the budget is charged as for a product."""
-        if small.is_constant():
-            return large / small.leading_coefficient()
-        if large.total_degree() < small.total_degree():
+    def quotient(self, dividend: fmpq_mpoly, divisor: fmpq_mpoly) -> fmpq_mpoly | None:
+        """Return dividend / divisor if it is a polynomial, else None; the budget is charged as for a product."""
+        if divisor.is_constant():
+            return dividend / divisor.leading_coefficient()
+        if dividend.total_degree() < divisor.total_degree():
             return None
-        self.pay(len(large) * len(small))
+        self.pay(len(dividend) * len(divisor))
         try:
-            return large / small
+            return dividend / divisor
         except DomainError:
             return None
 
@@ -225,7 +222,7 @@ class Function(Element):
         self.denominator = denominator
         self.powers = powers
 
-    def _plus(self, other: Function) -> Function:
+    def _add(self, other: Function) -> Function:
         if self.numerator.is_zero():
             return other
         if other.numerator.is_zero():
@@ -233,38 +230,40 @@ class Function(Element):
         if self.denominator == other.denominator:
             return self.field.fraction(self.numerator + other.numerator, self.denominator)
         times = self.field.times
-        for small, large in ((self, other), (other, self)):
-            quotient = self.field.quotient(large.denominator, small.denominator)
+        for a, b in ((self, other), (other, self)):
+            quotient = self.field.quotient(b.denominator, a.denominator)
             if quotient is not None:
-                return self.field.fraction(large.numerator + times(small.numerator, quotient), large.denominator)
+                return self.field.fraction(b.numerator + times(a.numerator, quotient), b.denominator)
         numerator = times(self.numerator, other.denominator) + times(other.numerator, self.denominator)
         return self.field.fraction(numerator, times(self.denominator, other.denominator))
 
     def __neg__(self) -> Function:
         return Function(self.field, -self.numerator, self.denominator)
 
-    def _times(self, other: Function) -> Function:
+    def _multiply(self, other: Function) -> Function:
         if self.numerator.is_zero() or other.numerator.is_zero():
             zero: Function = self.field.zero
             return zero
         times = self.field.times
         return self.field.fraction(times(self.numerator, other.numerator), times(self.denominator, other.denominator))
 
-    def _over(self, other: Function) -> Function:
+    def _divide(self, other: Function) -> Function:
         if self.field.vanishes(other.numerator):
             raise ZeroDivisionError("division by the zero function")
-        shared = [(D, min(power, other_power)) for D, power in self.powers for E, other_power in other.powers if D == E]
-        if shared:
+        common_powers = [
+            (D, min(power, other_power)) for D, power in self.powers for E, other_power in other.powers if D == E
+        ]
+        if common_powers:
             # a/D^3 over b/D^2 is a/(D b): multiplying both sides by the full denominators would leave a factor D^2.
-            own_rest, other_rest = (
-                self.field.product_of([(D, power - sum(n for E, n in shared if D == E)) for D, power in value.powers])
+            times, product_of = self.field.times, self.field.product_of
+            own_cofactor, other_cofactor = (
+                product_of([(D, power - sum(n for E, n in common_powers if D == E)) for D, power in value.powers])
                 for value in (self, other)
             )
-            times = self.field.times
-            return self.field.fraction(times(self.numerator, other_rest), times(other.numerator, own_rest))
-        return self._times(Function(self.field, other.denominator, other.numerator))
+            return self.field.fraction(times(self.numerator, other_cofactor), times(other.numerator, own_cofactor))
+        return self._multiply(Function(self.field, other.denominator, other.numerator))
 
-    def _same(self, other: Function) -> bool:
+    def _equals(self, other: Function) -> bool:
         if other.numerator.is_zero():
             return self.field.is_zero(self)
         return self.field.equal(self, other)
@@ -277,13 +276,13 @@ class FunctionMatrix(EntryMatrix):
         total: Function = self.field.zero
         for a, b in zip(row, column, strict=True):
             if not a.numerator.is_zero() and not b.numerator.is_zero():  # block matrices consist mostly of zeros
-                total = total._plus(a._times(b))
+                total = total._add(a._multiply(b))
         return total
 
     def det(self) -> Function:
         """Compute the determinant block by block, after clearing the denominators of each row."""
         total: Function = self.field.one
-        for block in self._blocks():
+        for block in self._diagonal_blocks():
             n = len(block)
             rows, denominator = FunctionMatrix(
                 self.field, n, n, [self[i, j] for i in block for j in block]
@@ -300,33 +299,35 @@ class FunctionMatrix(EntryMatrix):
         """Solve self X = right by minors, block by block. Raises ZeroDivisionError if the matrix is singular."""
         columns = right._columns
         solution: list[list[Function]] = [[] for _ in range(self._rows)]
-        for block in self._blocks():
+        for block in self._diagonal_blocks():
             n = len(block)
             augmented = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
-            flat = [entry for row in augmented for entry in row]
-            rows, _ = FunctionMatrix(self.field, n, n + columns, flat)._polynomial_rows()
+            entries = [entry for row in augmented for entry in row]
+            rows, _ = FunctionMatrix(self.field, n, n + columns, entries)._polynomial_rows()
             sign = -1 if n % 2 else 1  # so that the denominator is the determinant
             for j in range(n, n + columns):
-                *numerator, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
-                if self.field.vanishes(last):
+                *numerators, denominator = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+                if self.field.vanishes(denominator):
                     raise ZeroDivisionError("singular matrix in solve()")
-                if last.is_constant():  # cancel it: otherwise the digits double with each step of an affine map
-                    factor = last.leading_coefficient() * sign
-                    numerator, last = [entry / factor for entry in numerator], self.field.one.numerator * sign
-                for i, entry in zip(block, numerator, strict=True):
-                    solution[i].append(Function(self.field, entry * -sign, last * sign))
+                if denominator.is_constant():  # cancel it: otherwise the digits double with each step of an affine map
+                    factor = denominator.leading_coefficient() * sign
+                    numerators, denominator = [entry / factor for entry in numerators], self.field.one.numerator * sign
+                for i, entry in zip(block, numerators, strict=True):
+                    solution[i].append(Function(self.field, entry * -sign, denominator * sign))
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
-    def _blocks(self) -> list[list[int]]:
+    def _diagonal_blocks(self) -> list[list[int]]:
         """Return the finest partition of the indices for which the matrix is block diagonal."""
-        waiting = set(range(self._rows))
+        indices = set(range(self._rows))
         blocks = []
-        while waiting:
-            block = [waiting.pop()]
+        while indices:
+            block = [indices.pop()]
             for i in block:  # the list grows during the loop
-                linked = {j for j in waiting if not (self[i, j].numerator.is_zero() and self[j, i].numerator.is_zero())}
-                waiting -= linked
-                block += sorted(linked)
+                neighbors = {
+                    j for j in indices if not (self[i, j].numerator.is_zero() and self[j, i].numerator.is_zero())
+                }
+                indices -= neighbors
+                block += sorted(neighbors)
             blocks.append(sorted(block))
         return blocks
 
@@ -341,16 +342,16 @@ class FunctionMatrix(EntryMatrix):
                     continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.denominator)
             denominator = total.denominator
-            cleared = []
+            polynomial_row = []
             for entry in row:
                 if entry.numerator.is_zero():
-                    cleared.append(entry.numerator)
+                    polynomial_row.append(entry.numerator)
                     continue
                 quotient = self.field.quotient(denominator, entry.denominator)
                 if quotient is None:
                     raise BudgetExceeded("the denominators of a row have no simple common multiple")
-                cleared.append(self.field.times(entry.numerator, quotient))
-            rows.append(cleared)
+                polynomial_row.append(self.field.times(entry.numerator, quotient))
+            rows.append(polynomial_row)
             product = self.field.times(product, denominator)
         return rows, product
 
@@ -362,16 +363,18 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     counted like a new computation, so that no verdict depends on earlier computations. For the same reason a failure is
     cached together with its budget: with another budget, the work done before the failure would differ.
     """
+    from hashlib import sha256
+
     count_work(sum(map(len, chain(*rows))))  # the work of writing the text that is hashed
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
-    budget, before = field.budget, counted()
+    budget, units_before = field.budget, counted()
     for cached_key in (key, (key, budget)):
         minors, products, units = _cache.get(cached_key, (None, 0, 0))
         if cached_key in _cache and products <= budget:
             count_work(units)
             if minors is None:
                 field.budget = -1
-                raise BudgetExceeded(_TOO_MANY)
+                raise BudgetExceeded(_BUDGET_MESSAGE)
             field.budget -= products
             return minors
     try:
@@ -383,19 +386,19 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
             kernel = kernel_minors(entries, field.times, field.require)
             minors = [field.context.constant(0) if minor is None else minor for minor in kernel]
     except BudgetExceeded:
-        _store((key, budget), None, 0, counted() - before)
+        _cache_minors((key, budget), None, 0, counted() - units_before)
         raise
-    _store(key, minors, budget - field.budget, counted() - before)
+    _cache_minors(key, minors, budget - field.budget, counted() - units_before)
     return minors
 
 
-def _store(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
+def _cache_minors(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
     """Store minors, or None for a failure; remove the oldest entries of a full cache."""
     with _cache_lock:
         _cache[key] = minors, products, units
         while (
             len(_cache) > _MAX_CACHED
-            or sum(len(P) for cached, *_ in _cache.values() for P in cached or ()) > _MAX_CACHED_TERMS
+            or sum(len(P) for cached_minors, *_ in _cache.values() for P in cached_minors or ()) > _MAX_CACHED_TERMS
         ):
             del _cache[next(iter(_cache))]
 

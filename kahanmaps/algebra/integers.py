@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from flint import fmpq, fmpz
 
 SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int(n**0.5) + 1)))
-_LOW = (fmpz(1) << 64) - 1
+_MASK_64_BITS = (fmpz(1) << 64) - 1
 
 
 def over_common_denominator(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
@@ -29,54 +29,54 @@ def over_common_denominator(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
 
 def content(integers: Iterable[fmpz]) -> fmpz:
     """Return the greatest common divisor of integers."""
-    common = fmpz(0)
+    gcd = fmpz(0)
     for entry in integers:
-        common = common.gcd(entry)
-        if common == 1:
+        gcd = gcd.gcd(entry)
+        if gcd == 1:
             break
-    return common
+    return gcd
 
 
-def without(number: fmpz, power: fmpz) -> fmpz:
+def coprime_part(number: fmpz, power: fmpz) -> fmpz:
     """Return the part of a nonzero integer that is coprime to `power`."""
     return split_by_primes(number, power)[0]
 
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
     """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 is (0, 1)."""
-    part = fmpz(1)
+    prime_part = fmpz(1)
     if number == 0:
-        return number, part
-    while (common := power.gcd(number % power)) != 1:
-        number = number // common
-        part = part * common
-        if is_all(common, power):
+        return number, prime_part
+    while (gcd := power.gcd(number % power)) != 1:
+        number = number // gcd
+        prime_part = prime_part * gcd
+        if has_full_multiplicity(gcd, power):
             break
-        power = common * common  # contains every prime that may still divide the number
-    return number, part
+        power = gcd * gcd  # contains every prime that may still divide the number
+    return number, prime_part
 
 
 def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
     """Return the largest common factor of integers (not all 0) that consists of primes dividing `power` > 0."""
     while True:
-        common = power
+        gcd = power
         for number in numbers:
-            if common == 1:
+            if gcd == 1:
                 break
-            common = common.gcd(number % common)
-        if common == 1 or is_all(common, power):
-            return common
-        power = common * common
+            gcd = gcd.gcd(number % gcd)
+        if gcd == 1 or has_full_multiplicity(gcd, power):
+            return gcd
+        power = gcd * gcd
 
 
-def is_all(common: fmpz, power: fmpz) -> bool:
+def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
     """Whether a gcd with `power` has the full multiplicity of its primes: `power` contains each one more often."""
-    cofactor = power // common
-    while common != 1:
-        shared = common.gcd(cofactor)
-        if shared == 1:
+    cofactor = power // gcd
+    while gcd != 1:
+        common_factor = gcd.gcd(cofactor)
+        if common_factor == 1:
             return False
-        common = common // shared
+        gcd = gcd // common_factor
     return True
 
 
@@ -85,9 +85,9 @@ def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
     if divisor == 1:
         return list(values)
     quotients = [value // divisor for value in values]
-    low = divisor & _LOW
+    low_divisor = divisor & _MASK_64_BITS
     for value, quotient in zip(values, quotients, strict=True):
-        if ((quotient & _LOW) * low - value) & _LOW != 0:
+        if ((quotient & _MASK_64_BITS) * low_divisor - value) & _MASK_64_BITS != 0:
             raise ArithmeticError("a division that should be exact left a remainder: please report this")
     return quotients
 
@@ -106,7 +106,7 @@ def radical(*numbers: fmpz) -> fmpz:
                 while cofactor % prime == 0:
                     cofactor = cofactor // prime
         if cofactor > 1:
-            cofactor = without(cofactor, product) if product > 1 else cofactor
+            cofactor = coprime_part(cofactor, product) if product > 1 else cofactor
             # Replace perfect powers by their roots.
             for exponent in (2, 3, 5):
                 root = cofactor.root(exponent)

@@ -35,7 +35,7 @@ from kahanmaps.errors import BadPrime, InputError
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
 
 
-_UNLUCKY_PRIMES = 3  # after this number of failures the black box is declared not rational
+_MAX_UNLUCKY_PRIMES = 3  # after this number of failures the black box is declared not rational
 # One value modulo each of these new primes; a black box like the Legendre symbol passes each with probability 1/2.
 _CONFIRMATIONS = 5
 
@@ -45,8 +45,8 @@ Exponents = tuple[int, ...]
 BlackBox = Callable[[int, Point], Sequence[int] | None]
 
 NONE_FIXED: Mapping[int, int] = MappingProxyType({})
-_BAD_POINTS = 20  # consecutive points without a value, before another prime is tried
-_DETERMINING = 4  # number of entries that determine their common denominator; more would only enlarge the matrices
+_MAX_BAD_POINTS = 20  # consecutive points without a value, before another prime is tried
+_MAX_DETERMINING = 4  # entries that determine their common denominator; more would only enlarge the matrices
 
 
 class Stop(Exception):
@@ -59,19 +59,19 @@ class Unlucky(Exception):
 
 @dataclass
 class Samples:
-    """The limits of the calls of the black box, the number `taken` of calls so far, and the length of each vector."""
+    """The limits of the calls of the black box, the number of `calls` so far, and the length of each vector."""
 
     max_samples: int
     budget: Budget | None
-    taken: int = 0
+    calls: int = 0
     length: int | None = None
 
     def check(self, needed: int = 0) -> None:
         """Raise Stop if `needed` further values exceed the limit or the budget is spent."""
-        if self.taken + needed > self.max_samples:
-            raise Stop(f"{self.taken} values requested and {needed} more needed, the limit is {self.max_samples}")
+        if self.calls + needed > self.max_samples:
+            raise Stop(f"{self.calls} values requested and {needed} more needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
-            raise Stop(f"work limit reached after {self.taken} values; raise --effort")
+            raise Stop(f"work limit reached after {self.calls} values; raise --effort")
 
 
 class SampledValues:
@@ -83,14 +83,14 @@ class SampledValues:
         self.points: list[Point] = []
         self.values: list[tuple[int, ...]] = []
         self._black_box = black_box
-        self._powers: list[dict[Exponents, int]] = []
+        self._monomial_values: list[dict[Exponents, int]] = []
 
     def take(self, draw: Callable[[], Point]) -> None:
         """Compute one more value, at the first point drawn for which the black box has one."""
-        for _ in range(_BAD_POINTS):
+        for _ in range(_MAX_BAD_POINTS):
             self.samples.check(1)
             point = draw()
-            self.samples.taken += 1
+            self.samples.calls += 1
             answer = self._black_box(self.prime, point)
             if answer is not None:
                 values = tuple(int(value) % self.prime for value in answer)
@@ -101,43 +101,43 @@ class SampledValues:
                     raise InputError(f"found values of lengths {lengths}, expected equally many at all points")
                 self.points.append(point)
                 self.values.append(values)
-                self._powers.append({})
+                self._monomial_values.append({})
                 return
             if not point:
                 break
-        raise Unlucky(f"no value modulo {self.prime} at {_BAD_POINTS} points in a row")
+        raise Unlucky(f"no value modulo {self.prime} at {_MAX_BAD_POINTS} points in a row")
 
     def random_points(
-        self, symbols: int, rng: random.Random, fixed: Mapping[int, int] = NONE_FIXED
+        self, nvars: int, rng: random.Random, fixed: Mapping[int, int] = NONE_FIXED
     ) -> Callable[[], Point]:
         """Return a function that draws random points with some coordinates fixed."""
-        return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(symbols))
+        return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(nvars))
 
     def monomials(self, k: int, exponents: Sequence[Exponents]) -> list[int]:
         """Return the values of the monomials at point k."""
-        cached, point, p = self._powers[k], self.points[k], self.prime
-        row = []
+        known_values, point, p = self._monomial_values[k], self.points[k], self.prime
+        values = []
         for monomial in exponents:
-            value = cached.get(monomial)
+            value = known_values.get(monomial)
             if value is None:
                 value = 1
                 for base, exponent in zip(point, monomial, strict=True):
                     if exponent:
                         value = value * pow(base, exponent, p) % p
-                cached[monomial] = value
-            row.append(value)
-        return row
+                known_values[monomial] = value
+            values.append(value)
+        return values
 
 
 @dataclass(frozen=True)
 class Shape:
-    """The monomials of a numerator and a denominator. The monomial `lead` of the denominator has coefficient 1."""
+    """The monomials of a numerator and a denominator. `leading_monomial`, in the denominator, has coefficient 1."""
 
     numerator: tuple[Exponents, ...]
     denominator: tuple[Exponents, ...]
 
     @property
-    def lead(self) -> Exponents:
+    def leading_monomial(self) -> Exponents:
         return max(self.denominator)
 
     @property
@@ -160,10 +160,10 @@ class Quotient:
         denominator_terms = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
         if not denominator_terms:
             return None
-        support = Shape(tuple(numerator_terms), tuple(denominator_terms))
-        factor = pow(denominator_terms[support.lead], -1, prime)
+        nonzero_shape = Shape(tuple(numerator_terms), tuple(denominator_terms))
+        factor = pow(denominator_terms[nonzero_shape.leading_monomial], -1, prime)
         return cls(
-            support,
+            nonzero_shape,
             tuple(c * factor % prime for c in numerator_terms.values()),
             tuple(c * factor % prime for c in denominator_terms.values()),
         )
@@ -225,7 +225,7 @@ def reconstruct(
     samples = Samples(max_samples, budget)
     primes: list[int] = []
 
-    def at_new_prime() -> SampledValues:
+    def sample_new_prime() -> SampledValues:
         prime = draw(rng)
         while prime in primes:
             prime = draw(rng)
@@ -234,64 +234,64 @@ def reconstruct(
 
     reason = ""
     try:
-        for _ in range(_UNLUCKY_PRIMES):
+        for _ in range(_MAX_UNLUCKY_PRIMES):
             try:
                 functions = _lift(
-                    _modulo_first_prime(at_new_prime(), len(names), max_degree, rng),
-                    at_new_prime,
+                    _interpolate_modulo_prime(sample_new_prime(), len(names), max_degree, rng),
+                    sample_new_prime,
                     tuple(names),
                     primes,
                     rng,
                 )
-                return Reconstruction(functions, "", samples.taken, tuple(primes))
+                return Reconstruction(functions, "", samples.calls, tuple(primes))
             except Unlucky as unlucky:
                 reason = str(unlucky)
     except Stop as stop:
         reason = str(stop)
-    return Reconstruction(None, reason, samples.taken, tuple(primes))
+    return Reconstruction(None, reason, samples.calls, tuple(primes))
 
 
 # -- modulo the first prime --------------------------------------------------------------------------------------------
 
 
-def _modulo_first_prime(values: SampledValues, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
+def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int, rng: random.Random) -> list[Quotient]:
     """Interpolate the functions modulo one prime."""
     p = values.prime
-    values.take(values.random_points(symbols, rng))
+    values.take(values.random_points(nvars, rng))
     anchor = values.points[0]
-    one: Exponents = (0,) * symbols
+    one: Exponents = (0,) * nvars
     entries = range(len(values.values[0]))
     quotients = [Quotient(Shape((one,) if v else (), (one,)), (v,) if v else (), (1,)) for v in values.values[0]]
     axes = []
-    for j in range(symbols):
-        direction = tuple(int(i == j) for i in range(symbols))
-        axes.append(_along_line(values, anchor, direction, max_degree, rng))
+    for j in range(nvars):
+        direction = tuple(int(i == j) for i in range(nvars))
+        axes.append(_interpolate_on_line(values, anchor, direction, max_degree, rng))
     # Symbols of large degree come first: each new symbol multiplies the number of monomials known before.
-    order = sorted(range(symbols), key=lambda j: -max((_size(N) + _size(D) for N, D in axes[j]), default=0))
-    denominators: list[list[str]] = [[] for _ in entries]
-    for stage, j in enumerate(order):
-        active = order[: stage + 1]
+    symbol_order = sorted(range(nvars), key=lambda j: -max((_deg(N) + _deg(D) for N, D in axes[j]), default=0))
+    denominator_texts: list[list[str]] = [[] for _ in entries]
+    for stage, j in enumerate(symbol_order):
+        stage_symbols = symbol_order[: stage + 1]
         for i in entries:
-            denominators[i].append(str(axes[j][i][1]))
-        dependent = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
-        for i in dependent:
+            denominator_texts[i].append(str(axes[j][i][1]))
+        dependents = [i for i in entries if _deg(axes[j][i][0]) or _deg(axes[j][i][1])]
+        for i in dependents:
             if quotients[i].shape.unknowns <= 2 and set(
                 quotients[i].shape.numerator + quotients[i].shape.denominator
             ) <= {one}:
                 N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in axes[j][i])
-                powers = [tuple(e if k == j else 0 for k in range(symbols)) for e in range(max(len(N), len(D)))]
+                powers = [tuple(e if k == j else 0 for k in range(nvars)) for e in range(max(len(N), len(D)))]
                 quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
                 assert quotient is not None  # D is monic
                 quotients[i] = quotient
-        dependent = [
+        dependents = [
             i
-            for i in dependent
+            for i in dependents
             if any(sum(m) != m[j] for m in (*quotients[i].shape.numerator, *quotients[i].shape.denominator))
         ]
-        if not dependent:
+        if not dependents:
             continue
         shapes = {}
-        for i in dependent:  # after symbol j is added, the possible monomials have its exponents on axis j
+        for i in dependents:  # after symbol j is added, the possible monomials have its exponents on axis j
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -299,32 +299,33 @@ def _modulo_first_prime(values: SampledValues, symbols: int, max_degree: int, rn
                     for monomials, side in sides
                 )
             )
-        bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in dependent)
-        if max(shape.unknowns for shape in shapes.values()) > bound:
-            direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
-            line = _along_line(values, anchor, direction, max_degree, rng)
-            for i in dependent:
-                denominators[i].append(str(line[i][1]))
+        limit = max(sum(_deg(axes[a][i][0]) + _deg(axes[a][i][1]) for a in stage_symbols) + 2 for i in dependents)
+        if max(shape.unknowns for shape in shapes.values()) > limit:
+            direction = tuple(rng.randrange(1, p) if i in stage_symbols else 0 for i in range(nvars))
+            line_fractions = _interpolate_on_line(values, anchor, direction, max_degree, rng)
+            for i in dependents:
+                denominator_texts[i].append(str(line_fractions[i][1]))
                 shapes[i] = Shape(
-                    tuple(m for m in shapes[i].numerator if sum(m) <= _size(line[i][0])),
-                    tuple(m for m in shapes[i].denominator if sum(m) <= _size(line[i][1])),
+                    tuple(m for m in shapes[i].numerator if sum(m) <= _deg(line_fractions[i][0])),
+                    tuple(m for m in shapes[i].denominator if sum(m) <= _deg(line_fractions[i][1])),
                 )
         groups: dict[tuple[str, ...], list[int]] = {}
-        for i in dependent:
-            groups.setdefault(tuple(denominators[i]), []).append(i)
-        monic = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
-        split_groups = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
-        fixed = {i: anchor[i] for i in order[stage + 1 :]}
-        for i, quotient in fit(values, shapes, split_groups, symbols, rng, fixed).items():
+        for i in dependents:
+            groups.setdefault(tuple(denominator_texts[i]), []).append(i)
+        numerator_texts = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
+        split_groups = [split_group(group, [numerator_texts[i] for i in group], shapes) for group in groups.values()]
+        fixed = {i: anchor[i] for i in symbol_order[stage + 1 :]}
+        for i, quotient in fit(values, shapes, split_groups, nvars, rng, fixed).items():
             quotients[i] = quotient
     return quotients
 
 
-def _size(polynomial: nmod_poly) -> int:
+def _deg(polynomial: nmod_poly) -> int:
+    """Return the degree, but 0 for the zero polynomial."""
     return max(0, int(polynomial.degree()))
 
 
-def _along_line(
+def _interpolate_on_line(
     values: SampledValues, anchor: Point, direction: Point, max_degree: int, rng: random.Random
 ) -> list[tuple[nmod_poly, nmod_poly]]:
     """Interpolate all entries on the line anchor + t direction as fractions (N, D) of polynomials in t, D monic.
@@ -332,57 +333,57 @@ def _along_line(
     On an axis, the line is parametrized by its symbol, so that exponents of t are exponents of the symbol.
     """
     p = values.prime
-    varying = [i for i, d in enumerate(direction) if d]
-    start = anchor[varying[0]] if len(varying) == 1 else 0
-    nodes = [start]
+    symbols = [i for i, d in enumerate(direction) if d]
+    t0 = anchor[symbols[0]] if len(symbols) == 1 else 0
+    nodes = [t0]
 
     def draw() -> Point:
         t = rng.randrange(p)
         while t in nodes:
             t = rng.randrange(p)
         nodes.append(t)
-        return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
+        return tuple((a + (t - t0) * d) % p for a, d in zip(anchor, direction, strict=True))
 
     # Newton's form: a further point adds one term to each polynomial. The degrees are not known in advance, so points
     # are taken one by one until all fractions are determined.
     entries = range(len(values.values[0]))
-    vanishing = nmod_poly([-start, 1], p)
+    node_polynomial = nmod_poly([-t0, 1], p)
     interpolants = [nmod_poly([v], p) for v in values.values[0]]
     fractions: list[tuple[nmod_poly, nmod_poly] | None] = [None for _ in entries]
     n = 1
-    while any(pair is None for pair in fractions):
+    while any(fraction is None for fraction in fractions):
         if n > 2 * max_degree + 2:
             raise Stop(f"not the values of a rational function of degree at most {max_degree} along a line")
         values.take(draw)
         t, n = nodes[-1], n + 1
-        inverse = 1 / vanishing(t)
+        inverse = 1 / node_polynomial(t)
         for i in entries:
             if fractions[i] is None:
                 values.samples.check()
                 count_work(5 + n * (1 + n / 100))
-                interpolants[i] += vanishing * ((values.values[-1][i] - interpolants[i](t)) * inverse)
-        vanishing *= nmod_poly([-t, 1], p)
+                interpolants[i] += node_polynomial * ((values.values[-1][i] - interpolants[i](t)) * inverse)
+        node_polynomial *= nmod_poly([-t, 1], p)
         for i in entries:
             if fractions[i] is None:
-                fractions[i] = _least_fraction(interpolants[i], vanishing, n)
-    return [pair for pair in fractions if pair is not None]
+                fractions[i] = _least_fraction(interpolants[i], node_polynomial, n)
+    return [fraction for fraction in fractions if fraction is not None]
 
 
-def _least_fraction(interpolant: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
-    """Find N/D = `interpolant` modulo `vanishing` with deg N + deg D <= n - 2, D monic, by the Euclidean algorithm."""
+def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
+    """Find N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic, by Euclid's algorithm."""
     p = interpolant.modulus()
-    before, after = (vanishing, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
+    previous, current = (node_polynomial, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:
-        N, D = after
-        if _size(N) + _size(D) <= n - 2:
-            if int(D.gcd(vanishing).degree()) > 0:
+        N, D = current
+        if _deg(N) + _deg(D) <= n - 2:
+            if int(D.gcd(node_polynomial).degree()) > 0:
                 return None
-            lead = D.leading_coefficient()
-            return N / lead, D / lead
+            leading_coefficient = D.leading_coefficient()
+            return N / leading_coefficient, D / leading_coefficient
         if int(N.degree()) <= 0:
             return None
-        quotient, remainder = divmod(before[0], N)
-        before, after = after, (remainder, before[1] - quotient * D)
+        quotient, remainder = divmod(previous[0], N)
+        previous, current = current, (remainder, previous[1] - quotient * D)
 
 
 # -- the linear systems: quotients with given monomials from values modulo a prime ------------------------------------
@@ -398,16 +399,16 @@ def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, S
     """
     if len(shapes[group[0]].denominator) == 1:
         return group[:1], group[1:]
-    distinct = dict(reversed(list(zip(numerators, group, strict=True))))
-    determining = sorted(distinct.values())[:_DETERMINING]
-    return determining, [i for i in group if i not in determining]
+    entry_by_numerator = dict(reversed(list(zip(numerators, group, strict=True))))
+    determining_entries = sorted(entry_by_numerator.values())[:_MAX_DETERMINING]
+    return determining_entries, [i for i in group if i not in determining_entries]
 
 
 def fit(
     values: SampledValues,
     shapes: dict[int, Shape],
-    pairs: list[tuple[list[int], list[int]]],
-    symbols: int,
+    split_groups: list[tuple[list[int], list[int]]],
+    nvars: int,
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
@@ -415,22 +416,22 @@ def fit(
 
     With `fixed` coordinates only points with these coordinates are used.
     """
-    fitted: dict[int, Quotient] = {}
-    draw = values.random_points(symbols, rng, fixed)
+    quotients: dict[int, Quotient] = {}
+    draw = values.random_points(nvars, rng, fixed)
     values.take(draw)
     while True:
-        usable = [k for k, point in enumerate(values.points) if all(point[i] == v for i, v in fixed.items())]
+        point_indices = [k for k, point in enumerate(values.points) if all(point[i] == v for i, v in fixed.items())]
         needed = 0
-        for determining, others in pairs:
-            if determining[0] not in fitted:
-                needed = max(needed, _solve(values, usable, shapes, determining, None, fitted))
-            if determining[0] in fitted:
-                denominator = fitted[determining[0]]
-                for i in others:
-                    if i not in fitted:
-                        needed = max(needed, _solve(values, usable, shapes, [i], denominator, fitted))
+        for determining_entries, other_entries in split_groups:
+            if determining_entries[0] not in quotients:
+                needed = max(needed, _solve(values, point_indices, shapes, determining_entries, None, quotients))
+            if determining_entries[0] in quotients:
+                denominator = quotients[determining_entries[0]]
+                for i in other_entries:
+                    if i not in quotients:
+                        needed = max(needed, _solve(values, point_indices, shapes, [i], denominator, quotients))
         if needed == 0:
-            return fitted
+            return quotients
         values.samples.check(needed)
         for _ in range(needed):
             values.take(draw)
@@ -438,32 +439,32 @@ def fit(
 
 def _solve(
     values: SampledValues,
-    usable: list[int],
+    point_indices: list[int],
     shapes: dict[int, Shape],
-    members: list[int],
+    entries: list[int],
     known_denominator: Quotient | None,
-    fitted: dict[int, Quotient],
+    quotients: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of members with one denominator (known or not), and enter them into `fitted`.
+    """Solve for the fractions of entries with one denominator (known or not), and store them in `quotients`.
 
     Returns the number of further values needed, 0 on success. Raises Unlucky if there is no solution.
     """
     p = values.prime
     values.samples.check()
-    denominator = shapes[members[0]].denominator if known_denominator is None else known_denominator.shape.denominator
-    widths = [len(shapes[i].numerator) for i in members]
+    denominator = shapes[entries[0]].denominator if known_denominator is None else known_denominator.shape.denominator
+    widths = [len(shapes[i].numerator) for i in entries]
     # The last point is left out of the equations, as a check; without symbols all points are the same.
-    last = usable[-1]
+    test_index = point_indices[-1]
     rows: list[int] = []
     height = 0
-    for k in usable[:-1] if values.points[0] else usable[:1]:
+    for k in point_indices[:-1] if values.points[0] else point_indices[:1]:
         denominator_values = values.monomials(k, denominator)
         if known_denominator is not None:
             denominator_values = [
                 sum(c * m for c, m in zip(known_denominator.denominator, denominator_values, strict=True)) % p
             ]
         offset = 0
-        for i, width in zip(members, widths, strict=True):
+        for i, width in zip(entries, widths, strict=True):
             v = p - values.values[k][i]
             rows += [0] * offset + values.monomials(k, shapes[i].numerator) + [0] * (sum(widths) - offset - width)
             rows += [v * m % p for m in denominator_values]
@@ -471,11 +472,11 @@ def _solve(
             height += 1
     width = sum(widths) + (len(denominator) if known_denominator is None else 1)
     if height == 0:
-        return max(1, -(-(width - 1) // len(members)))
+        return max(1, -(-(width - 1) // len(entries)))
     count_work(20 + len(rows) * (0.5 + min(height, width) / 1500))
     kernel, nullity = nmod_mat(height, width, rows, p).nullspace()
     if nullity > 1:
-        return int(-(-(nullity - 1) // len(members)))
+        return int(-(-(nullity - 1) // len(entries)))
     if nullity == 0:
         raise Unlucky(f"the values modulo {p} do not fit the monomials found")
     solution = [int(kernel[i, 0]) for i in range(width)]
@@ -485,20 +486,22 @@ def _solve(
         else [solution[-1] * c % p for c in known_denominator.denominator]
     )
     offset = 0
-    for i, size in zip(members, widths, strict=True):
+    for i, size in zip(entries, widths, strict=True):
         quotient = Quotient.of(
             replace(shapes[i], denominator=denominator), solution[offset : offset + size], denominator_values, p
         )
         offset += size
-        fits = quotient is not None
+        is_consistent = quotient is not None
         if quotient is not None:
-            shape, v = quotient.shape, values.values[last][i]
+            shape, v = quotient.shape, values.values[test_index][i]
             sums = ((quotient.numerator, shape.numerator), (quotient.denominator, shape.denominator))
-            N, D = (sum(c * m for c, m in zip(cs, values.monomials(last, ms), strict=True)) % p for cs, ms in sums)
-            fits = D != 0 and (N - v * D) % p == 0
-        if quotient is None or not fits:
+            N, D = (
+                sum(c * m for c, m in zip(cs, values.monomials(test_index, ms), strict=True)) % p for cs, ms in sums
+            )
+            is_consistent = D != 0 and (N - v * D) % p == 0
+        if quotient is None or not is_consistent:
             raise Unlucky(f"a value modulo {p} that was held out does not agree")
-        fitted[i] = quotient
+        quotients[i] = quotient
     return 0
 
 
@@ -506,83 +509,75 @@ def _solve(
 
 
 def _lift(
-    at_first_prime: list[Quotient],
-    at_new_prime: Callable[[], SampledValues],
+    quotients: list[Quotient],
+    sample_new_prime: Callable[[], SampledValues],
     names: tuple[str, ...],
     primes: list[int],
     rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
     """Lift the functions to Q. Raises Unlucky if values modulo other primes disagree."""
-    modulus = primes[-1]
-    shapes = {i: quotient.shape for i, quotient in enumerate(at_first_prime)}
-    residues = [[*quotient.numerator, *quotient.denominator] for quotient in at_first_prime]
+    modulus, context = primes[-1], ring(names)
+    shapes = {i: quotient.shape for i, quotient in enumerate(quotients)}
+    residues = [[*quotient.numerator, *quotient.denominator] for quotient in quotients]
     groups: dict[object, list[int]] = {}
-    for i, quotient in enumerate(at_first_prime):
+    for i, quotient in enumerate(quotients):
         groups.setdefault((quotient.shape.denominator, quotient.denominator), []).append(i)
     # Numerators are compared up to a factor: the first coefficient is made 1.
-    monic = [str([c * pow(f.numerator[0], -1, modulus) % modulus for c in f.numerator]) for f in at_first_prime]
-    pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
-    misfits = 0
+    numerator_texts = [str([c * pow(f.numerator[0], -1, modulus) % modulus for c in f.numerator]) for f in quotients]
+    split_groups = [split_group(group, [numerator_texts[i] for i in group], shapes) for group in groups.values()]
+    failures = 0
     while True:
-        functions = _functions_with_residues(list(shapes.values()), residues, modulus, names)
+        # Guess the functions whose coefficients are fractions of small height with these residues.
+        functions = list[RationalFunction]()
+        for shape, entries in zip(shapes.values(), residues, strict=True):
+            count_work((20 + 5 * len(entries)) * modulus.bit_length() / 60)
+            coefficients = rational_vector(entries, modulus)
+            if coefficients is None:
+                break
+            size = len(shape.numerator)
+            N = context.from_dict({m: c for m, c in zip(shape.numerator, coefficients[:size], strict=True) if c != 0})
+            D = context.from_dict({m: c for m, c in zip(shape.denominator, coefficients[size:], strict=True) if c != 0})
+            functions.append(RationalFunction.reduced(N, D))
         try:
-            if functions is None:
-                values = at_new_prime()
-            elif (counterexample := _find_counterexample(functions, at_new_prime, rng)) is not None:
+            if len(functions) < len(shapes):
+                values = sample_new_prime()
+            elif (counterexample := _find_counterexample(functions, sample_new_prime, rng)) is not None:
                 values = counterexample
             else:
-                return functions
-            fitted = fit(values, shapes, pairs, len(names), rng)
-            if any(fitted[i].shape.lead != shape.lead for i, shape in shapes.items()):
+                return tuple(functions)
+            new_quotients = fit(values, shapes, split_groups, len(names), rng)
+            if any(new_quotients[i].shape.leading_monomial != shape.leading_monomial for i, shape in shapes.items()):
                 raise Unlucky(f"the prime {values.prime} divides a leading coefficient")
         except Unlucky:
-            misfits += 1
-            if misfits >= _UNLUCKY_PRIMES:
+            failures += 1
+            if failures >= _MAX_UNLUCKY_PRIMES:
                 raise
             continue
         for i, shape in shapes.items():
-            numerator_terms = dict(zip(fitted[i].shape.numerator, fitted[i].numerator, strict=True))
-            denominator_terms = dict(zip(fitted[i].shape.denominator, fitted[i].denominator, strict=True))
-            new = [
+            numerator_terms = dict(zip(new_quotients[i].shape.numerator, new_quotients[i].numerator, strict=True))
+            denominator_terms = dict(zip(new_quotients[i].shape.denominator, new_quotients[i].denominator, strict=True))
+            new_residues = [
                 *(numerator_terms.get(m, 0) for m in shape.numerator),
                 *(denominator_terms.get(m, 0) for m in shape.denominator),
             ]
-            residues[i] = chinese(residues[i], modulus, new, values.prime)
+            residues[i] = chinese(residues[i], modulus, new_residues, values.prime)
         modulus *= values.prime
 
 
-def _functions_with_residues(
-    shapes: list[Shape], residues: list[list[int]], modulus: int, names: tuple[str, ...]
-) -> tuple[RationalFunction, ...] | None:
-    """Return the functions whose coefficients are fractions of small height with these residues, or None."""
-    context = ring(names)
-    functions = []
-    for shape, entries in zip(shapes, residues, strict=True):
-        count_work((20 + 5 * len(entries)) * modulus.bit_length() / 60)
-        coefficients = rational_vector(entries, modulus)
-        if coefficients is None:
-            return None
-        size = len(shape.numerator)
-        N = context.from_dict({m: c for m, c in zip(shape.numerator, coefficients[:size], strict=True) if c != 0})
-        D = context.from_dict({m: c for m, c in zip(shape.denominator, coefficients[size:], strict=True) if c != 0})
-        functions.append(RationalFunction.reduced(N, D))
-    return tuple(functions)
-
-
 def _find_counterexample(
-    functions: tuple[RationalFunction, ...], at_new_prime: Callable[[], SampledValues], rng: random.Random
+    functions: Sequence[RationalFunction], sample_new_prime: Callable[[], SampledValues], rng: random.Random
 ) -> SampledValues | None:
     """Compare the functions with the black box modulo new primes; return the values modulo the first that disagrees."""
     for _ in range(_CONFIRMATIONS):
-        values = at_new_prime()
+        values = sample_new_prime()
         values.take(values.random_points(len(functions[0].names) if functions else 0, rng))
         field = GF(values.prime)
         point = [field.convert(entry) for entry in values.points[-1]]
         try:
-            computed = [function.value(field, point) for function in functions]
+            computed_values = [function.value(field, point) for function in functions]
         except BadPrime as error:
             raise Unlucky(str(error)) from error
-        pairs = zip(computed, values.values[-1], strict=True)
+        pairs = zip(computed_values, values.values[-1], strict=True)
         if not all(
             computed_value is not None and field.convert(computed_value) == value for computed_value, value in pairs
         ):

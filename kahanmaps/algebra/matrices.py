@@ -68,15 +68,15 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
         integers, denominator, rank_found = _integer_rows(matrix).rref()
         pivots = split_columns(integers, rank_found)[0]
     else:
-        reduced, rank_found = matrix.rref()
-        rows, pivots = reduced.tolist(), split_columns(reduced, rank_found)[0]
+        echelon_form, rank_found = matrix.rref()
+        rows, pivots = echelon_form.tolist(), split_columns(echelon_form, rank_found)[0]
     basis = []
     with field.working():
-        for free in (j for j in range(columns) if j not in set(pivots)):
+        for k in (j for j in range(columns) if j not in set(pivots)):
             vector = [field.zero] * columns
-            vector[free] = field.one
+            vector[k] = field.one
             for i, pivot in enumerate(pivots):
-                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], denominator)
+                vector[pivot] = -rows[i][k] if rows is not None else fmpq(-integers[i, k], denominator)
             basis.append(tuple(vector))
     return basis
 
@@ -101,12 +101,12 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     """Return the coprime integers proportional to a rational vector; the first nonzero integer is positive."""
     integers, _ = over_common_denominator(vector)
-    common = content(integers)
-    if common == 0:
+    gcd = content(integers)
+    if gcd == 0:
         return tuple(integers)
     if next(integer for integer in integers if integer != 0) < 0:
-        common = -common
-    return tuple(integer // common for integer in integers)
+        gcd = -gcd
+    return tuple(integer // gcd for integer in integers)
 
 
 class EntryMatrix(ABC):
@@ -140,8 +140,8 @@ class EntryMatrix(ABC):
     def tolist(self) -> list[list[Any]]:
         return [self._entries[i * self._columns : (i + 1) * self._columns] for i in range(self._rows)]
 
-    def __getitem__(self, place: tuple[int, int]) -> Any:
-        i, j = place
+    def __getitem__(self, position: tuple[int, int]) -> Any:
+        i, j = position
         if not (0 <= i < self._rows and 0 <= j < self._columns):
             raise IndexError(f"index {i},{j} exceeds matrix dimensions")
         return self._entries[i * self._columns + j]
@@ -155,10 +155,10 @@ class EntryMatrix(ABC):
             return NotImplemented
         if (self._rows, self._columns) != (other._rows, other._columns):
             raise ValueError("incompatible shapes for matrix addition")
-        return self._like([a + b for a, b in zip(self._entries, other._entries, strict=True)])
+        return self._with_entries([a + b for a, b in zip(self._entries, other._entries, strict=True)])
 
     def __neg__(self) -> Self:
-        return self._like([-entry for entry in self._entries])
+        return self._with_entries([-entry for entry in self._entries])
 
     def __sub__(self, other: Self) -> Self:
         if not isinstance(other, type(self)):
@@ -180,7 +180,7 @@ class EntryMatrix(ABC):
 
     def __rmul__(self, other: Any) -> Self:
         factor = operand(self.field, other)
-        return NotImplemented if factor is None else self._like([entry * factor for entry in self._entries])
+        return NotImplemented if factor is None else self._with_entries([entry * factor for entry in self._entries])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):
@@ -192,7 +192,7 @@ class EntryMatrix(ABC):
     def __repr__(self) -> str:
         return "\n".join(f"[{', '.join(self.field.format(entry) for entry in row)}]" for row in self.tolist())
 
-    def _like(self, entries: Sequence[Any]) -> Self:
+    def _with_entries(self, entries: Sequence[Any]) -> Self:
         return type(self)(self.field, self._rows, self._columns, entries)
 
 
@@ -208,23 +208,23 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []
         for column in range(matrix.ncols()):
-            row = len(pivots)
-            others = [k for k in range(row, len(rows)) if not _is_zero(rows[k][column])]
-            if not others:
+            target_row = len(pivots)
+            candidates = [k for k in range(target_row, len(rows)) if not _is_zero(rows[k][column])]
+            if not candidates:
                 continue
-            best = others[0]
-            if hasattr(rows[best][column], "abs_lower"):  # over balls take the pivot farthest from zero
-                best = max(others, key=lambda k: rows[k][column].abs_lower())
-                if rows[best][column].contains(0):
+            pivot_row = candidates[0]
+            if hasattr(rows[pivot_row][column], "abs_lower"):  # over balls take the pivot farthest from zero
+                pivot_row = max(candidates, key=lambda k: rows[k][column].abs_lower())
+                if rows[pivot_row][column].contains(0):
                     raise PrecisionLost("the rank cannot be decided with balls this wide: use more bits")
-            rows[row], rows[best] = rows[best], rows[row]
-            lead = rows[row][column]
-            rows[row] = [entry / lead for entry in rows[row]]
-            rows[row][column] = field.one  # exactly 1; over balls lead / lead is only a ball around 1
+            rows[target_row], rows[pivot_row] = rows[pivot_row], rows[target_row]
+            pivot_entry = rows[target_row][column]
+            rows[target_row] = [entry / pivot_entry for entry in rows[target_row]]
+            rows[target_row][column] = field.one  # exactly 1; over balls the quotient is only a ball around 1
             for i in range(len(rows)):
-                if i != row and not _is_zero(rows[i][column]):
+                if i != target_row and not _is_zero(rows[i][column]):
                     factor = rows[i][column]
-                    rows[i] = [a - factor * b for a, b in zip(rows[i], rows[row], strict=True)]
+                    rows[i] = [a - factor * b for a, b in zip(rows[i], rows[target_row], strict=True)]
                     rows[i][column] = field.zero
             pivots.append(column)
         return rows, pivots

@@ -32,13 +32,13 @@ def kernel_minors(
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
     for row, layer in zip(rows[1:], _layers(width), strict=True):
         if check_pairs is not None:
-            pairs = ((row[j], minors[without]) for _, products in layer for j, without, _ in products)
+            pairs = ((row[j], minors[smaller_mask]) for _, products in layer for j, smaller_mask, _ in products)
             check_pairs([(entry, minor) for entry, minor in pairs if entry is not None and minor is not None])
-        larger: dict[int, Any] = {}
+        larger_minors: dict[int, Any] = {}
         for mask, products in layer:
             total: Any = None
-            for j, without, is_negative in products:
-                entry, minor = row[j], minors[without]
+            for j, smaller_mask, is_negative in products:
+                entry, minor = row[j], minors[smaller_mask]
                 if entry is None or minor is None:
                     continue
                 term = times(entry, minor)
@@ -46,11 +46,11 @@ def kernel_minors(
                     total = -term if total is None else total - term
                 else:
                     total = term if total is None else total + term
-            larger[mask] = total
-        minors = larger
+            larger_minors[mask] = total
+        minors = larger_minors
     all_columns = (1 << width) - 1
-    maximal = (minors[all_columns ^ 1 << j] for j in range(width))
-    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal)]
+    maximal_minors = (minors[all_columns ^ 1 << j] for j in range(width))
+    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal_minors)]
 
 
 @cache

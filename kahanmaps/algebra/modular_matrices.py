@@ -18,7 +18,7 @@ def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
     return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat(rows, prime)
 
 
-def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
+def reduced_echelon_form(A: nmod_mat) -> tuple[nmod_mat, int]:
     """Return the reduced echelon form of a matrix modulo a prime, and its rank."""
     _count_elimination(A)
     form, rank = A.rref()
@@ -51,7 +51,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
     """Return the reduced echelon basis of the null space of the matrix with these rows, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
-    form, rank = reduced(matrix([row[::-1] for row in rows], prime))
+    form, rank = reduced_echelon_form(matrix([row[::-1] for row in rows], prime))
     return [vector[::-1] for vector in reversed(kernel(form, rank))]
 
 
@@ -76,10 +76,10 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]
     """
-    prime, (pivot_columns, free) = form.modulus(), split_columns(form, rank)
-    count_work(len(free) * (len(pivot_columns) / 3 + form.ncols() / 50))
+    prime, (pivot_columns, free_columns) = form.modulus(), split_columns(form, rank)
+    count_work(len(free_columns) * (len(pivot_columns) / 3 + form.ncols() / 50))
     basis = []
-    for k in free:
+    for k in free_columns:
         vector = [0] * form.ncols()
         vector[k] = 1
         for i, j in enumerate(pivot_columns):
@@ -94,7 +94,7 @@ def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """Return the reduced echelon basis of the span of vectors modulo a prime."""
     if not vectors:
         return []
-    form, rank = reduced(matrix(vectors, prime))
+    form, rank = reduced_echelon_form(matrix(vectors, prime))
     return integers(form)[:rank]
 
 

@@ -49,7 +49,7 @@ NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
 BLANKS = " \t\r\n"
 _NUMBER = re.compile(r"([+-]?)(?:([0-9]+)/([0-9]+)|([0-9]+)?(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?)")
 # p/q with powers, as in 10^-6, 1/10**6, 2^10/3^4: the parser of expressions bounds the exponents and the digits.
-_POWER = re.compile(r"(?=[^*^]*[*^])[+-]?[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?(?:/[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?)?")
+_POWERS = re.compile(r"(?=[^*^]*[*^])[+-]?[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?(?:/[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?)?")
 _START_OF_NUMBER = re.compile(
     r"[+-]?(?:[0-9]+(?:/[0-9]*|\.?[0-9]*(?:[eE][+-]?[0-9]*)?)|\.(?:[0-9]+(?:[eE][+-]?[0-9]*)?)?)?"
 )
@@ -75,16 +75,16 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
     """
     if isinstance(names, str):
         raise InputError(f"found the text {quoted(names)}, expected a list of names such as ['x', 'y']")
-    seen = set()
+    previous_names = set()
     for name in names:
         if not is_name(name.rstrip("~") if iterates and isinstance(name, str) else name):
             found_text = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
             raise InputError(
                 f"found {found_text}, expected a name: ASCII letters, digits and _, not starting with a digit"
             )
-        if name in seen:
+        if name in previous_names:
             raise InputError(f"found the name {quoted(name)} twice, expected distinct names")
-        seen.add(name)
+        previous_names.add(name)
 
 
 def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLimits) -> fmpq:
@@ -98,7 +98,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
     if end - start > digits + 20:
         found_text = f"found a number of {end - start} characters"
         raise ExpressionError(f"{found_text}, expected at most {digits} digits", text, start)
-    if _POWER.fullmatch(text, start, end):
+    if _POWERS.fullmatch(text, start, end):
         try:
             return parse_constant(text[start:end], limits=limits)
         except ExpressionError as error:
@@ -108,8 +108,8 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         prefix = _START_OF_NUMBER.match(text, start, end)
         column = start if prefix is None else prefix.end()
         raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
-    sign, numerator, denominator, integer_part, fraction, power = match.groups()
-    if max(len(numerator or ""), len(denominator or ""), len(integer_part or "") + len(fraction or "")) > digits:
+    sign, numerator, denominator, integer_part, fraction_digits, exponent = match.groups()
+    if max(len(numerator or ""), len(denominator or ""), len(integer_part or "") + len(fraction_digits or "")) > digits:
         raise ExpressionError(f"found a number of more than {digits} digits, expected at most {digits}", text, start)
     if denominator is not None:
         divisor = fmpz(denominator)
@@ -117,17 +117,17 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
             raise ExpressionError("found the denominator 0, expected a nonzero integer", text, match.start(3))
         value = fmpq(fmpz(numerator), divisor)
     else:
-        value = fmpq(fmpz((integer_part or "") + (fraction or "")))
-        shift = -len(fraction or "")
-        if power is not None:
+        value = fmpq(fmpz((integer_part or "") + (fraction_digits or "")))
+        shift = -len(fraction_digits or "")
+        if exponent is not None:
             # Check the length first: Python's int() raises for more than 4300 digits.
-            size = power.lstrip("+-").lstrip("0")
-            if len(size) > 9 or int(size or "0") > limits.power_of_ten:
-                found_text = f"found the power of ten {quoted(power)}"
+            exponent_digits = exponent.lstrip("+-").lstrip("0")
+            if len(exponent_digits) > 9 or int(exponent_digits or "0") > limits.power_of_ten:
+                found_text = f"found the power of ten {quoted(exponent)}"
                 raise ExpressionError(
                     f"{found_text}, expected at most {limits.power_of_ten} in size", text, match.start(6)
                 )
-            shift += int(power)
+            shift += int(exponent)
         if shift:
             ten = fmpz(10) ** abs(shift)
             value = value * ten if shift > 0 else value / ten
@@ -185,11 +185,11 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
         found_text = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
         raise ExpressionError(f"found {found_text}, expected {dimension}, separated by commas", text)
     point = []
-    for entry, (start, end) in enumerate(entries, 1):
+    for number, (start, end) in enumerate(entries, 1):
         try:
             point.append(number_in(text, start, end, limits.number_digits, limits))
         except ExpressionError as error:
-            raise ExpressionError(f"entry {entry}: {error.message}", text, error.column) from None
+            raise ExpressionError(f"entry {number}: {error.message}", text, error.column) from None
     return tuple(point)
 
 
@@ -206,17 +206,17 @@ def point_entries(text: str) -> list[tuple[int, int]]:
         end -= 1
     if text[start : start + 1] + text[end - 1 : end] in ("[]", "()", "{}"):
         start, end = start + 1, end - 1
-    inside = text[start:end]
-    if not inside.strip(BLANKS):
+    inner_text = text[start:end]
+    if not inner_text.strip(BLANKS):
         return []
-    separator = "," if "," in inside else r"[ \t\r\n]+"
+    separator = "," if "," in inner_text else r"[ \t\r\n]+"
     if separator != ",":
-        start += len(inside) - len(inside.lstrip(BLANKS))
-        inside = inside.strip(BLANKS)
-    separators = [match.span() for match in re.finditer(separator, inside)]
-    starts = [0, *(last for _, last in separators)]
-    ends = [*(first for first, _ in separators), len(inside)]
-    return [(start + first, start + last) for first, last in zip(starts, ends, strict=True)]
+        start += len(inner_text) - len(inner_text.lstrip(BLANKS))
+        inner_text = inner_text.strip(BLANKS)
+    separators = [match.span() for match in re.finditer(separator, inner_text)]
+    starts = [0, *(right for _, right in separators)]
+    ends = [*(left for left, _ in separators), len(inner_text)]
+    return [(start + left, start + right) for left, right in zip(starts, ends, strict=True)]
 
 
 def parse_polynomial(
@@ -298,7 +298,7 @@ _TOKEN = re.compile(
 )
 _END = "end"
 
-_WRITE = {
+_CHARACTER_HINTS = {
     "\u2212": "write the minus sign as -",
     "\u2013": "write the minus sign as -",
     "\u00b7": "write a product as x*y",
@@ -362,7 +362,7 @@ def _tokens(text: str) -> Iterator[Token]:
             continue
         match = _TOKEN.match(text, column)
         if match is None:
-            hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
+            hint = _CHARACTER_HINTS.get(text[column], "use numbers, names and + - * / ^ ( )")
             found_text = repr(text[column])
             if not (text[column].isascii() and text[column].isprintable()):
                 found_text = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
@@ -380,27 +380,27 @@ def _parse(arithmetic: _Arithmetic) -> _Quotient:
         raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
     if not text.strip(BLANKS):
         raise ExpressionError("found nothing, expected an expression such as x^2/2 - y", text)
-    opened: list[int] = []
+    open_columns: list[int] = []
     for match in re.finditer(r"[()]", text):
         column = match.start()
         if match[0] == "(":
-            opened.append(column)
-            if len(opened) > limits.depth:
+            open_columns.append(column)
+            if len(open_columns) > limits.depth:
                 raise ExpressionError(f"found brackets nested more than {limits.depth} deep: simplify", text, column)
-        elif opened:
-            opened.pop()
+        elif open_columns:
+            open_columns.pop()
         else:
             raise ExpressionError("found ')' without its '(', expected brackets in pairs", text, column)
-    if opened:
-        raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
-    reader = _Reader(arithmetic)
+    if open_columns:
+        raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, open_columns[-1])
+    reader = _Parser(arithmetic)
     value = reader.sum()
     if reader.next.kind != _END:
         raise _syntax_error(reader.next, arithmetic)
     return value
 
 
-class _Reader:
+class _Parser:
     """A recursive reader of sums of products of powers, from left to right.
 
     A sign binds more weakly than a power, so that -x^2 is -(x^2), and powers associate to the right, so that 2^3^2 is
@@ -434,9 +434,9 @@ class _Reader:
         while self.next.kind in ("^", "**"):
             bases.append((signs, value, self.take()))
             signs, value = self.signs(), self.atom()
-        value = self.arithmetic.negated(signs, value)
+        value = self.arithmetic.apply_signs(signs, value)
         for signs, base, operator in reversed(bases):
-            value = self.arithmetic.negated(signs, self.arithmetic.power(base, operator, value))
+            value = self.arithmetic.apply_signs(signs, self.arithmetic.power(base, operator, value))
         return value
 
     def signs(self) -> list[Token]:
@@ -449,9 +449,9 @@ class _Reader:
         token = self.take()
         if token.kind == "(":
             value = self.sum()
-            closing = self.take()
-            if closing.kind != ")":
-                raise _syntax_error(closing, self.arithmetic)
+            closing_token = self.take()
+            if closing_token.kind != ")":
+                raise _syntax_error(closing_token, self.arithmetic)
             return value
         if token.kind not in ("number", "name"):
             raise _syntax_error(token, self.arithmetic)
@@ -466,16 +466,16 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
     if token.kind == _END:
         return ExpressionError(f"found the end of the text, {_OPERAND}", text, len(text))
     column = token.start_pos
-    before = text[:column].rstrip(BLANKS)
-    if token.kind not in ("name", "number", "(") or not before or before[-1] in "+-*/^(":
+    prefix = text[:column].rstrip(BLANKS)
+    if token.kind not in ("name", "number", "(") or not prefix or prefix[-1] in "+-*/^(":
         return ExpressionError(f"found {quoted(token)}, {_OPERAND}", text, column)
-    start = len(before) - 1
-    while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
+    start = len(prefix) - 1
+    while start > 0 and (prefix[start - 1].isalnum() or prefix[start - 1] in "_.") and prefix[-1] != ")":
         start -= 1
-    operand = before[start:]
+    operand = prefix[start:]
     if token.kind == "(" and is_name(operand) and operand not in arithmetic.names:
-        call = f"found {quoted(operand + '(')}, which looks like a function call"
-        return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
+        found_text = f"found {quoted(operand + '(')}, which looks like a function call: only + - * / ^ are available"
+        return ExpressionError(f"{found_text}, and products are written with *", text, start)
     example = f"{operand}*{token}" if len(operand) + len(token) < 40 else "x*y"
     found_text = f"found {quoted(token)} right after {quoted(operand)}"
     return ExpressionError(f"{found_text}, expected an operator between them: write {example}", text, column)
@@ -512,7 +512,7 @@ class _Arithmetic:
     def number(self, token: Token) -> _Quotient:
         start = token.start_pos
         value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
-        self.spend(1, value.height_bits(), start)
+        self.spend_words(1, value.height_bits(), start)
         return self.constant(value)
 
     def name(self, token: Token) -> _Quotient:
@@ -546,21 +546,21 @@ class _Arithmetic:
         def sum_of(values: list[_Polynomial]) -> _Polynomial:
             """Add in pairs: if the terms were added one by one, the growing sum would be copied for each term."""
             while len(values) > 1:
-                odd = values[-1:] if len(values) % 2 else []
+                unpaired_values = values[-1:] if len(values) % 2 else []
                 pairs = zip(values[::2], values[1::2], strict=False)
-                values = [self.add(left, right, column) for left, right in pairs] + odd
+                values = [self.add(left, right, column) for left, right in pairs] + unpaired_values
             return values[0]
 
         if not fractions:
             return _Quotient(sum_of(polynomials), None)
-        common, numerator = fractions[0][0], sum_of(fractions[0][1])
+        common_denominator, numerator = fractions[0][0], sum_of(fractions[0][1])
         for denominator, terms in fractions[1:]:
-            crossed = self.times(sum_of(terms), common, column)
-            numerator = self.add(self.times(numerator, denominator, column), crossed, column)
-            common = self.times(common, denominator, column)
+            cross_product = self.times(sum_of(terms), common_denominator, column)
+            numerator = self.add(self.times(numerator, denominator, column), cross_product, column)
+            common_denominator = self.times(common_denominator, denominator, column)
         if polynomials:
-            numerator = self.add(numerator, self.times(sum_of(polynomials), common, column), column)
-        return _Quotient(numerator, common)
+            numerator = self.add(numerator, self.times(sum_of(polynomials), common_denominator, column), column)
+        return _Quotient(numerator, common_denominator)
 
     def product(self, pieces: list[Any]) -> _Quotient:
         numerator, denominator = self.one, None
@@ -576,13 +576,13 @@ class _Arithmetic:
                 )
         return _Quotient(numerator, denominator)
 
-    def negated(self, signs: list[Token], value: _Quotient) -> _Quotient:
-        minus = sum(sign == "-" for sign in signs) % 2
-        return self.negative(value, signs[0].start_pos) if minus else value
+    def apply_signs(self, signs: list[Token], value: _Quotient) -> _Quotient:
+        is_negative = sum(sign == "-" for sign in signs) % 2
+        return self.negative(value, signs[0].start_pos) if is_negative else value
 
-    def power(self, base: _Quotient, operator: Token, power: _Quotient) -> _Quotient:
+    def power(self, base: _Quotient, operator: Token, exponent_value: _Quotient) -> _Quotient:
         column = operator.start_pos
-        exponent = _constant(power)
+        exponent = _constant(exponent_value)
         if exponent is None:
             raise self.error_at("found an exponent with variables in it, expected an integer", column)
         if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
@@ -596,7 +596,8 @@ class _Arithmetic:
             return self.constant(fmpq(1))
         numerator, denominator = base
         return _Quotient(
-            self.repeated(numerator, n, column), None if denominator is None else self.repeated(denominator, n, column)
+            self.integer_power(numerator, n, column),
+            None if denominator is None else self.integer_power(denominator, n, column),
         )
 
     def reciprocal(self, value: _Quotient, column: int) -> _Quotient:
@@ -608,15 +609,16 @@ class _Arithmetic:
             return _Quotient(self.times_number(denominator, 1 / number, column), None)
         if not self.quotients:
             raise self.error_at("found a division by something with variables in it, expected a polynomial", column)
-        leading = numerator.element.leading_coefficient()
-        if leading == 1:
+        leading_coefficient = numerator.element.leading_coefficient()
+        if leading_coefficient == 1:
             return _Quotient(denominator, numerator)
         # Make the leading coefficient 1, so that denominators that differ by a constant factor become equal.
-        self.spend(numerator.terms, numerator.bits, column)
-        monic = numerator._replace(
-            element=numerator.element / leading, common_denominator=abs((leading * numerator.common_denominator).p)
+        self.spend_words(numerator.terms, numerator.bits, column)
+        monic_numerator = numerator._replace(
+            element=numerator.element / leading_coefficient,
+            common_denominator=abs((leading_coefficient * numerator.common_denominator).p),
         )
-        return _Quotient(self.times_number(denominator, 1 / leading, column), monic)
+        return _Quotient(self.times_number(denominator, 1 / leading_coefficient, column), monic_numerator)
 
     def negative(self, value: _Quotient, column: int) -> _Quotient:
         return _Quotient(self.times_number(value.numerator, fmpq(-1), column), value.denominator)
@@ -634,8 +636,8 @@ class _Arithmetic:
             )
             self.check_bits(denominator_bits, column)
         self.check_bits(bits, column)
-        self.spend(left.terms + right.terms, bits, column)
-        return self.measured(left.element + right.element, common_denominator, bits, column)
+        self.spend_words(left.terms + right.terms, bits, column)
+        return self.limited_polynomial(left.element + right.element, common_denominator, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         if right is self.one:
@@ -648,8 +650,8 @@ class _Arithmetic:
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             found_text = f"found a product of polynomials with {left.terms} and {right.terms} terms"
             raise self.error_at(f"{found_text}, which is too large to expand", column)
-        self.spend(pairs, bits_of_pair, column)
-        return self.measured(
+        self.spend_words(pairs, bits_of_pair, column)
+        return self.limited_polynomial(
             left.element * right.element, left.common_denominator * right.common_denominator, bits, column
         )
 
@@ -658,18 +660,18 @@ class _Arithmetic:
             return value
         bits = value.bits + _bits(number.p)
         self.check_bits(max(bits, _bits(value.common_denominator) + _bits(number.q)), column)
-        self.spend(value.terms, bits, column)
+        self.spend_words(value.terms, bits, column)
         return value._replace(
             element=value.element * number, common_denominator=value.common_denominator * number.q, bits=bits
         )
 
-    def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
+    def integer_power(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
         """Compute the n-th power by squaring, for n > 0; the size of each product is checked."""
         self.check_degree(value.degree * n, "a power", column)
         if value.terms == 1:
             bits = value.bits * n
             self.check_bits(max(bits, _bits(value.common_denominator) * n), column)
-            self.spend(1, bits, column)
+            self.spend_words(1, bits, column)
             return _Polynomial(value.element**n, value.common_denominator**n, bits, 1, value.degree * n)
         result = value
         for digit in f"{n:b}"[1:]:
@@ -680,7 +682,7 @@ class _Arithmetic:
 
     # The limits, and the errors raised if a limit is exceeded.
 
-    def measured(self, value: Any, common_denominator: fmpz, bits: int, column: int) -> _Polynomial:
+    def limited_polynomial(self, value: Any, common_denominator: fmpz, bits: int, column: int) -> _Polynomial:
         if isinstance(value, fmpq):
             return self.constant(value).numerator
         if len(value) > self.limits.terms:
@@ -701,7 +703,7 @@ class _Arithmetic:
         if degree > self.limits.degree:
             raise self.error_at(f"found {operation} of degree {degree}, expected at most {self.limits.degree}", column)
 
-    def spend(self, terms: int, bits: int, column: int) -> None:
+    def spend_words(self, terms: int, bits: int, column: int) -> None:
         """Count the machine words of `terms` terms whose coefficients have this number of bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
@@ -716,15 +718,15 @@ class _Arithmetic:
             return UnknownName(f"found the name {quoted(name)}, expected numbers only", self.text, column)
         suggestion = ""
         if len(name) <= 40:  # the search for a similar name takes quadratic time
-            folded = {other.lower(): other for other in names}
+            by_lowercase = {other.lower(): other for other in names}
             from difflib import get_close_matches
 
-            suggestion = "".join(folded[other] for other in get_close_matches(name.lower(), folded, 1, 0.7))
+            suggestion = "".join(by_lowercase[other] for other in get_close_matches(name.lower(), by_lowercase, 1, 0.7))
             products = (f"{name[:i]}*{name[i:]}" for i in range(1, len(name)) if {name[:i], name[i:]} <= set(names))
             suggestion = next(products, suggestion)
         hint = f"did you mean {suggestion}? " if suggestion else ""
-        listed = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
-        return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
+        names_text = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
+        return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {names_text}", self.text, column)
 
 
 def _constant(value: _Quotient) -> fmpq | None:

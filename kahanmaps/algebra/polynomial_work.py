@@ -14,10 +14,10 @@ from flint import fmpq_mpoly, nmod_mpoly, nmod_poly
 from kahanmaps.algebra.work import count_work
 
 
-def product_units(length: int, other: int) -> float:
+def product_units(length: int, other_length: int) -> float:
     """Return the units of a product of two polynomials of these lengths, or of two series with as many terms."""
-    short, long = (length, other) if length < other else (other, length)
-    return 0.4 + long * (0.05 + min(short / 3000, 0.05 * short.bit_length()))
+    min_length, max_length = (length, other_length) if length < other_length else (other_length, length)
+    return 0.4 + max_length * (0.05 + min(min_length / 3000, 0.05 * min_length.bit_length()))
 
 
 def series_units(length: int) -> float:
@@ -25,9 +25,9 @@ def series_units(length: int) -> float:
     return 0.5 + 2 * product_units(length, length)
 
 
-def gcd_units(length: int, common: int = 0) -> float:
-    """Return the units of a gcd of two polynomials of this length, if the gcd has the length `common`."""
-    return 0.5 + length * (0.2 + min((length - common) / 500, 0.1 * sqrt(length)))
+def gcd_units(length: int, gcd_length: int = 0) -> float:
+    """Return the units of a gcd of two polynomials of this length, if the gcd has the length `gcd_length`."""
+    return 0.5 + length * (0.2 + min((length - gcd_length) / 500, 0.1 * sqrt(length)))
 
 
 def minpoly_units(length: int) -> float:
@@ -35,9 +35,9 @@ def minpoly_units(length: int) -> float:
     return 3 + length * (1.2 + min(length / 100, 0.2 * sqrt(length)))
 
 
-def roots_units(length: int, roots: int = 0) -> float:
-    """Return the units of finding the roots of a polynomial of this length modulo a 61-bit prime."""
-    return 150 * (product_units(length, length) + product_units(roots, roots) * roots.bit_length())
+def roots_units(length: int, root_count: int = 0) -> float:
+    """Return the units of finding the `root_count` roots of a polynomial of this length modulo a 61-bit prime."""
+    return 150 * (product_units(length, length) + product_units(root_count, root_count) * root_count.bit_length())
 
 
 def counted_product(left: Any, right: Any) -> Any:

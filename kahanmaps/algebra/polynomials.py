@@ -50,8 +50,8 @@ def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
     (x, y)
     """
     if len(set(names)) != len(names):
-        repeated = sorted({name for name in names if list(names).count(name) > 1})
-        raise InputError(f"found the variable {quoted(repeated[0])} twice, expected distinct names")
+        repeated_names = sorted({name for name in names if list(names).count(name) > 1})
+        raise InputError(f"found the variable {quoted(repeated_names[0])} twice, expected distinct names")
     return fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
 
 
@@ -114,9 +114,9 @@ def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
     if count == 1:
         yield (of_degree,)
         return
-    for first in range(of_degree, -1, -1):
-        for others in monomials(count - 1, of_degree - first):
-            yield (first, *others)
+    for first_exponent in range(of_degree, -1, -1):
+        for remaining_exponents in monomials(count - 1, of_degree - first_exponent):
+            yield (first_exponent, *remaining_exponents)
 
 
 def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
@@ -134,8 +134,8 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
     integers, denominator = over_common_denominator(
         coefficient for polynomial in polynomials for coefficient in polynomial.coeffs()
     )
-    longest = max([denominator, *integers], key=abs)
-    return int(longest.bit_length() * 0.30103) + 1
+    largest = max([denominator, *integers], key=abs)
+    return int(largest.bit_length() * 0.30103) + 1
 
 
 def over_one_denominator(
@@ -150,13 +150,13 @@ def over_one_denominator(
     ([y^2, x], x*y)
     """
 
-    def substituted(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+    def substitute_images(polynomial: fmpq_mpoly) -> fmpq_mpoly:
         count = polynomial.context().nvars()
         if count:
             return polynomial.compose(*images[:count], ctx=context)
         return context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
 
-    pairs = [(substituted(function.numerator), substituted(function.denominator)) for function in functions]
+    pairs = [(substitute_images(function.numerator), substitute_images(function.denominator)) for function in functions]
     denominator = context.constant(1)
     for _, entry_denominator in pairs:
         denominator = denominator * entry_denominator / denominator.gcd(entry_denominator)
@@ -211,9 +211,9 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
         total: Any = fmpz(0)
         for monomial, coefficient in polynomial.terms():
             term: Any = coefficient.p * (denominator // coefficient.q)
-            for table, exponent in zip(powers, (*monomial, total_degree - int(sum(monomial))), strict=True):
+            for base_powers, exponent in zip(powers, (*monomial, total_degree - int(sum(monomial))), strict=True):
                 if exponent:
-                    term = term * _power(table, exponent)
+                    term = term * _power(base_powers, exponent)
             total += term
         return fmpq(total, denominator * _power(powers[-1], total_degree))
     field_value = field.value(polynomial, point)
@@ -232,31 +232,31 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     return total
 
 
-def _power(table: list[Any], exponent: int) -> Any:
-    """Return table[1]^exponent from a table of powers, which is extended as needed."""
-    while len(table) <= exponent:
-        table.append(table[-1] * table[1])
-    return table[exponent]
+def _power(powers: list[Any], exponent: int) -> Any:
+    """Return powers[1]^exponent from a list of powers, which is extended as needed."""
+    while len(powers) <= exponent:
+        powers.append(powers[-1] * powers[1])
+    return powers[exponent]
 
 
 def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> tuple[fmpq_mpoly, ...]:
     """Return the product of `matrix` and the column vector of `polynomials`."""
     zero: Any = polynomials[0].context().constant(0)
-    combined = []
+    combinations = []
     for i in range(matrix.nrows()):
         total = zero
         for j, polynomial in enumerate(polynomials):
             if matrix[i, j] != fmpq(0):
                 total = total + matrix[i, j] * polynomial
-        combined.append(total)
-    return tuple(combined)
+        combinations.append(total)
+    return tuple(combinations)
 
 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
     """Replace some variables by numbers; the result is in the ring of the remaining variables."""
     names = names_of(polynomial)
-    replaced: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
-    return polynomial.subs(replaced).project_to_context(ring([name for name in names if name not in replaced]))
+    numbers: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
+    return polynomial.subs(numbers).project_to_context(ring([name for name in names if name not in numbers]))
 
 
 def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
@@ -306,8 +306,8 @@ class RationalFunction(LatexDisplay):
         y
         """
         count_work(10 + (len(numerator) + len(denominator)) / 2)
-        common = numerator.gcd(denominator)
-        return cls(numerator / common, denominator / common)
+        gcd = numerator.gcd(denominator)
+        return cls(numerator / gcd, denominator / gcd)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RationalFunction):
@@ -356,34 +356,32 @@ class RationalFunction(LatexDisplay):
 # Pickling.
 
 
-def _polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ...], fmpq]) -> fmpq_mpoly:
+def _make_polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ...], fmpq]) -> fmpq_mpoly:
     return fmpq_mpoly_ctx.get(names, Ordering[ordering]).from_dict(terms)
 
 
-def _of_ball(x: arb) -> tuple[Any, ...]:
-    """Return midpoint and radius as exact integers times powers of 2, independent of the current precision."""
-    return arb, tuple(end.man_exp() if end.is_finite() else float(end) for end in (x.mid(), x.rad()))
-
-
-def _residue(value: int, modulus: int) -> fmpz_mod:
+def _make_residue(value: int, modulus: int) -> fmpz_mod:
     return fmpz_mod_ctx(modulus)(value)
 
 
-def _of_matrix(A: Any) -> tuple[Any, ...]:
+def _reduce_matrix(A: Any) -> tuple[Any, ...]:
     return type(A), (A.nrows(), A.ncols(), A.entries())
 
 
-def _of_univariate(P: Any) -> tuple[Any, ...]:
+def _reduce_univariate(P: Any) -> tuple[Any, ...]:
     return type(P), (P.coeffs(),)
 
 
-copyreg.pickle(fmpq_mat, _of_matrix)
-copyreg.pickle(fmpz_mat, _of_matrix)
-copyreg.pickle(fmpq_poly, _of_univariate)
-copyreg.pickle(fmpz_poly, _of_univariate)
-copyreg.pickle(fmpq_mpoly, lambda P: (_polynomial, (P.context().names(), P.context().ordering().name, P.to_dict())))
-copyreg.pickle(arb, _of_ball)
+copyreg.pickle(fmpq_mat, _reduce_matrix)
+copyreg.pickle(fmpz_mat, _reduce_matrix)
+copyreg.pickle(fmpq_poly, _reduce_univariate)
+copyreg.pickle(fmpz_poly, _reduce_univariate)
+copyreg.pickle(
+    fmpq_mpoly, lambda P: (_make_polynomial, (P.context().names(), P.context().ordering().name, P.to_dict()))
+)
+# Midpoint and radius are exact integers times powers of 2, independent of the current precision.
+copyreg.pickle(arb, lambda x: (arb, tuple(y.man_exp() if y.is_finite() else float(y) for y in (x.mid(), x.rad()))))
 copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
 copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
 # fmpz_mod has no method that returns its modulus p: the residue 0 x - 1 is p - 1.
-copyreg.pickle(fmpz_mod, lambda x: (_residue, (int(x), int(0 * x - 1) + 1)))
+copyreg.pickle(fmpz_mod, lambda x: (_make_residue, (int(x), int(0 * x - 1) + 1)))

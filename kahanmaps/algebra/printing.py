@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of, primitive_part
 
-_MAX_FACTORED = 2000  # maximal number of terms of a polynomial that is factored for printing
+_MAX_FACTORED_TERMS = 2000  # maximal number of terms of a polynomial that is factored for printing
 _ONE = fmpq(1)
 
 
@@ -53,17 +53,17 @@ def format_polynomial(polynomial: fmpq_mpoly) -> str:
     if not isinstance(polynomial, fmpq_mpoly):
         raise wrong_kind(polynomial, "a polynomial (fmpq_mpoly)", "make one with parse_polynomial")
     names = names_of(polynomial)
-    pieces: list[str] = []
+    texts: list[str] = []
     for monomial, coefficient in polynomial.terms():
         if coefficient < 0:
-            pieces.append(" - " if pieces else "-")
+            texts.append(" - " if texts else "-")
             coefficient = -coefficient
-        elif pieces:
-            pieces.append(" + ")
+        elif texts:
+            texts.append(" + ")
         powers = [n if k == 1 else f"{n}^{k}" for n, k in zip(names, monomial, strict=True) if k]
         product = "*".join(powers if coefficient.p == 1 and powers else [str(coefficient), *powers])
-        pieces.append(f"{product}/{coefficient.q}" if coefficient.p == 1 and powers and coefficient.q != 1 else product)
-    return "".join(pieces) or "0"
+        texts.append(f"{product}/{coefficient.q}" if coefficient.p == 1 and powers and coefficient.q != 1 else product)
+    return "".join(texts) or "0"
 
 
 def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
@@ -77,9 +77,9 @@ def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
         coefficient = polynomial[power]
         if coefficient == 0:
             continue
-        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
+        absolute, sign = abs(coefficient), "-" if coefficient < 0 else "+"
         power_text = "" if power == 0 else name if power == 1 else f"{name}^{power}"
-        number = "" if size == 1 and power_text else format_number(size) + ("*" if power_text else "")
+        number = "" if absolute == 1 and power_text else format_number(absolute) + ("*" if power_text else "")
         text += f" {sign} {number}{power_text}" if text else f"{'-' if sign == '-' else ''}{number}{power_text}"
     return text or "0"
 
@@ -114,8 +114,8 @@ def format_factored(function: RationalFunction) -> str:
     >>> format_factored(RationalFunction(2*x**3*y - 2*x*y, (x - y)**2)), format_factored(RationalFunction(x + 1, 2*y))
     ('2*x*y*(x^2 - 1)/(x - y)^2', '(x/2 + 1/2)/y')
     """
-    factored = shorter_factors(function)
-    return format_rational_function(function) if factored is None else format_product(*factored)
+    factors_and_constant = shorter_factors(function)
+    return format_rational_function(function) if factors_and_constant is None else format_product(*factors_and_constant)
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
@@ -126,22 +126,22 @@ def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, 
     """
     factors, constant, is_shorter = list[tuple[fmpq_mpoly, int]](), fmpq(1), False
     for sign, polynomial in ((1, function.numerator), (-1, function.denominator)):
-        if len(polynomial) == 0 or len(polynomial) > _MAX_FACTORED:
+        if len(polynomial) == 0 or len(polynomial) > _MAX_FACTORED_TERMS:
             return None
         content, primitive = primitive_part(polynomial)
         constant *= content**sign
         powers = [(primitive_part(g)[1], int(k)) for g, k in primitive.factor()[1]]
         variables = [power for power in powers if len(power[0]) == 1]
         cofactor = primitive / prod(g**k for g, k in variables) if variables else primitive
-        choices = [powers, [*variables, *([(cofactor, 1)] if len(cofactor) > 1 else [])]]
-        chosen = min(choices, key=lambda powers: len(format_product(powers)))
-        is_shorter |= len(chosen) > 1 or any(k > 1 for _, k in chosen)
-        for g, k in chosen:
-            same = next((n for n, (other, _) in enumerate(factors) if other == g), None)
-            if same is None:
+        factorizations = [powers, [*variables, *([(cofactor, 1)] if len(cofactor) > 1 else [])]]
+        shortest = min(factorizations, key=lambda powers: len(format_product(powers)))
+        is_shorter |= len(shortest) > 1 or any(k > 1 for _, k in shortest)
+        for g, k in shortest:
+            index = next((n for n, (factor, _) in enumerate(factors) if factor == g), None)
+            if index is None:
                 factors.append((g, sign * k))
             else:  # a common factor, since rational functions are not reduced
-                factors[same] = g, factors[same][1] + sign * k
+                factors[index] = g, factors[index][1] + sign * k
     return ([(g, k) for g, k in factors if k], constant) if is_shorter else None
 
 
@@ -179,11 +179,11 @@ def numerator_and_denominator(
     Each is a pair: a positive integer, and powers (polynomial, exponent) with short polynomials first.
     """
 
-    def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
+    def sort_key(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
         return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
 
     return [
-        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=size))
+        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=sort_key))
         for sign, number in ((1, abs(int(constant.p))), (-1, int(constant.q)))
     ]
 
@@ -198,16 +198,16 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
     >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
     x^20 + 20*x^19*y + 190*x^18*y^2
     """
-    kept: dict[tuple[int, ...], fmpq] = {}
-    names, available = names_of(polynomial), characters
+    terms: dict[tuple[int, ...], fmpq] = {}
+    names, characters_left = names_of(polynomial), characters
     for monomial, value in terms_of(polynomial):
         # Estimate the length of a number: converting a coefficient of a million digits to text takes seconds.
-        available -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
-        available -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
-        if available < 0:
+        characters_left -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
+        characters_left -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
+        if characters_left < 0:
             break
-        kept[monomial] = value
-    return polynomial if len(kept) == len(polynomial) else polynomial.context().from_dict(kept)
+        terms[monomial] = value
+    return polynomial if len(terms) == len(polynomial) else polynomial.context().from_dict(terms)
 
 
 @dataclass(frozen=True)
@@ -240,14 +240,14 @@ class Notation:
         names = names_of(polynomial)
         order = sorted(range(len(names)), key=lambda k: self.eps_first and names[k] != "eps")
         variables = {k: self.name(names[k]) for k in order}
-        first, plus, minus = self.signs
+        first_minus, plus, minus = self.signs
         terms: list[str] = []
         for monomial, coefficient in terms_of(polynomial):
             powers = ((variables[k], monomial[k]) for k in order if monomial[k])
             factors = [name if exponent == 1 else self.power(name, exponent) for name, exponent in powers]
             if not factors or abs(coefficient) != 1:  # the coefficients 1 and -1 are printed only without factors
                 factors.insert(0, self.number(abs(coefficient)))
-            sign = (minus if terms else first) if coefficient < 0 else plus if terms else ""
+            sign = (minus if terms else first_minus) if coefficient < 0 else plus if terms else ""
             terms.append(sign + self.times.join(factors))
         return terms or [self.number(fmpq(0))]
 
@@ -260,20 +260,20 @@ class Notation:
 
         Numerator and denominator start with a positive term. Common factors are not canceled, as in `RationalFunction`.
         """
-        factored = shorter_factors(function)
-        if factored is None:
+        factors_and_constant = shorter_factors(function)
+        if factors_and_constant is None:
             is_negative, *polynomials = integer_fraction(function)
             numerator, denominator = map(self.polynomial, polynomials)
             is_polynomial = polynomials[1].is_one()
         else:
             is_negative, (numerator_factors, denominator_factors) = (
-                factored[1] < 0,
-                numerator_and_denominator(*factored),
+                factors_and_constant[1] < 0,
+                numerator_and_denominator(*factors_and_constant),
             )
             numerator, denominator = self._product(*numerator_factors), self._product(*denominator_factors)
             is_polynomial = denominator_factors == (1, [])
-        absolute = numerator if is_polynomial else self.fraction(numerator, denominator)
-        return self.row(self.signs[0] + absolute) if is_negative else absolute
+        absolute_value = numerator if is_polynomial else self.fraction(numerator, denominator)
+        return self.row(self.signs[0] + absolute_value) if is_negative else absolute_value
 
     def _product(self, number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
         """Return the formula of a product: first the number and the variables, then the sums in brackets."""
@@ -302,7 +302,7 @@ def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq
     if function.is_polynomial or numerator.is_zero():
         return False, numerator, numerator.context().constant(1)
     factor = fmpq(common_denominator(numerator))
-    signs = [1 if part.coefficient(0) > 0 else -1 for part in (numerator, denominator)]
+    signs = [1 if polynomial.coefficient(0) > 0 else -1 for polynomial in (numerator, denominator)]
     return signs[0] != signs[1], numerator * (factor * signs[0]), denominator * (factor * signs[1])
 
 

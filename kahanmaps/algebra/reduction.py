@@ -12,7 +12,7 @@ from typing import Any
 from flint import fmpq, fmpq_poly, fmpz
 
 from kahanmaps.algebra.elliptic_curves import EllipticCurve
-from kahanmaps.algebra.integers import without
+from kahanmaps.algebra.integers import coprime_part
 
 _SMOOTH_BITS = 32  # prime factors with at most this number of bits are found
 _MAX_FACTORED_BITS = 140  # a cofactor with at most this number of bits is factored completely, in about a second
@@ -36,21 +36,21 @@ class BadPrimes:
     @property
     def text(self) -> str:
         """The primes in one line."""
-        parts = [", ".join(map(str, self.bad)) or "none"]
+        texts = [", ".join(map(str, self.bad)) or "none"]
         if self.bad_cofactors:
-            parts.append(f"and all primes of {', '.join(map(str, self.bad_cofactors))} (composite, not factored)")
-        unknown = [str(p) for p in self.undecided]
-        unknown += [f"primes of {n} (composite, not factored)" for n in self.undecided_cofactors]
-        if unknown:
-            parts.append(f"undecided: {', '.join(unknown)}")
-        return "; ".join(parts)
+            texts.append(f"and all primes of {', '.join(map(str, self.bad_cofactors))} (composite, not factored)")
+        undecided_texts = [str(p) for p in self.undecided]
+        undecided_texts += [f"primes of {n} (composite, not factored)" for n in self.undecided_cofactors]
+        if undecided_texts:
+            texts.append(f"undecided: {', '.join(undecided_texts)}")
+        return "; ".join(texts)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data; integers are given as text, since they may be long."""
         names = ("bad", "undecided", "bad_cofactors", "undecided_cofactors")
-        minimal = self.minimal_discriminant
+        discriminant = self.minimal_discriminant
         lists = {name: [str(n) for n in getattr(self, name)] for name in names}
-        return {**lists, "minimal_discriminant": None if minimal is None else str(minimal)}
+        return {**lists, "minimal_discriminant": None if discriminant is None else str(discriminant)}
 
 
 def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
@@ -88,21 +88,23 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
     c4, c6 = 16 * (a2 * a2 - 3 * a4), 32 * (9 * a2 * a4 - 2 * a2**3 - 27 * a6)
     discriminant = (c4**3 - c6 * c6) // 1728
     primes, composites = _factors([fmpz(6), discriminant] if divisors is None else [fmpz(6), *divisors, scale.p])
-    bad, minimal = list[int](), discriminant
+    bad, reduced_discriminant = list[int](), discriminant
     for p in sorted(primes):
-        steps = min(_valuation(c, p) // k for c, k in ((discriminant, 12), (c4, 4), (c6, 6)) if c != 0)
+        scale_exponent = min(_valuation(c, p) // k for c, k in ((discriminant, 12), (c4, 4), (c6, 6)) if c != 0)
         if p == 2:
-            a, b = c4 // fmpz(2) ** (4 * steps) % 16, c6 // fmpz(2) ** (6 * steps) % 32
-            steps -= not (b % 4 == 3 or (a == 0 and b in (0, 8)))
+            a, b = c4 // fmpz(2) ** (4 * scale_exponent) % 16, c6 // fmpz(2) ** (6 * scale_exponent) % 32
+            scale_exponent -= not (b % 4 == 3 or (a == 0 and b in (0, 8)))
         elif p == 3:
-            steps -= c6 != 0 and _valuation(c6, 3) == 6 * steps + 2
-        minimal //= fmpz(p) ** (12 * steps)
-        if minimal % p == 0:
+            scale_exponent -= c6 != 0 and _valuation(c6, 3) == 6 * scale_exponent + 2
+        reduced_discriminant //= fmpz(p) ** (12 * scale_exponent)
+        if reduced_discriminant % p == 0:
             bad.append(p)
-    certain = {n for n in composites if without(fmpz(n), curve.j.q) == 1}
+    bad_composites = {n for n in composites if coprime_part(fmpz(n), curve.j.q) == 1}
     is_known = all(c4.gcd(fmpz(n)) == 1 for n in composites)
-    minimal_discriminant = int(minimal) if is_known else None
-    return BadPrimes(tuple(bad), (), tuple(sorted(certain)), tuple(sorted(composites - certain)), minimal_discriminant)
+    minimal_discriminant = int(reduced_discriminant) if is_known else None
+    return BadPrimes(
+        tuple(bad), (), tuple(sorted(bad_composites)), tuple(sorted(composites - bad_composites)), minimal_discriminant
+    )
 
 
 def bad_primes_of_plane(gamma: Any) -> BadPrimes:
@@ -120,25 +122,27 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
     K, denominator = gamma.field, leading_coefficient(gamma)
     # Primes in the denominator of j are bad. For a number field these are the primes that divide this integer.
-    poles = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
+    pole_norm = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()
-    polynomial, ramified = fmpq_poly(delta.matrix.charpoly()), K.chi.discriminant().p
+    polynomial, field_discriminant = fmpq_poly(delta.matrix.charpoly()), K.chi.discriminant().p
     for p in sorted(primes | {2, 3}):
-        if poles % p == 0:
+        if pole_norm % p == 0:
             bad.append(p)
         elif p < 5:
             undecided.append(p)
         else:
             # The slopes are valuations divided by ramification indices, which are 1 if p does not divide disc(g).
-            indices = range(1, K.degree + 1) if ramified % p == 0 else (1,)
-            slopes = [[s * e for e in indices if (s * e).q == 1] for s in newton_slopes(polynomial, p)]
-            if any(all(n.p % 6 != 0 for n in possible) for possible in slopes):
+            indices = range(1, K.degree + 1) if field_discriminant % p == 0 else (1,)
+            valuations = [[s * e for e in indices if (s * e).q == 1] for s in newton_slopes(polynomial, p)]
+            if any(all(n.p % 6 != 0 for n in possible_valuations) for possible_valuations in valuations):
                 bad.append(p)
-            elif any(n.p % 6 != 0 for possible in slopes for n in possible):
+            elif any(n.p % 6 != 0 for possible_valuations in valuations for n in possible_valuations):
                 undecided.append(p)
-    certain = {n for n in composites if without(fmpz(n), poles) == 1}
-    return BadPrimes(tuple(bad), tuple(undecided), tuple(sorted(certain)), tuple(sorted(composites - certain)))
+    bad_composites = {n for n in composites if coprime_part(fmpz(n), pole_norm) == 1}
+    return BadPrimes(
+        tuple(bad), tuple(undecided), tuple(sorted(bad_composites)), tuple(sorted(composites - bad_composites))
+    )
 
 
 def leading_coefficient(element: Any) -> fmpz:
@@ -158,15 +162,17 @@ def newton_slopes(polynomial: fmpq_poly, p: int) -> set[fmpq]:
     points = [(k, _valuation(c.p, p) - _valuation(fmpz(c.q), p)) for k, c in enumerate(polynomial.coeffs()) if c != 0]
     slopes, (k, height) = set[fmpq](), points[0]
     while k < points[-1][0]:
-        slope, neg = min((fmpq(y - height, x - k), -x) for x, y in points if x > k)
+        slope, negative_x = min((fmpq(y - height, x - k), -x) for x, y in points if x > k)
         slopes.add(-slope)
-        k, height = -neg, height + int(slope * (-neg - k))
+        k, height = -negative_x, height + int(slope * (-negative_x - k))
     return slopes
 
 
 def _factors(numbers: Iterable[fmpz]) -> tuple[set[int], set[int]]:
-    found = [factor_within_bound(number) for number in numbers]
-    return set().union(*(primes for primes, _ in found)), set().union(*(composites for _, composites in found))
+    factorizations = [factor_within_bound(number) for number in numbers]
+    return set().union(*(primes for primes, _ in factorizations)), set().union(
+        *(composites for _, composites in factorizations)
+    )
 
 
 def _valuation(number: fmpz, p: int) -> int:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from flint import fmpq, fmpz, fmpz_mat
 
-_MAX_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8) for the modulus m; Wang's bound is m^(1/2)
+_MAX_LATTICE_RESIDUES = 7  # residues in one lattice: heights up to m^(7/8) for the modulus m; Wang's bound is m^(1/2)
 _SPARE_BITS = 4  # a common denominator must be shorter by this number of bits than for random residues
 
 
@@ -40,14 +40,14 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
     True
     """
     bound = int(fmpz((modulus - 1) // 2).isqrt())
-    numerator, denominator = (modulus, 0), (residue % modulus, 1)
-    while denominator[0] > bound:
-        quotient = numerator[0] // denominator[0]
-        numerator, denominator = (
-            denominator,
-            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+    previous, remainder = (modulus, 0), (residue % modulus, 1)
+    while remainder[0] > bound:
+        quotient = previous[0] // remainder[0]
+        previous, remainder = (
+            remainder,
+            (previous[0] - quotient * remainder[0], previous[1] - quotient * remainder[1]),
         )
-    n, d = denominator
+    n, d = remainder
     if d == 0 or abs(d) > bound or fmpz(n).gcd(fmpz(d)) != 1:
         return None
     return fmpq(n, d)
@@ -64,16 +64,16 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
     >>> simple_fraction(10**20 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
     (100000000000000000000/7, None)
     """
-    numerator, denominator = (modulus, 0), (residue % modulus, 1)
-    best = denominator
-    while denominator[0] * abs(denominator[1]):
-        best = min(best, denominator, key=lambda pair: pair[0] * abs(pair[1]))
-        quotient = numerator[0] // denominator[0]
-        numerator, denominator = (
-            denominator,
-            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+    previous, remainder = (modulus, 0), (residue % modulus, 1)
+    simplest_pair = remainder
+    while remainder[0] * abs(remainder[1]):
+        simplest_pair = min(simplest_pair, remainder, key=lambda pair: pair[0] * abs(pair[1]))
+        quotient = previous[0] // remainder[0]
+        previous, remainder = (
+            remainder,
+            (previous[0] - quotient * remainder[0], previous[1] - quotient * remainder[1]),
         )
-    n, d = best
+    n, d = simplest_pair
     return fmpq(n, d) if n * abs(d) < modulus >> spare_bits else None
 
 
@@ -89,13 +89,13 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     >>> rational_vector(residues, m) == tuple(numbers), rational_reconstruction(residues[0], m) == numbers[0]
     (True, False)
     """
-    nontrivial = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
-    step = -(-len(nontrivial) // _MAX_TOGETHER) or 1
-    chosen = [residues[i] for i in nontrivial[::step]]
-    denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
+    nontrivial_indices = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
+    step = -(-len(nontrivial_indices) // _MAX_LATTICE_RESIDUES) or 1
+    sample = [residues[i] for i in nontrivial_indices[::step]]
+    denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(sample)
     if k > 1:
         # The least q > 0 with small q r modulo `modulus`, provided that both are smaller than for random residues.
-        rows = [[1, *chosen], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
+        rows = [[1, *sample], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
         if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k:
@@ -139,27 +139,30 @@ def from_residues(
     [(355/113,), (-7/12157665459056928801,)]
     """
     rng = random.Random(0)
-    residues, modulus, guesses, next_guess = list[list[int]](), 1, list[tuple[fmpq, ...]](), 2
+    residues, modulus, candidates, next_count = list[list[int]](), 1, list[tuple[fmpq, ...]](), 2
     for count in range(1, max_primes + 1):
         prime = random_prime(rng)
-        new = modulo(prime)
-        if new is None:
+        new_residues = modulo(prime)
+        if new_residues is None:
             return None
-        if guesses and all(
+        if candidates and all(
             (x.p - r * x.q) % prime == 0
-            for guess, group in zip(guesses, new, strict=True)
-            for x, r in zip(guess, group, strict=True)
+            for fractions, group in zip(candidates, new_residues, strict=True)
+            for x, r in zip(fractions, group, strict=True)
         ):
-            return guesses
-        residues = [chinese(old, modulus, group, prime) for old, group in zip(residues or new, new, strict=True)]
+            return candidates
+        residues = [
+            chinese(group_residues, modulus, group, prime)
+            for group_residues, group in zip(residues or new_residues, new_residues, strict=True)
+        ]
         modulus *= prime
-        guesses = []
-        if count >= next_guess:  # not after each prime, since a guess takes longer than evaluating modulo a prime
+        candidates = []
+        if count >= next_count:  # not after each prime, since a guess takes longer than evaluating modulo a prime
             for group in residues:
-                guess = rational_vector(group, modulus)
-                if guess is None:
-                    guesses = []
+                fractions = rational_vector(group, modulus)
+                if fractions is None:
+                    candidates = []
                     break
-                guesses.append(guess)
-            next_guess = count + 1 + count // 6
+                candidates.append(fractions)
+            next_count = count + 1 + count // 6
     return None

@@ -25,8 +25,8 @@ from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
 MAX_DEGREE = 12
-_FORM = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
-_SQUARE_ROOT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
+_ROOT_TEXT = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
+_SQUARE_ROOT_TEXT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
 _GUARD_BITS = 64
 
 
@@ -100,8 +100,8 @@ class Root:
 
     def real_approximation(self, bits: int = 256) -> fmpq:
         """Return a rational approximation of the real root with this number of bits."""
-        middle = self._real(bits).mid()
-        mantissa, exponent = middle.man_exp()
+        midpoint = self._real(bits).mid()
+        mantissa, exponent = midpoint.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
     def residues(self, field: PrimeField) -> list[int]:
@@ -109,8 +109,8 @@ class Root:
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
-        residues = [int(field.convert(c)) for c in self.polynomial.coeffs()]
-        roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
+        coefficients = [int(field.convert(c)) for c in self.polynomial.coeffs()]
+        roots = sorted(int(root) for root, _ in nmod_poly(coefficients, p).roots())
         if not roots:
             raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: use another prime", p)
         return roots
@@ -130,13 +130,13 @@ class Root:
             real_roots: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not real_roots:
                 raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
-            middle = arb(0 if near is None else near)
-            first, *others = sorted(real_roots, key=lambda root: float(abs(root - middle)))
-            if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # the two may overlap
+            center = arb(0 if near is None else near)
+            closest, *others = sorted(real_roots, key=lambda root: float(abs(root - center)))
+            if others and (near is None or not abs(closest - center) < abs(others[0] - center)):  # the two may overlap
                 texts = ", ".join(root.str(6, radius=False) for root in real_roots)
                 example = real_roots[-1].str(4, radius=False)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {example}")
-            return first
+            return closest
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Root) and bool(self.polynomial == other.polynomial) and self.near == other.near
@@ -196,15 +196,15 @@ def parse_algebraic_point(
             raise InputError(f"entry {number}: {error}\n{hint}") from None
         except InputError as error:
             raise InputError(f"entry {number}: {error}") from None
-    occurring = [k for k, name in enumerate(roots) if any(name not in entry.unused_gens() for entry in entries)]
-    if len(occurring) > 1:
-        names = " and ".join(list(roots)[k] for k in occurring)
+    occurring_indices = [k for k, name in enumerate(roots) if any(name not in entry.unused_gens() for entry in entries)]
+    if len(occurring_indices) > 1:
+        names = " and ".join(list(roots)[k] for k in occurring_indices)
         raise InputError(f"found the algebraic numbers {names} in a point, expected one")
-    if not occurring:
+    if not occurring_indices:
         return tuple(entry.leading_coefficient() if entry else fmpq(0) for entry in entries)
-    name, root = list(roots.items())[occurring[0]]
+    name, root = list(roots.items())[occurring_indices[0]]
     generator = ring([name]).gens()[0]
-    values = [generator if k == occurring[0] else generator * 0 for k in range(len(roots))]
+    values = [generator if k == occurring_indices[0] else generator * 0 for k in range(len(roots))]
     return AlgebraicPoint(root, tuple(entry.compose(*values, ctx=generator.context()) for entry in entries))
 
 
@@ -214,17 +214,17 @@ def parse_root(text: str) -> Root | None:
     >>> print(parse_root("-sqrt(2)"), parse_root("1/2"))
     root of t^2 - 2 near -1.414 None
     """
-    square = _SQUARE_ROOT.fullmatch(text)
-    if square is not None:
-        number = parse_number(square["number"])
-        side = -1 if square["sign"] else 1  # any number of the same sign selects the root
-        return Root(fmpq_poly([-number, 0, 1]), fmpq(side) if number > 0 else None)
-    match = _FORM.fullmatch(text)
-    if match is None:
+    square_root_match = _SQUARE_ROOT_TEXT.fullmatch(text)
+    if square_root_match is not None:
+        number = parse_number(square_root_match["number"])
+        sign = -1 if square_root_match["sign"] else 1  # any number of the same sign selects the root
+        return Root(fmpq_poly([-number, 0, 1]), fmpq(sign) if number > 0 else None)
+    form_match = _ROOT_TEXT.fullmatch(text)
+    if form_match is None:
         return None
-    names = sorted(set(re.findall(r"[A-Za-z_]\w*", match["g"])))
+    names = sorted(set(re.findall(r"[A-Za-z_]\w*", form_match["g"])))
     if len(names) != 1:
         raise InputError(f"found {quoted(text)}, expected a polynomial in one variable, e.g. root of t^2 - 2")
-    terms = {int(e): c for (e,), c in parse_polynomial(match["g"], names).terms()}
+    terms = {int(e): c for (e,), c in parse_polynomial(form_match["g"], names).terms()}
     coefficients = [terms.get(k, fmpq(0)) for k in range(max(terms, default=0) + 1)]
-    return Root(fmpq_poly(coefficients), None if match["near"] is None else parse_number(match["near"]))
+    return Root(fmpq_poly(coefficients), None if form_match["near"] is None else parse_number(form_match["near"]))

@@ -49,11 +49,8 @@ class SolutionComponent:
     @property
     def free(self) -> tuple[int, ...]:
         """The indices of the free variables."""
-        occurs = [False] * self.values[0].context().nvars()
-        for value in (*self.values, *self.equations):
-            for i, exponent in enumerate(value.degrees()):
-                occurs[i] = occurs[i] or exponent > 0
-        return tuple(i for i, u in enumerate(occurs) if u)
+        degrees = [polynomial.degrees() for polynomial in (*self.values, *self.equations)]
+        return tuple(i for i, column in enumerate(zip(*degrees, strict=True)) if max(column) > 0)
 
     @property
     def point(self) -> tuple[fmpq, ...]:
@@ -67,13 +64,10 @@ class SolutionComponent:
 
     def contains(self, other: SolutionComponent) -> bool:
         """Whether this linear family contains `other`, a linear family or a point."""
-        size = len(self.values)
         directions = [self.direction(i) for i in self.free]
-        space = fmpq_mat(size, len(directions), [direction[k] for k in range(size) for direction in directions])
         offset = [a - b for a, b in zip(other.point, self.point, strict=True)]
-        vectors = [offset, *(other.direction(i) for i in other.free)]
-        joined = fmpq_mat([[*space.tolist()[k], *(v[k] for v in vectors)] for k in range(size)])
-        return int(joined.rank()) == len(directions)
+        vectors = [*directions, offset, *(other.direction(i) for i in other.free)]
+        return int(fmpq_mat(vectors).rank()) == len(directions)
 
 
 @dataclass
@@ -112,35 +106,35 @@ def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly
     solver = _Solver(budget)
     solver.solve(list(equations), tuple(variables))
     solutions = solver.solutions
-    solutions.components = without_contained(solutions.components)
+    solutions.components = maximal_components(solutions.components)
     solutions.irrational = list(dict.fromkeys(solutions.irrational))
     return solutions
 
 
-def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
+def echelon_basis(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     """Return the reduced echelon basis of the linear span, with coprime integer coefficients.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
-    >>> independent([x**2 + x, x**2 + y, x - y])
+    >>> echelon_basis([x**2 + x, x**2 + y, x - y])
     [x^2 + y, x - y]
     """
-    nonzero = [p for p in polynomials if not p.is_zero()]
-    if not nonzero:
+    nonzero_polynomials = [p for p in polynomials if not p.is_zero()]
+    if not nonzero_polynomials:
         return []
-    context = nonzero[0].context()
+    context = nonzero_polynomials[0].context()
     # A sum of all the monomials lists them in the order of the ring.
-    order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
-    places = {tuple(m): k for k, m in enumerate(order)}
-    count_work(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 30)
-    matrix = fmpq_mat(len(nonzero), len(places))
-    for i, p in enumerate(nonzero):
+    monomials = context.from_dict({m: fmpq(1) for p in nonzero_polynomials for m in p.monoms()}).monoms()
+    monomial_column = {tuple(m): k for k, m in enumerate(monomials)}
+    count_work(20 + 7 * sum(map(len, nonzero_polynomials)) + len(nonzero_polynomials) ** 2 * len(monomial_column) / 30)
+    matrix = fmpq_mat(len(nonzero_polynomials), len(monomial_column))
+    for i, p in enumerate(nonzero_polynomials):
         for monomial, value in p.terms():
-            matrix[i, places[tuple(monomial)]] = value
-    reduced, rank = matrix.rref()
+            matrix[i, monomial_column[tuple(monomial)]] = value
+    echelon_form, rank = matrix.rref()
     basis = []
     for i in range(rank):
-        row = {m: reduced[i, k] for k, m in enumerate(order) if reduced[i, k] != 0}
+        row = {m: echelon_form[i, k] for k, m in enumerate(monomials) if echelon_form[i, k] != 0}
         basis.append(primitive_part(context.from_dict(row))[1])
     return basis
 
@@ -155,14 +149,14 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
     """
     context = p.context()
     remainder = context.constant(0)
-    leads = [(tuple(g.monoms()[0]), g) for g in basis]
+    leading_monomials = [(tuple(g.monoms()[0]), g) for g in basis]
     while not p.is_zero():
         leading_exponents, leading_coefficient = tuple(p.monoms()[0]), p.leading_coefficient()
-        count_work(10 + len(p) + len(leads) / 2)
-        for lead, g in leads:
-            if all(a <= b for a, b in zip(lead, leading_exponents, strict=True)):
+        count_work(10 + len(p) + len(leading_monomials) / 2)
+        for divisor, g in leading_monomials:
+            if all(a <= b for a, b in zip(divisor, leading_exponents, strict=True)):
                 cofactor = context.from_dict(
-                    {tuple(b - a for a, b in zip(lead, leading_exponents, strict=True)): fmpq(1)}
+                    {tuple(b - a for a, b in zip(divisor, leading_exponents, strict=True)): fmpq(1)}
                 )
                 p = p - g * cofactor * (leading_coefficient / g.leading_coefficient())
                 break
@@ -193,10 +187,10 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
         second_derivatives = (total.derivative(i).derivative(j) for i in range(count) for j in range(count))
         return fmpq_mat(count, count, [evaluate(p, QQ, point) for p in second_derivatives])
 
-    first = hessian()
-    if first.det() == 0:
+    first_hessian = hessian()
+    if first_hessian.det() == 0:
         return None
-    ratio = first.solve(hessian())
+    ratio = first_hessian.solve(hessian())
     _, factors = ratio.charpoly().factor()
     blocks = []
     for factor, multiplicity in factors:
@@ -209,75 +203,74 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
     # Return None unless the forms decouple: other coordinates would only make the coefficients longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
-    check = T.transpose() * hessian() * T
-    is_decoupled = all(check[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
+    T_hessian = T.transpose() * hessian() * T
+    is_decoupled = all(T_hessian[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
     return T if is_decoupled and len(blocks) > 1 else None
 
 
 class _Solver:
+    """The recursion of `solve_system`; `stop_reason` is not empty once a limit has ended it."""
+
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
         self.solutions = Solutions()
-        self.stopped = ""
+        self.stop_reason = ""
 
     def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], is_basis: bool = False) -> None:
         """Add the solutions of `equations` to the result; `is_basis` says that these form a Groebner basis."""
-        if self.stopped:  # the reason is already in the result
+        if self.stop_reason:  # the reason is already in the result
             return
         count_work(50)
-        original = [p for p in equations if not p.is_zero()]
-        equations = equations if is_basis else independent(equations)
-        if len(original) > len(equations):
-            original = equations
+        original_equations = [p for p in equations if not p.is_zero()]
+        equations = equations if is_basis else echelon_basis(equations)
+        if len(original_equations) > len(equations):
+            original_equations = equations
         if any(p.is_constant() for p in equations):
             return
         if not equations:
             self.solutions.components.append(SolutionComponent(values))
             return
         if self.budget.is_spent:
-            self.stopped = SPENT
+            self.stop_reason = SPENT
         elif len(self.solutions.components) + len(self.solutions.unsolved) > MAX_PARTS:
-            self.stopped = f"there are more than {MAX_PARTS} parts"
-        if self.stopped:
-            self._give_up(equations, values, self.stopped)
+            self.stop_reason = f"there are more than {MAX_PARTS} parts"
+        if self.stop_reason:
+            self._give_up(equations, values, self.stop_reason)
             return
         for p in sorted(equations, key=degree):
             if degree(p) == 1:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
-                count_work(sum(20 + len(q) * len(p) for q in (*original, *values)))
-                substituted = [
-                    tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (original, values)
-                ]
-                self.solve(list(substituted[0]), substituted[1])
+                count_work(sum(20 + len(q) * len(p) for q in (*original_equations, *values)))
+                new_equations = [q.compose(*gens, ctx=context) for q in original_equations]
+                self.solve(new_equations, tuple(q.compose(*gens, ctx=context) for q in values))
                 return
         # The reduced basis may hide factors of the original equations, as for x f, y g, z h: factor both.
-        best = _easiest_product(equations) or _easiest_product(original)
-        if best is not None:
-            for factor in sorted(best, key=lambda q: (degree(q), str(q))):
+        factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original_equations)
+        if factors is not None:
+            for factor in sorted(factors, key=lambda q: (degree(q), str(q))):
                 # Use remainders: otherwise the solver would branch on the same product again.
-                self.solve([factor, *(divmod(p, factor)[1] for p in original)], values)
+                self.solve([factor, *(divmod(p, factor)[1] for p in original_equations)], values)
             return
         for p in equations:
             if sum(e > 0 for e in p.degrees()) == 1:  # in one variable, irreducible and not linear: no rational root
                 self._no_rational_point(str(primitive_part(p)[1]), equations, values)
                 return
         if is_basis:
-            self._finite(equations, values)
+            self._solve_finite(equations, values)
             return
         basis = groebner(equations, self.budget)
         if basis is None:
-            spent = self.budget.is_spent
-            self._give_up(equations, values, SPENT if spent else "a Groebner basis would be too large")
+            self._give_up(equations, values, SPENT if self.budget.is_spent else "a Groebner basis would be too large")
             self.solutions.without_basis.append(SolutionComponent(values, tuple(equations)))
             return
         self.solve(basis, values, is_basis=True)
 
-    def _finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
+    def _solve_finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         """Branch on the rational values of a linear form if the Groebner basis shows finitely many solutions."""
-        free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
-        quotient = quotient_monomials(basis, free)
+        free_variables = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
+        quotient = quotient_monomials(basis, free_variables)
         if quotient is None:
             self._give_up(basis, values, "the solutions are not isolated points, and not linear families")
             return
@@ -285,15 +278,15 @@ class _Solver:
             self._give_up(basis, values, f"there are {len(quotient)} solutions over the complex numbers")
             return
         gens = basis[0].context().gens()
-        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free)), basis[0].context().constant(0))
-        context, places = form.context(), {m: k for k, m in enumerate(quotient)}
+        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free_variables)), basis[0].context().constant(0))
+        context, monomial_index = form.context(), {m: k for k, m in enumerate(quotient)}
         matrix = fmpq_mat(len(quotient), len(quotient))  # multiplication by the form in the quotient ring
         for k, m in enumerate(quotient):
             if self.budget.is_spent:
                 self._give_up(basis, values, SPENT)
                 return
             for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
-                matrix[places[tuple(int(e) for e in monomial)], k] = value
+                matrix[monomial_index[tuple(int(e) for e in monomial)], k] = value
         size = max((max(abs(e.p), e.q).bit_length() for e in matrix.entries()), default=1)
         count_work(20 + len(quotient) ** 3 * size / 200)
         _, factors = matrix.charpoly().factor()
@@ -305,8 +298,8 @@ class _Solver:
                 for coefficient in reversed(factor.coeffs()):
                     vector = matrix * vector
                     vector[0, 0] += coefficient
-                at_form = context.from_dict(dict(zip(quotient, vector.entries(), strict=True)))
-                self._no_rational_point(text, [*basis, at_form], values)
+                factor_value = context.from_dict(dict(zip(quotient, vector.entries(), strict=True)))
+                self._no_rational_point(text, [*basis, factor_value], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
 
@@ -321,7 +314,7 @@ class _Solver:
         self.solutions.reason = reason
 
 
-def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
+def _factors_to_branch_on(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
     """Return the factors of the equation that is best to branch on; None if no equation factors."""
     # Factors of high degree lead to long branches, so the equation whose largest factor has the least degree is taken.
     products = []
@@ -335,8 +328,8 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
         else:
             continue
         products.append(p.factor()[1])
-    reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
-    return min(reducible, key=lambda factors: (max(map(degree, factors)), sum(map(len, factors))), default=None)
+    factor_lists = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
+    return min(factor_lists, key=lambda factors: (max(map(degree, factors)), sum(map(len, factors))), default=None)
 
 
 def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly] | None:
@@ -355,7 +348,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     guard = sum(1 << 16 * i + 15 for i in range(integers.nvars()))
     # A heap of pairs of polynomials, ordered by the least common multiple of their leading monomials.
     pairs: list[tuple[int, list[int], int, int]] = []
-    waiting: set[tuple[int, int]] = set()  # the pairs in the heap, for lookups
+    pending_pairs: set[tuple[int, int]] = set()  # the pairs in the heap, for lookups
     bits = 1  # length of the longest coefficient
 
     def pack(monomial: Iterable[int]) -> int:
@@ -372,7 +365,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             lcm = list(map(max, lead, other))
             if sum(lcm) < sum(lead) + sum(other):  # otherwise the S-polynomial reduces to 0 (Buchberger's criterion)
                 heappush(pairs, (sum(lcm), [-e for e in reversed(lcm)], i, len(basis)))
-                waiting.add((i, len(basis)))
+                pending_pairs.add((i, len(basis)))
         basis.append(p)
         leads.append(lead)
         packed.append(pack(lead))
@@ -380,8 +373,8 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
 
     for p in filter(None, equations):
         denominator = common_denominator(p)
-        cleared = integers.from_dict({tuple(m): c.p * (denominator // c.q) for m, c in p.terms()})
-        if not add(cleared.primitive()[1]):
+        integer_polynomial = integers.from_dict({tuple(m): c.p * (denominator // c.q) for m, c in p.terms()})
+        if not add(integer_polynomial.primitive()[1]):
             return None
     variable_count = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))
     vector = fmpz_mpoly_vec(basis, integers)
@@ -389,7 +382,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         if budget.is_spent:
             return None
         lcm_degree, _, i, j = heappop(pairs)
-        waiting.remove((i, j))
+        pending_pairs.remove((i, j))
         count_work(4 + len(basis) / 10)
         # Buchberger's chain criterion: skip the pair if a third leading monomial divides the least common multiple of
         # its leading monomials, and both pairs with the third polynomial are done.
@@ -397,14 +390,16 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         if any(
             (guarded_lcm - lead) & guard == guard
             and k not in (i, j)
-            and (min(i, k), max(i, k)) not in waiting
-            and (min(j, k), max(j, k)) not in waiting
+            and (min(i, k), max(i, k)) not in pending_pairs
+            and (min(j, k), max(j, k)) not in pending_pairs
             for k, lead in enumerate(packed)
         ):
             continue
         s_polynomial = basis[i].spoly(basis[j])
-        mean = sum(map(len, basis)) / len(basis)
-        count_work(5 + mean * lcm_degree * variable_count * sqrt(variable_count * bits * len(s_polynomial)) / 200)
+        mean_length = sum(map(len, basis)) / len(basis)
+        count_work(
+            5 + mean_length * lcm_degree * variable_count * sqrt(variable_count * bits * len(s_polynomial)) / 200
+        )
         remainder = s_polynomial.reduction_primitive_part(vector)
         if not remainder.is_zero():
             if not add(remainder):
@@ -413,29 +408,28 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in vector.autoreduction()]
 
 
-def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
+def quotient_monomials(basis: Sequence[fmpq_mpoly], free_variables: Sequence[int]) -> list[tuple[int, ...]] | None:
     """Return the monomials that no leading monomial of the basis divides; None if there are infinitely many."""
-    leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
-    for i in free:
-        if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leading):
+    leads = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
+    for i in free_variables:
+        if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leads):
             return None
-    count = len(leading[0])
+    count = len(leads[0])
     layer, monomials = [(0,) * count], []
     while layer:
-        layer = [m for m in layer if not any(all(a <= b for a, b in zip(lead, m, strict=True)) for lead in leading)]
+        layer = [m for m in layer if not any(all(a <= b for a, b in zip(lead, m, strict=True)) for lead in leads)]
         monomials += layer
         if len(monomials) > 4 * MAX_QUOTIENT:
             return monomials
-        raised = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free))
-        layer = list(dict.fromkeys(raised))
+        next_layer = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free_variables))
+        layer = list(dict.fromkeys(next_layer))
     return monomials
 
 
-def without_contained(components: Sequence[SolutionComponent]) -> list[SolutionComponent]:
+def maximal_components(components: Sequence[SolutionComponent]) -> list[SolutionComponent]:
     """Remove components that are equal to another component or contained in one."""
-    ordered = sorted(components, key=lambda c: -len(c.free))
     maximal: list[SolutionComponent] = []
-    for component in ordered:
+    for component in sorted(components, key=lambda c: -len(c.free)):
         if not any(larger.contains(component) for larger in maximal):
             maximal.append(component)
     return sorted(maximal, key=lambda c: (len(c.free), [str(v) for v in c.values]))

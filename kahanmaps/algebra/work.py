@@ -54,7 +54,7 @@ class Budget:
 
     def __init__(self, units: float = inf) -> None:
         self.units = float(units)
-        self._before = counted()
+        self._units_before = counted()
 
     def __repr__(self) -> str:
         return f"Budget({self.units:.0f})"
@@ -62,7 +62,7 @@ class Budget:
     @property
     def spent(self) -> int:
         """The units counted since the budget was created."""
-        return counted() - self._before
+        return counted() - self._units_before
 
     @property
     def left(self) -> float:
@@ -105,15 +105,15 @@ def counted_cache(size: int) -> Callable[[Callable[..., Any]], Callable[..., Any
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         @lru_cache(size)
-        def cached(*arguments: Any) -> tuple[Any, int]:
-            before = counted()
-            return function(*arguments), counted() - before
+        def call_cached(*arguments: Any) -> tuple[Any, int]:
+            units_before = counted()
+            return function(*arguments), counted() - units_before
 
         @wraps(function)
         def call(*arguments: Any) -> Any:
-            before = counted()
-            result, units = cached(*arguments)
-            count_work(units - (counted() - before))
+            units_before = counted()
+            result, units = call_cached(*arguments)
+            count_work(units - (counted() - units_before))
             return result
 
         return call

@@ -30,7 +30,7 @@ from kahanmaps.certificates.identities import (
     invariant_tensor,
     limited,
     map_data,
-    restricted,
+    restrict,
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
@@ -38,11 +38,11 @@ from kahanmaps.checks.claims import Certainty, Finding, Report
 from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
 from kahanmaps.documents.expressions import formula_text
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.laboratory import Separated, separated
+from kahanmaps.laboratory.laboratory import SeparatedSystem, separate_planes
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
@@ -85,13 +85,13 @@ class Certificate(str):
         cls, checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
     ) -> Certificate:
         """Write the script; `terms` is the number of terms that the program multiplies out."""
-        pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
-        about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
-        left_out = [f"Not in this certificate: {reason}" for reason in skipped]
-        text = cls(CHECKERS[checker](claims, [*header, *about, *left_out]))
+        names_and_texts = [(claim.name, getattr(claim, "about", "")) for claim in claims]
+        about_lines = [f"{name}: {text}" for name, text in dict.fromkeys(names_and_texts) if text]
+        skipped_lines = [f"Not in this certificate: {reason}" for reason in skipped]
+        text = cls(CHECKERS[checker](claims, [*header, *about_lines, *skipped_lines]))
         text.claims = tuple(claim.name for claim in claims)
-        start, by_byte, by_term = _SECONDS[checker]
-        text.seconds = start + by_byte * len(text.encode()) + by_term * terms
+        startup_seconds, seconds_per_byte, seconds_per_term = _SECONDS[checker]
+        text.seconds = startup_seconds + seconds_per_byte * len(text.encode()) + seconds_per_term * terms
         return text
 
     @property
@@ -159,65 +159,65 @@ def certificate(
         raise InputError(f"found claims = {claims!r}, expected a list: claims=[{claims!r}]")
     with limited(effort) as limits:
         file = as_file(system)
-        formulas, data = _prepared(file, checker)
-        planes, proved = _Planes(file, data), list[Claim]()
+        formulas, data = _prepare(file, checker)
+        planes, proved_claims = _Planes(file, data), list[Claim]()
         if commute is not None:
-            others = (claims, integrals, density, tensor, period, equivalent)
-            if everything or any(other is not None for other in others):
+            other_arguments = (claims, integrals, density, tensor, period, equivalent)
+            if everything or any(other is not None for other in other_arguments):
                 raise InputError("a certificate that two maps commute cannot be combined with other claims")
-            proved = _commuting(file, data, commute)
+            proved_claims = _commuting_claims(file, data, commute)
         if equivalent is not None:
-            proved.append(_equivalence(file, data, as_file(equivalent), by))
+            proved_claims.append(_equivalence_claim(file, data, as_file(equivalent), by))
         if period is not None:
             if integer(period, "period") < 1:
                 raise InputError(f"found period = {period}, expected a positive integer")
-            proved.append(periodic(data, integer(period, "period")))
+            proved_claims.append(periodic(data, integer(period, "period")))
         if integrals is not None:
             for name, f in claimed_functions(file, integrals).items():
-                proved += planes.claims(conserved_function, name, f)
+                proved_claims += planes.claims(conserved_function, name, f)
         if density is not None:
-            proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
+            proved_claims.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
         if tensor is not None:
             matrix = claimed_tensor(file, tensor)
             assert matrix is not None
-            proved.append(invariant_tensor(data, "P", matrix.rows))
-        known = dict(_known_claims(formulas, planes, checker))
-        searches = {name: search for name, search in _SEARCHES.items() if name not in known}
+            proved_claims.append(invariant_tensor(data, "P", matrix.rows))
+        provers = dict(_known_claims(formulas, planes, checker))
+        searches = {name: search for name, search in _SEARCHES.items() if name not in provers}
         is_required = claims is not None
         if claims is None:
-            claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-            unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
+            claims = [] if proved_claims and not everything else [*provers, *(searches if everything else ())]
+            omitted_names = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
             has_integral = bool(formulas.integrals) or formulas.H is not None  # then the entropy is not positive
-            unwanted |= {ENTROPY} if has_integral or not everything else set()
-            claims = [name for name in claims if name not in unwanted]
+            omitted_names |= {ENTROPY} if has_integral or not everything else set()
+            claims = [name for name in claims if name not in omitted_names]
         skipped = []
         for name in claims:
-            if name not in known and name not in searches:
-                expected = ", ".join([*known, *searches])
+            if name not in provers and name not in searches:
+                expected = ", ".join([*provers, *searches])
                 raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
             try:
-                new = known[name]() if name in known else _claims_of(searches[name](file), data, planes)
-                if is_required and not new:
+                new_claims = provers[name]() if name in provers else _claims_of(searches[name](file), data, planes)
+                if is_required and not new_claims:
                     raise InputError(
                         f"the search for {name!r} proves nothing about {file.name}: no certificate is written"
                     )
-                proved += [claim for claim in new if all(claim is not other for other in proved)]
+                proved_claims += [claim for claim in new_claims if all(claim is not other for other in proved_claims)]
             except FalseClaim:
                 raise
             except InputError as error:  # if all claims are requested, those with too long identities are omitted
                 if is_required:
                     raise
                 skipped.append(f"{name}: {error}")
-        if skipped and not proved:
+        if skipped and not proved_claims:
             raise InputError(f"no certificate of {file.name} can be written: {skipped[0]}")
-        if not proved and is_required:
+        if not proved_claims and is_required:
             raise InputError("found an empty list of claims, expected names, or None for all that need no search")
-        if not proved:
+        if not proved_claims:
             raise InputError(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return Certificate.of(checker, proved, formulas.header(command), skipped, limits.terms)
+        return Certificate.of(checker, proved_claims, formulas.header(command), skipped, limits.terms)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -227,11 +227,11 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     >>> known_claims(load("euler_top"), "integrals")
     ['F1', 'F2']
     """
-    formulas, data = _prepared(file, "gp")
+    formulas, data = _prepare(file, "gp")
     names = [name for name, _ in _known_claims(formulas, _Planes(file, data))]
-    special = {"measure": {VOLUME, DETERMINANT}, "poisson": {TENSOR, UNPROVED}}
-    if check in special:
-        return [name for name in names if name in special[check]]
+    names_of_check = {"measure": {VOLUME, DETERMINANT}, "poisson": {TENSOR, UNPROVED}}
+    if check in names_of_check:
+        return [name for name in names if name in names_of_check[check]]
     return [name for name in names if name not in (VOLUME, DETERMINANT, TENSOR, UNPROVED, ENTROPY)]
 
 
@@ -257,15 +257,21 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
     """
     result = getattr(result, "finding", result)  # a commuting system contains its finding
     if isinstance(result, Report | Finding):
-        return _of_check(result, checker, command)
-    parts: list[Any] = [result]
+        arguments = dict(result.certified)
+        if "why_not" in arguments or not arguments:
+            about = "no other program is told how to check these claims" if isinstance(result, Report) else result.claim
+            raise InputError(arguments.get("why_not", f"no certificate is known for this claim: {about}"))
+        if check := arguments.pop("known", ""):
+            arguments["claims"] = known_claims(arguments["system"], check)
+        return certificate(checker=checker, command=command, **arguments)
+    sub_results: list[Any] = [result]
     skipped = list[str]()
     if isinstance(result, Analysis):
-        parts = [result.integrals, result.densities, result.poisson]
+        sub_results = [result.integrals, result.densities, result.poisson]
         if result.symbols:
             skipped.append("symmetries, commuting and equivalent systems: they are about the values in the file")
         else:
-            parts += [result.symmetries, result.commuting, result.equivalent]
+            sub_results += [result.symmetries, result.commuting, result.equivalent]
     if isinstance(result, Analysis | Search):
         file, symbols = result.file, result.symbols
     elif isinstance(result, Equivalence) and result.file is not None:
@@ -281,23 +287,23 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         raise InputError(f"the system has the {root} for a parameter: expected rational numbers for a certificate")
     is_of_flow, eps = getattr(result, "flow", False) is True, getattr(result, "eps", None)
     if is_of_flow or eps is not None:
-        what = "the flow" if is_of_flow else f"eps = {eps}"
-        raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
-    formulas, data = _prepared(file, checker, symbols)
+        scope_text = "the flow" if is_of_flow else f"eps = {eps}"
+        raise InputError(f"a certificate is about a map, for every eps: found a result for {scope_text}")
+    formulas, data = _prepare(file, checker, symbols)
     claims = list[Claim]()
-    finds: dict[str, Callable[[], list[Any]]] = {
-        type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
+    provers: dict[str, Callable[[], list[Any]]] = {
+        type(r).__name__: partial(_claims_of, r, data) for r in sub_results if r is not None
     }
     if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
-        finds[ENTROPY] = dict(_known_claims(formulas, _Planes(file, data), checker))[ENTROPY]
+        provers[ENTROPY] = dict(_known_claims(formulas, _Planes(file, data), checker))[ENTROPY]
     with limited(1) as limits:
-        for name, find in finds.items():
+        for name, prove in provers.items():
             try:
-                claims += find()
+                claims += prove()
             except FalseClaim:
                 raise
             except InputError as error:  # of an analysis, results with too long identities are omitted
-                if parts == [result]:
+                if sub_results == [result]:
                     raise
                 skipped.append(f"{name}: {error}")
     if not claims:
@@ -305,18 +311,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
     return Certificate.of(checker, claims, formulas.header(command), skipped, limits.terms)
 
 
-def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
-    """The certificate of a check (of all its claims), or of one finding."""
-    arguments = dict(result.certified)
-    if "why_not" in arguments or not arguments:
-        about = "no other program is told how to check these claims" if isinstance(result, Report) else result.claim
-        raise InputError(arguments.get("why_not", f"no certificate is known for this claim: {about}"))
-    if known := arguments.pop("known", ""):
-        arguments["claims"] = known_claims(arguments["system"], known)
-    return certificate(checker=checker, command=command, **arguments)
-
-
-def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
+def _prepare(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
     """The formulas of a single map over Q, and the equation of this map."""
     if checker not in CHECKERS:
         raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
@@ -330,37 +325,40 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
     return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
-def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
+def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
     """The claims that maps commute, in coordinates that separate the planes if possible; `label` begins their names."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
-        others = [associate.system for associate in listed_associates(file.member)]
-        others += [others[0].scaled(-1)] if len(others) == 1 else []  # as in check_commute
-        maps: list[MapFamily] = [as_map(system) for system in others]
+        systems = [associate.system for associate in listed_associates(file.member)]
+        systems += [systems[0].scaled(-1)] if len(systems) == 1 else []  # as in check_commute
+        maps: list[MapFamily] = [as_map(system) for system in systems]
     else:
-        second = as_file(other)
-        g, _ = matched(file, second)
+        other_file = as_file(other)
+        g, _ = match_variables(file, other_file)
         if g.variables != file.map.variables or not hasattr(g, "rows") or g.symbols:
-            raise InputError(f"expected two single maps in the same variables, got {file.name} and {second.name}")
+            raise InputError(f"expected two single maps in the same variables, got {file.name} and {other_file.name}")
         maps = [file.map, g]
 
     claims: list[Claim] = []
-    given = [data.with_rows(map_.rows) for map_ in maps]
-    separate = separated(file.system) if file.is_quadratic else None
-    if separate is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
-        T, zero = separate.T, [fmpq(0)] * file.dim
-        moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
-        in_planes = [data.with_rows(as_map(system).rows) for system in moved]
-        pairs = enumerate(zip(in_planes, given, strict=True), 1)
+    map_data_list = [data.with_rows(map_.rows) for map_ in maps]
+    separation = separate_planes(file.system) if file.is_quadratic else None
+    if separation is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
+        T, zero = separation.T, [fmpq(0)] * file.dim
+        planar_systems = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
+        planar_data = [data.with_rows(as_map(system).rows) for system in planar_systems]
+        pairs = enumerate(zip(planar_data, map_data_list, strict=True), 1)
         claims += [affine_symmetry(z, f"{label}coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
-        given = in_planes
-    pairs_of = combinations(range(len(given)), 2)
-    claims += [commuting(f"{label}maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
+        map_data_list = planar_data
+    index_pairs = combinations(range(len(map_data_list)), 2)
+    claims += [
+        commuting(f"{label}maps_{i + 1}_and_{j + 1}_commute", map_data_list[i], map_data_list[j])
+        for i, j in index_pairs
+    ]
     return claims
 
 
-def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequence[Any]) -> AffineSymmetry:
+def _equivalence_claim(file: SystemFile, data: MapData, other: SystemFile, by: Sequence[Any]) -> AffineSymmetry:
     """The claim that the affine map `by` takes the Kahan map of the file to the Kahan map of the other system."""
     n = file.dim
     if not (file.is_quadratic and other.is_quadratic) or other.dim != n or len(by) != n:
@@ -384,20 +382,20 @@ def _known_claims(
     """Yield the claims of the file, then those from theorems, as names with functions that compute the identities."""
     H, file, data = formulas.H, formulas.file, planes.data
 
-    def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
-        return lambda: [find(data, *arguments)]
+    def single_claim(prove: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
+        return lambda: [prove(data, *arguments)]
 
     for name, function in formulas.integrals.items():
         yield name, partial(planes.claims, conserved_function, name, function)
     if H is not None:
-        yield "modified_hamiltonian", one(modified_hamiltonian, "modified_hamiltonian", H)
+        yield "modified_hamiltonian", single_claim(modified_hamiltonian, "modified_hamiltonian", H)
     for name, form in formulas.forms.items():
-        yield name, one(bilinear_integral, name, form)
+        yield name, single_claim(bilinear_integral, name, form)
     if formulas.density is not None:
-        yield VOLUME, one(invariant_volume, VOLUME, formulas.density)
+        yield VOLUME, single_claim(invariant_volume, VOLUME, formulas.density)
     if H is not None:
-        volume = VOLUME if formulas.density is None else DETERMINANT
-        yield volume, lambda: [invariant_volume(data, volume, _polynomial(data.determinant))]
+        volume_name = VOLUME if formulas.density is None else DETERMINANT
+        yield volume_name, lambda: [invariant_volume(data, volume_name, _polynomial(data.determinant))]
     if data.dim == 2:
         is_short = checker == "rocq"  # Coq takes a second for a hundred terms
         yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows), is_short)]
@@ -415,25 +413,25 @@ class _Planes:
     data: MapData
 
     @cached_property
-    def separate(self) -> tuple[Separated, AffineSymmetry] | None:
+    def separation(self) -> tuple[SeparatedSystem, AffineSymmetry] | None:
         """The system in the coordinates z if it is shorter, and the claim that T takes its map to the given map."""
         file, n = self.file, self.data.dim
         has_symbols = len(self.data.names) > n + 1
-        separate = None if file.member is None or has_symbols else separated(file.system)
-        if separate is None:
+        coordinates = None if file.member is None or has_symbols else separate_planes(file.system)
+        if coordinates is None:
             return None
-        in_planes = self.data.with_rows(as_map(separate.system).rows)
-        return separate, affine_symmetry(in_planes, "coordinates", separate.T, [fmpq(0)] * n, target=self.data)
+        planar_data = self.data.with_rows(as_map(coordinates.system).rows)
+        return coordinates, affine_symmetry(planar_data, "coordinates", coordinates.T, [fmpq(0)] * n, target=self.data)
 
     def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
         """The claims that `prove` returns for a function; for a function of one plane, for the map of this plane."""
-        if self.separate is not None:
-            separate, way = self.separate
-            moved = separate.function(function)
-            plane = restricted(way.data, moved)
-            if plane is not way.data:
-                proof = prove(plane, f"{name}_in_its_plane", moved)
-                return [way, changed_function(way, name, function, moved, plane.names), proof]
+        if self.separation is not None:
+            coordinates, change = self.separation
+            plane_function = coordinates.function(function)
+            plane_data = restrict(change.data, plane_function)
+            if plane_data is not change.data:
+                proof = prove(plane_data, f"{name}_in_its_plane", plane_function)
+                return [change, changed_function(change, name, function, plane_function, plane_data.names), proof]
         return [prove(self.data, name, function)]
 
 
@@ -444,8 +442,8 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
     proved = Certainty.PROVED
     if isinstance(result, IntegralSearch):
         planes = planes or _Planes(result.file, data)
-        found = [integral for integral in result.integrals if integral.verdict is proved]
-        return [claim for I in found for claim in planes.claims(conserved_function, I.name, I.function)]
+        integrals = [integral for integral in result.integrals if integral.verdict is proved]
+        return [claim for I in integrals for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
         densities = [density for density in result.shown if density.verdict is proved]  # further ones are multiples
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
@@ -465,7 +463,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
     if isinstance(result, CommutingSystems):
         file = SystemFile.from_system(result.system, "system")
         systems = [field.system for field in result.nontrivial if field.finding.verdict is proved]
-        return [claim for k, g in enumerate(systems, 1) for claim in _commuting(file, data, g, f"g{k}_")]
+        return [claim for k, g in enumerate(systems, 1) for claim in _commuting_claims(file, data, g, f"g{k}_")]
     assert isinstance(result, Symmetries)
     symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
     return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
@@ -485,13 +483,13 @@ def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:
     """Pi = J - eps^2 f'^2 J."""
     assert formulas.file.hamiltonian is not None
     context, J, n = ring((*formulas.names, "eps")), formulas.file.hamiltonian.J, formulas.dim
-    *letters, eps = context.gens()
-    slopes = [[entry.compose(*letters, ctx=context) for entry in row] for row in formulas.jacobian]
+    *generators, eps = context.gens()
+    jacobian = [[entry.compose(*generators, ctx=context) for entry in row] for row in formulas.jacobian]
 
-    def times(A: Sequence[Sequence[Any]], B: Sequence[Sequence[Any]]) -> list[list[fmpq_mpoly]]:
+    def multiply(A: Sequence[Sequence[Any]], B: Sequence[Sequence[Any]]) -> list[list[fmpq_mpoly]]:
         return [[sum((a * B[k][j] for k, a in enumerate(row)), context.constant(0)) for j in range(n)] for row in A]
 
-    square = times(times(slopes, slopes), J.tolist())
+    square = multiply(multiply(jacobian, jacobian), J.tolist())
     return [[_polynomial(J[i, j] - eps**2 * square[i][j]) for j in range(n)] for i in range(n)]
 
 

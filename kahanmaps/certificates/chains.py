@@ -28,23 +28,23 @@ class RationalPoint:
 
     numerators: tuple[fmpq_mpoly, ...]
     denominators: tuple[fmpq_mpoly, ...]
-    which: tuple[int, ...]
+    denominator_indices: tuple[int, ...]
 
     @classmethod
     def of(cls, fractions: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> RationalPoint:
         """Return the point with these coordinates, reduced to lowest terms over Z."""
-        numerators, denominators, which = [], list[fmpq_mpoly](), []
+        numerators, denominators, denominator_indices = [], list[fmpq_mpoly](), []
         for numerator, denominator in fractions:
-            common = numerator.gcd(denominator)
-            P, Q = numerator / common, denominator / common
+            gcd = numerator.gcd(denominator)
+            P, Q = numerator / gcd, denominator / gcd
             Q, P = Q / Q.leading_coefficient(), P / Q.leading_coefficient()
-            multiple = common_denominator(P) * common_denominator(Q)
-            P, Q = P * multiple, Q * multiple
+            common_multiple = common_denominator(P) * common_denominator(Q)
+            P, Q = P * common_multiple, Q * common_multiple
             if Q not in denominators:
                 denominators.append(Q)
             numerators.append(P)
-            which.append(denominators.index(Q))
-        return cls(tuple(numerators), tuple(denominators), tuple(which))
+            denominator_indices.append(denominators.index(Q))
+        return cls(tuple(numerators), tuple(denominators), tuple(denominator_indices))
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ class Chain(EquationClaim):
     """The points x = point 0, point 1, ..., each the image of an earlier point, two of which are equal.
 
     `maps` are the maps by their letters. For each point except x, `arrows` contains the letter of the map, the number
-    of the preimage, and the index of the point in `values`, which begin with x. `says` are the two equal points.
+    of the preimage, and the index of the point in `values`, which begin with x. The two `equal_points` agree.
     """
 
     maps: Mapping[str, MapData]
     arrows: tuple[tuple[str, int, int], ...]
     values: tuple[RationalPoint, ...]
-    says: tuple[int, int]
+    equal_points: tuple[int, int]
 
     def value_of(self, point: int) -> int:
         """Return the index in `values` of a point."""
@@ -72,7 +72,7 @@ def commuting(name: str, f: MapData, g: MapData) -> Chain:
         FalseClaim: if the maps do not commute.
         InputError: if a map is the identity, as for f = 0, or if the identities have too many terms.
     """
-    x = _identity(f)
+    x = _identity_point(f)
     y, z = apply(f, x), apply(g, x)
     if x in (y, z):
         raise InputError(
@@ -94,12 +94,25 @@ def periodic(f: MapData, period: int) -> Chain:
     """
     if period > MAX_PERIOD:
         raise InputError(f"found period = {period}, expected at most {MAX_PERIOD} for a certificate")
-    if (moved := _moved_point(f, period)) is not None:
-        raise FalseClaim(
-            f"iterate {period} is not the identity, as it moves a point modulo 2^61 - 1: {moved}; "
-            "no certificate can be written"
-        )
-    values = [_identity(f)]
+    # First try a random point modulo a prime. The equation is over Z, so if det M is not 0 at x modulo the prime, then
+    # x~ modulo the prime is the image of x modulo the prime: if the iterate is the identity, it moves no such point.
+    n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
+    residues = [rng.randrange(_PRIME) for _ in f.names]
+    x = residues[:n]
+    for _ in range(period):
+        rows = [[int(entry(*x, *residues[n:]).p) for entry in row] for row in f.rows]
+        M, r = nmod_mat([row[:-1] for row in rows], _PRIME), nmod_mat([row[-1:] for row in rows], _PRIME)
+        if M.det() == nmod(0, _PRIME):
+            break  # the orbit ends here: the identities decide
+        x = [int(entry) for entry in M.solve(r).entries()]
+    else:
+        if x != residues[:n]:
+            point = ", ".join(f"{name} = {residue}" for name, residue in zip(f.names, residues, strict=True))
+            raise FalseClaim(
+                f"iterate {period} is not the identity, as it moves a point modulo 2^61 - 1: {point}; "
+                "no certificate can be written"
+            )
+    values = [_identity_point(f)]
     for _ in range(period):
         values.append(apply(f, values[-1]))
     if values.pop() != values[0]:
@@ -108,34 +121,14 @@ def periodic(f: MapData, period: int) -> Chain:
     return Chain(f"period {period}", f, {"f": f}, arrows, tuple(values), (0, period))
 
 
-def _moved_point(f: MapData, period: int) -> str | None:
-    """Return, as text, a random point modulo a prime that the iterate moves, or None.
-
-    The equation is over Z, so if det M is not 0 at x modulo the prime, then x~ modulo the prime is the image of x
-    modulo the prime. Hence if the iterate is the identity, it moves no such point.
-    """
-    n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
-    values = [rng.randrange(_PRIME) for _ in f.names]
-    x = values[:n]
-    for _ in range(period):
-        rows = [[int(entry(*x, *values[n:]).p) for entry in row] for row in f.rows]
-        M, r = nmod_mat([row[:-1] for row in rows], _PRIME), nmod_mat([row[-1:] for row in rows], _PRIME)
-        if M.det() == nmod(0, _PRIME):
-            return None  # the orbit ends here: the identities decide
-        x = [int(entry) for entry in M.solve(r).entries()]
-    if x == values[:n]:
-        return None
-    return ", ".join(f"{name} = {value}" for name, value in zip(f.names, values, strict=True))
-
-
 def apply(data: MapData, point: RationalPoint) -> RationalPoint:
     """Return the image of a point that depends on x. Raises InputError if the image has too many terms."""
     fractions = []
     for numerator in data.numerators:
-        common = numerator.gcd(data.determinant)
-        moved = [value_at(part / common, point, data) for part in (numerator, data.determinant)]
-        (P, exponents), (Q, other) = moved
-        for denominator, a, b in zip(point.denominators, exponents, other, strict=True):
+        gcd = numerator.gcd(data.determinant)
+        values = [value_at(polynomial / gcd, point, data) for polynomial in (numerator, data.determinant)]
+        (P, exponents), (Q, other_exponents) = values
+        for denominator, a, b in zip(point.denominators, exponents, other_exponents, strict=True):
             P, Q = P * denominator ** max(b - a, 0), Q * denominator ** max(a - b, 0)
         fractions.append((P, Q))
     return RationalPoint.of(fractions)
@@ -150,15 +143,16 @@ def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tup
     rows = [[int(e) for e in exponents] for exponents in polynomial.monoms()]
 
     def degree(row: Sequence[int], index: int) -> int:
-        return sum(e for e, k in zip(row[:n], point.which, strict=True) if k == index)
+        return sum(e for e, k in zip(row[:n], point.denominator_indices, strict=True) if k == index)
 
-    powers = [max((degree(row, k) for row in rows), default=0) for k in range(len(point.denominators))]
+    max_exponents = [max((degree(row, k) for row in rows), default=0) for k in range(len(point.denominators))]
     total, products = letters[0] * 0, 0
     for row, coefficient in zip(rows, polynomial.coeffs(), strict=True):
         term = letters[0] ** 0 * coefficient
         factors = [*zip(letters[n:], row[n:], strict=True), *zip(point.numerators, row[:n], strict=True)]
         factors += [
-            (q, power - degree(row, k)) for k, (q, power) in enumerate(zip(point.denominators, powers, strict=True))
+            (q, max_exponent - degree(row, k))
+            for k, (q, max_exponent) in enumerate(zip(point.denominators, max_exponents, strict=True))
         ]
         for factor, exponent in factors:
             for _ in range(exponent):
@@ -166,9 +160,9 @@ def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tup
                 term *= factor
                 check_limits(len(term), products)
         total += term
-    return total, powers
+    return total, max_exponents
 
 
-def _identity(data: MapData) -> RationalPoint:
+def _identity_point(data: MapData) -> RationalPoint:
     letters = ring(data.names).gens()
     return RationalPoint.of([(x, x**0) for x in letters[: data.dim]])

@@ -62,8 +62,8 @@ class AffineSymmetry(EquationClaim):
         """The inverse of T: for each coordinate a polynomial over Z and its divisor."""
         n, zero, letters = self.data.dim, (0,) * len(self.data.names), ring(self.data.names).gens()
         S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in self.image]).inv()
-        moved = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
-        images = [sum((S[i, j] * moved[j] for j in range(n)), letters[0] * 0) for i in range(n)]
+        translated_point = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
+        images = [sum((S[i, j] * translated_point[j] for j in range(n)), letters[0] * 0) for i in range(n)]
         return [(P * common_denominator(P), int(common_denominator(P))) for P in images]
 
 
@@ -73,8 +73,8 @@ class ChangedFunction(EquationClaim):
 
     image: Row
     divisor: int
-    given: tuple[fmpq_mpoly, fmpq_mpoly]
-    moved: tuple[fmpq_mpoly, fmpq_mpoly]
+    old_function: tuple[fmpq_mpoly, fmpq_mpoly]
+    new_function: tuple[fmpq_mpoly, fmpq_mpoly]
 
 
 def three_points(data: MapData) -> tuple[str, ...]:
@@ -107,21 +107,21 @@ def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegr
         )
         result = []
         for k in range(n):
-            slope = H.derivative(k)
-            middle, *ends = (slope.compose(*point, *constants, ctx=context) for point in points)
-            result.append((2 * middle - (ends[0] + ends[1]) / 2) / 3)
+            derivative = H.derivative(k)
+            at_midpoint, *at_ends = (derivative.compose(*point, *constants, ctx=context) for point in points)
+            result.append((2 * at_midpoint - (at_ends[0] + at_ends[1]) / 2) / 3)
         return result
 
     def value(a: int, b: int) -> fmpq_mpoly:
-        old = gens[a : a + n]
-        total = H.compose(*old, *constants, ctx=context)
+        x = gens[a : a + n]
+        total = H.compose(*x, *constants, ctx=context)
         for k in range(n):
-            total += H.derivative(k).compose(*old, *constants, ctx=context) * (gens[b + k] - gens[a + k]) / 3
+            total += H.derivative(k).compose(*x, *constants, ctx=context) * (gens[b + k] - gens[a + k]) / 3
         return total
 
     g, h = gradient(0, n), gradient(n, 2 * n)
-    first = [a + b for a, b in zip(g, h, strict=True)]
-    return _orbit_integral(data, name, value(0, n), value(n, 2 * n), context.constant(1), first, g)
+    multipliers = [a + b for a, b in zip(g, h, strict=True)]
+    return _orbit_integral(data, name, value(0, n), value(n, 2 * n), context.constant(1), multipliers, g)
 
 
 def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
@@ -129,14 +129,16 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
     n, context = data.dim, ring(three_points(data))
     gens = context.gens()
 
-    def times(a: int) -> list[fmpq_mpoly]:
+    def BT_times(a: int) -> list[fmpq_mpoly]:
         """Return B^T x for the point x whose first name has the index a."""
         return [sum((gens[a + i] * B[i, j] for i in range(n)), gens[0] * 0) for j in range(n)]
 
-    def form(a: int, b: int) -> fmpq_mpoly:
-        return sum((entry * gens[b + j] for j, entry in enumerate(times(a))), gens[0] * 0)
+    def value(a: int, b: int) -> fmpq_mpoly:
+        return sum((entry * gens[b + j] for j, entry in enumerate(BT_times(a))), gens[0] * 0)
 
-    return _orbit_integral(data, name, form(0, n), form(n, 2 * n), gens[-1], [-c for c in times(2 * n)], times(0))
+    return _orbit_integral(
+        data, name, value(0, n), value(n, 2 * n), gens[-1], [-c for c in BT_times(2 * n)], BT_times(0)
+    )
 
 
 def affine_symmetry(
@@ -160,18 +162,18 @@ def affine_symmetry(
     context = ring(names)
     gens = context.gens()
     divisor = lcm(*(int(entry.q) for entry in (*S.entries(), *shift)))
-    at = [[_affine(S, shift, gens[k : k + n], i) for i in range(n)] for k in (0, n)]
-    first, second = reversed(at) if reversing else at
-    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in target.residual(names, 0, n)]
-    scale, own_scale = row_multiples(target), row_multiples(data)
-    K = [[(-1 if reversing else 1) * S[i, j] * scale[i] / own_scale[j] for j in range(n)] for i in range(n)]
+    images = [[_affine(S, shift, gens[k : k + n], i) for i in range(n)] for k in (0, n)]
+    left, right = reversed(images) if reversing else images
+    target_residual = [P.compose(*left, *right, *gens[2 * n :], ctx=context) for P in target.residual(names, 0, n)]
+    target_scales, own_scales = row_multiples(target), row_multiples(data)
+    K = [[(-1 if reversing else 1) * S[i, j] * target_scales[i] / own_scales[j] for j in range(n)] for i in range(n)]
     multiple = lcm(*(int(entry.q) for row in K for entry in row))
     matrix = tuple(tuple(int(entry * multiple) for entry in row) for row in K)
-    own = data.residual(names, 0, n)
-    for row, value in zip(matrix, moved, strict=True):
-        if value * multiple != sum((c * P for c, P in zip(row, own, strict=True)), context.constant(0)):
-            what = f"is no {'reversing ' * reversing}symmetry" if target is data else "takes the map to another one"
-            raise FalseClaim(f"{name} {what}: no certificate can be written")
+    own_residual = data.residual(names, 0, n)
+    for row, value in zip(matrix, target_residual, strict=True):
+        if value * multiple != sum((c * P for c, P in zip(row, own_residual, strict=True)), context.constant(0)):
+            reason = f"is no {'reversing ' * reversing}symmetry" if target is data else "takes the map to another one"
+            raise FalseClaim(f"{name} {reason}: no certificate can be written")
     image = tuple(
         ring(data.names).constant(0) + divisor * _affine(S, shift, ring(data.names).gens(), i) for i in range(n)
     )
@@ -179,21 +181,25 @@ def affine_symmetry(
 
 
 def changed_function(
-    way: AffineSymmetry, name: str, function: RationalFunction, moved: RationalFunction, letters: tuple[str, ...]
+    claim: AffineSymmetry,
+    name: str,
+    function: RationalFunction,
+    new_function: RationalFunction,
+    letters: tuple[str, ...],
 ) -> ChangedFunction:
-    """Return the identity that a function of x = T z equals `moved`, a function of z that contains only `letters`.
+    """Return the identity that a function of x = T z is `new_function`, a function of z that contains only `letters`.
 
     Raises:
         FalseClaim: if the two functions are not equal.
     """
-    data, context = way.data, ring(way.data.names)
+    data, context = claim.data, ring(claim.data.names)
     gens = dict(zip(data.names, context.gens(), strict=True))
-    p, q = (P.compose(*(gens[letter] for letter in letters), ctx=context) for P in coprime(moved, letters))
+    p, q = (P.compose(*(gens[letter] for letter in letters), ctx=context) for P in coprime(new_function, letters))
     P, Q = coprime(function, data.names)
-    images = [entry / way.divisor for entry in way.image] + [*context.gens()[data.dim :]]
+    images = [entry / claim.divisor for entry in claim.image] + [*context.gens()[data.dim :]]
     if P.compose(*images, ctx=context) * q != p * Q.compose(*images, ctx=context):
         raise FalseClaim(f"{name} is another function in these coordinates: no certificate can be written")
-    return ChangedFunction(name, data, way.image, way.divisor, (P, Q), (p, q))
+    return ChangedFunction(name, data, claim.image, claim.divisor, (P, Q), (p, q))
 
 
 def _affine(S: fmpq_mat, shift: Sequence[fmpq], letters: Sequence[fmpq_mpoly], i: int) -> fmpq_mpoly:
@@ -212,14 +218,14 @@ def _orbit_integral(
 ) -> OrbitIntegral:
     """Return the claim with integer coefficients, after verifying its identity by expansion."""
     n, names = data.dim, three_points(data)
-    rows = [fmpq(1) / c for c in row_multiples(data)]
-    multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]
+    row_factors = [fmpq(1) / c for c in row_multiples(data)]
+    multipliers = [[c * s for c, s in zip(factors, row_factors, strict=True)] for factors in (first, second)]
     total = ring(names).constant(0)
-    for side, k in zip(multipliers, (0, n), strict=True):
-        for c, e in zip(side, data.residual(names, k, k + n), strict=True):
+    for factors, k in zip(multipliers, (0, n), strict=True):
+        for c, e in zip(factors, data.residual(names, k, k + n), strict=True):
             total += c * e
     if total != next_value - value:
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")
     multiple = lcm(*(int(common_denominator(c)) for c in (value, *multipliers[0], *multipliers[1])))
-    scaled = [tuple(c * multiple for c in side) for side in multipliers]
-    return OrbitIntegral(name, data, value * multiple, denominator * multiple, scaled[0], scaled[1])
+    a, b = (tuple(c * multiple for c in factors) for factors in multipliers)
+    return OrbitIntegral(name, data, value * multiple, denominator * multiple, a, b)

@@ -44,9 +44,9 @@ class Monomial:
     def __pow__(self, exponent: int) -> Monomial:
         return Monomial(self.constant**exponent, tuple(exponent * power for power in self.powers))
 
-    def without(self, common: Sequence[int]) -> Monomial:
-        """Return the quotient by the monomial with the exponents `common`."""
-        return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, common, strict=True)))
+    def divide_by(self, exponents: Sequence[int]) -> Monomial:
+        """Return the quotient by the monomial with these exponents."""
+        return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, exponents, strict=True)))
 
     def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
         """Return the polynomial for these values of D, c_1, ... Raises InputError if it has too many terms."""
@@ -113,7 +113,7 @@ class DarbouxProducts:
     """Two or more products whose cofactors are monomials in D and the same polynomials c_1, c_2, ... over Z."""
 
     products: tuple[DarbouxProduct, ...]
-    letters: tuple[fmpq_mpoly, ...]
+    common_factors: tuple[fmpq_mpoly, ...]
 
     @property
     def degree(self) -> int:
@@ -123,7 +123,7 @@ class DarbouxProducts:
     @property
     def cofactors(self) -> list[Monomial]:
         """The cofactors of all products, for the largest degree."""
-        return [product.cofactor(self.degree, len(self.letters)) for product in self.products]
+        return [product.cofactor(self.degree, len(self.common_factors)) for product in self.products]
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,8 @@ class InvariantVolume(Claim):
         assert self.fraction is not None
         C, B = self.fraction.cofactors
         C = replace(C, powers=(C.powers[0] + self.data.dim + 1, *C.powers[1:]))
-        shared = tuple(map(min, zip(C.powers, B.powers, strict=True)))
-        return Monomial(1, shared), C.without(shared), B.without(shared)
+        common_powers = tuple(map(min, zip(C.powers, B.powers, strict=True)))
+        return Monomial(1, common_powers), C.divide_by(common_powers), B.divide_by(common_powers)
 
 
 def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
@@ -213,18 +213,16 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
     P, Q = coprime(function, data.names)
     if not P:
         raise InputError("found the density 0, expected another function: no certificate is written")
-    at_old, at_new = data.at_points(P, Q, data.determinant)
-    if times(times(at_new[0], at_old[1]), at_old[2]) == times(
-        times(at_old[0], at_new[1]), determinant(data.derivative)
-    ):
+    at_x, at_image = data.at_points(P, Q, data.determinant)
+    if times(times(at_image[0], at_x[1]), at_x[2]) == times(times(at_x[0], at_image[1]), determinant(data.derivative)):
         return InvariantVolume(name, data, P, Q, None)
     volume = determinant(derivative_at_image(data))
     fraction = darboux_products(data, [P, Q])  # P and Q are Darboux polynomials if dx/phi is invariant
     if fraction is not None:
         claim = InvariantVolume(name, data, P, Q, fraction)
-        letters = (data.determinant, *fraction.letters)
+        values = (data.determinant, *fraction.common_factors)
         _, left, right = claim.balance
-        if left.at(letters) == times(right.at(letters), volume):
+        if left.at(values) == times(right.at(values), volume):
             return claim
     raise FalseClaim("dx/phi is not invariant: no certificate can be written")
 
@@ -237,75 +235,75 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
         polynomials: nonzero polynomials over Z in the names of the map.
         splits: whether the polynomials are also split into factors that are Darboux polynomials.
     """
-    known, k = list[fmpq_mpoly](), max(degree_in(P, data.dim) for P in polynomials)
-    pieces = []
+    common_factors, D = list[fmpq_mpoly](), data.determinant
+    max_degree = max(degree_in(P, data.dim) for P in polynomials)
+    products = []
     for P in polynomials:
-        factors = _with_cofactors(data, _factored(P, data.dim), k) if splits else None
-        factors = factors or _with_cofactors(data, (P**0, [(P, 1)]), k)
-        if factors is None:
+        factorization = _factor_with_cofactors(data, P, max_degree, splits=True) if splits else None
+        factorization = factorization or _factor_with_cofactors(data, P, max_degree, splits=False)
+        if factorization is None:
             return None
-        content, parts = factors
-        pieces.append((content, [(f, k, e, _monomial(C, data.determinant, k, known)) for f, k, e, C in parts]))
-    count = len(known)
+        content, factors = factorization
+        cofactors = []  # each cofactor C, with D^k f(N/D) = C f, as a monomial in D and the common factors so far
+        for _, k, _, C in factors:
+            power, cofactor = 0, C
+            if D.is_constant():  # the powers of D in C are numbers; count at most k of them, as in D^k
+                number, divisor = abs(int(D.coeffs()[0].p)), gcd(*(int(c.p) for c in C.coeffs()))
+                while divisor % number == 0 and power < k:
+                    power, divisor, cofactor = power + 1, divisor // number, cofactor / D
+            elif gcd(*(int(c.p) for c in D.coeffs())) == 1:  # D is primitive, so that the quotients are over Z
+                while (smaller_cofactor := quotient(cofactor, D)) is not None:
+                    power, cofactor = power + 1, smaller_cofactor
+            is_factored = len(cofactor) <= _MAX_FACTORED_TERMS
+            constant, irreducible_factors = cofactor.factor() if is_factored else (fmpq(1), [(cofactor, 1)])
+            powers = {}
+            for c, exponent in irreducible_factors:
+                if c not in common_factors:
+                    common_factors.append(c)
+                powers[common_factors.index(c)] = int(exponent)
+            cofactors.append((int(constant), power, powers))
+        products.append((content, factors, cofactors))
+    indices = range(len(common_factors))
+    return DarbouxProducts(
+        tuple(
+            DarbouxProduct(
+                content,
+                tuple(
+                    DarbouxFactor(f, k, exponent, Monomial(constant, (power, *(powers.get(j, 0) for j in indices))))
+                    for (f, k, exponent, _), (constant, power, powers) in zip(factors, cofactors, strict=True)
+                ),
+            )
+            for content, factors, cofactors in products
+        ),
+        tuple(common_factors),
+    )
 
-    def padded(constant: int, powers: Sequence[int]) -> Monomial:
-        return Monomial(constant, (*powers, *[0] * (count + 1 - len(powers))))
 
-    products = [
-        DarbouxProduct(
-            content,
-            tuple(DarbouxFactor(f, k, e, padded(*cofactor)) for f, k, e, cofactor in parts),
-        )
-        for content, parts in pieces
-    ]  # fmt: skip
-    return DarbouxProducts(tuple(products), tuple(known))
-
-
-def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]]:
-    """Return the factor without the variables, and the remaining irreducible factors with exponents."""
-    constant, factors = P.factor()
-    content = prod((f ** int(e) for f, e in factors if degree_in(f, dim) <= 0), start=P**0 * constant)
-    return content, [(f, int(e)) for f, e in factors if degree_in(f, dim) > 0]
-
-
-def _with_cofactors(
-    data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]], most: int
+def _factor_with_cofactors(
+    data: MapData, P: fmpq_mpoly, max_degree: int, splits: bool
 ) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
-    """Return the factors with their k, exponents and cofactors; None if a factor has no cofactor.
+    """Return the content of P, and its factors with their k, exponents and cofactors; None if one has no cofactor.
 
-    If f has a factor of D, f may divide D^k f(N/D) only for some k larger than deg f. Such k are tried up to `most`:
-    the degree of P and Q if P/Q is an integral, and n + 1 more if dx/phi with phi = P/Q is invariant.
+    Unless P `splits`, it is the only factor. If f has a factor of D, f may divide D^k f(N/D) only for some k larger
+    than deg f. Such k are tried up to `max_degree`, the degree of P and Q for an integral P/Q, and n + 1 more if dx/phi
+    with phi = P/Q is invariant.
     """
-    content, factors = factored
+    n, D = data.dim, data.determinant
+    content, factors = P**0, [(P, 1)]
+    if splits:  # factors without the variables belong to the content
+        constant, irreducible_factors = P.factor()
+        content = prod((f ** int(e) for f, e in irreducible_factors if degree_in(f, n) <= 0), start=P**0 * constant)
+        factors = [(f, int(e)) for f, e in irreducible_factors if degree_in(f, n) > 0]
     result = []
-    for f, e in factors:
-        k, D = degree_in(f, data.dim), data.determinant
+    for f, exponent in factors:
+        k = degree_in(f, n)
         value = homogeneous_value(f, k, data)
         cofactor = quotient(value, f)
-        if cofactor is None and degree_in(f.gcd(D), data.dim) > 0:
-            while cofactor is None and k < most + data.dim + 1:
+        if cofactor is None and degree_in(f.gcd(D), n) > 0:
+            while cofactor is None and k < max_degree + n + 1:
                 value, k = times(value, D), k + 1
                 cofactor = quotient(value, f)
         if not cofactor:  # the cofactor 0: the image of the map lies in f = 0
             return None
-        result.append((f, k, e, cofactor))
+        result.append((f, k, exponent, cofactor))
     return content, result
-
-
-def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, k: int, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
-    """Write C, with D^k P(N/D) = C P, as a monomial in D and the `known` polynomials; append new factors to `known`."""
-    power, rest = 0, C
-    if D.is_constant():  # the powers of D in C are numbers; count at most k of them, as in D^k
-        number, content = abs(int(D.coeffs()[0].p)), gcd(*(int(c.p) for c in C.coeffs()))
-        while content % number == 0 and power < k:
-            power, content, rest = power + 1, content // number, rest / D
-    elif gcd(*(int(c.p) for c in D.coeffs())) == 1:  # D is primitive, so that the quotients are over Z
-        while (smaller := quotient(rest, D)) is not None:
-            power, rest = power + 1, smaller
-    constant, factors = rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (fmpq(1), [(rest, 1)])
-    powers = {}
-    for f, e in factors:
-        if f not in known:
-            known.append(f)
-        powers[known.index(f)] = int(e)
-    return int(constant), [power, *(powers.get(j, 0) for j in range(len(known)))]

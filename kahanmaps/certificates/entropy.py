@@ -56,33 +56,33 @@ def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) ->
     Raises:
         InputError: if no such degrees are found within the limits; this proves nothing about the map.
     """
-    first, factor = _without_common_factor(_forms(data))
-    iterates, factors = [first], [factor]
+    F_1, factor = _without_common_factor(_forms(data))
+    iterates, factors = [F_1], [factor]
     line = [nmod_poly(list(point), PRIME) for point in LINE]
-    degrees, best = [1], None
+    degrees, best_bound = [1], None
     while len(degrees) <= 2 * len(iterates):
-        line = _image(first, line)
+        line = _curve_image(F_1, line)
         degrees.append(max(X.degree() for X in line))
         if degrees[-1] > _MAX_DEGREE:
             break
         n, is_even = len(degrees) // 2, len(degrees) % 2 == 1
         if is_even:
             bound = lower_bound(degrees[2 * n], _degree(iterates[n - 1]), n)
-            if bound is not None and (best is None or float(bound) > best[0]):
-                best = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
-            if (is_short and best) or n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
+            if bound is not None and (best_bound is None or float(bound) > best_bound[0]):
+                best_bound = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
+            if (is_short and best_bound) or n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
                 break
-            inner, context = iterates[-1], first[0].context()
-            images = [inner[0], inner[1], *context.gens()[2:-1], inner[2]]
-            form, factor = _without_common_factor([F.compose(*images, ctx=context) for F in first])
-            iterates.append(form)
+            F_n, context = iterates[-1], F_1[0].context()
+            images = [F_n[0], F_n[1], *context.gens()[2:-1], F_n[2]]
+            F_next, factor = _without_common_factor([F.compose(*images, ctx=context) for F in F_1])
+            iterates.append(F_next)
             factors.append(factor)
-    if best is None:
+    if best_bound is None:
         raise InputError("no lower bound of the dynamical degree above 1 was found, which proves nothing")
-    _, n, line_degree, lower = best
-    backward, _ = _without_common_factor(_forms(inverse))
+    _, n, line_degree, lower = best_bound
+    B, _ = _without_common_factor(_forms(inverse))
     forms = tuple(iterates[:n])
-    return PositiveEntropy("entropy", data, backward, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
+    return PositiveEntropy("entropy", data, B, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
 
 
 def homogenizing(names: Sequence[str]) -> str:
@@ -101,16 +101,16 @@ def _degree(forms: Sequence[fmpq_mpoly]) -> int:
 
 def _forms(data: MapData) -> list[fmpq_mpoly]:
     """Return N and D as homogeneous forms in the variables and the homogenizing variable."""
-    context, parts = ring((*data.names, homogenizing(data.names))), (*data.numerators, data.determinant)
-    degree = max(degree_in(part, 2) for part in parts)
-    return [context.from_dict({(*e, degree - e[0] - e[1]): c for e, c in part.terms()}) for part in parts]
+    context, polynomials = ring((*data.names, homogenizing(data.names))), (*data.numerators, data.determinant)
+    degree = max(degree_in(P, 2) for P in polynomials)
+    return [context.from_dict({(*e, degree - e[0] - e[1]): c for e, c in P.terms()}) for P in polynomials]
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
     """Return the forms over Z divided by their primitive common factor, and this common factor."""
-    common = reduce(fmpq_mpoly.gcd, forms)
-    common *= common_denominator(common)
-    return tuple(form / common for form in forms), common
+    gcd = reduce(fmpq_mpoly.gcd, forms)
+    gcd *= common_denominator(gcd)
+    return tuple(form / gcd for form in forms), gcd
 
 
 def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
@@ -118,13 +118,13 @@ def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | N
     line = [nmod_poly(list(point), prime) for point in LINE]
     try:
         for _ in range(steps):
-            line = _image(forms, line, prime)
+            line = _curve_image(forms, line, prime)
     except InputError:
         return None
     return max(X.degree() for X in line)
 
 
-def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
+def _curve_image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
     """Return the image of a curve modulo the prime, without common factors. Raises InputError if the image is 0."""
     powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], prime)} for _ in curve]
 
@@ -143,7 +143,7 @@ def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int =
             scalar = int(coefficient.p) * pow(EPS, eps, prime)
             total += power(0, x) * power(1, y) * power(2, h) * scalar
         values.append(total)
-    common = reduce(nmod_poly.gcd, values)
+    gcd = reduce(nmod_poly.gcd, values)
     if not any(values):
         raise InputError("the image of the line modulo a prime is undefined: no degrees are computed")
-    return [value // common for value in values]
+    return [value // gcd for value in values]

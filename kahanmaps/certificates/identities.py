@@ -67,12 +67,12 @@ def check_limits(terms: int, products: int = 0) -> None:
     """
     limits = _LIMITS.get()
     limits.terms += terms
-    for found, limit, what in (
+    for count, limit, text in (
         (products, MAX_PRODUCTS, "take more than {} products of terms to multiply out"),
         (terms, MAX_TERMS, "have more than {} terms when multiplied out"),
     ):
-        if found > (most := round(limit * limits.multiple)):
-            raise InputError(f"the identities of the certificate {what.format(most)}; raise --effort")
+        if count > (max_count := round(limit * limits.multiple)):
+            raise InputError(f"the identities of the certificate {text.format(max_count)}; raise --effort")
 
 
 class FalseClaim(InputError):
@@ -100,7 +100,7 @@ class MapData:
     @cached_property
     def solution(self) -> tuple[fmpq_mpoly, ...]:
         """D = det M, followed by N = adj(M) r."""
-        return tuple(self._solved([row[-1] for row in self.rows]))
+        return tuple(self._solve([row[-1] for row in self.rows]))
 
     @property
     def determinant(self) -> fmpq_mpoly:
@@ -116,7 +116,7 @@ class MapData:
     def adjugate(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
         """The adjugate of M."""
         zero, one = self.rows[0][0] * 0, self.rows[0][0] ** 0
-        columns = [self._solved([one if i == j else zero for i in range(self.dim)])[1:] for j in range(self.dim)]
+        columns = [self._solve([one if i == j else zero for i in range(self.dim)])[1:] for j in range(self.dim)]
         return tuple(zip(*columns, strict=True))
 
     @cached_property
@@ -134,15 +134,15 @@ class MapData:
         """The names for x and x~, and the constants."""
         return (*self.variables, *self.new, *self.names[self.dim :])
 
-    def residual(self, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
-        """Return M(x) y - r(x) in the ring of `names`; x begins at the name with index `first`, y at `second`."""
+    def residual(self, names: Sequence[str], x_index: int, y_index: int) -> list[fmpq_mpoly]:
+        """Return M(x) y - r(x) in the ring of `names`; x begins at the name with index `x_index`, y at `y_index`."""
         n, context = self.dim, ring(names)
         letters = context.gens()
         constants = letters[len(names) - len(self.names) + n :]
         result = []
         for row in self.rows:
-            *entries, right = (entry.compose(*letters[first : first + n], *constants, ctx=context) for entry in row)
-            result.append(sum((e * y for e, y in zip(entries, letters[second : second + n], strict=True)), -right))
+            *entries, right = (entry.compose(*letters[x_index : x_index + n], *constants, ctx=context) for entry in row)
+            result.append(sum((e * y for e, y in zip(entries, letters[y_index : y_index + n], strict=True)), -right))
         return result
 
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
@@ -150,20 +150,20 @@ class MapData:
         n, context = self.dim, ring(self.two_points)
         letters = context.gens()
         points = letters[:n], letters[n : 2 * n]
-        at_old, at_new = ([F.compose(*x, *letters[2 * n :], ctx=context) for F in functions] for x in points)
-        return at_old, at_new
+        at_x, at_image = ([F.compose(*x, *letters[2 * n :], ctx=context) for F in functions] for x in points)
+        return at_x, at_image
 
     def with_rows(self, rows: Sequence[Row]) -> MapData:
         """Return the map in the same variables whose equation has the rows of (M | -r)."""
         return map_data([[*row[:-1], -row[-1]] for row in rows], self.variables, self.new, self.names)
 
-    def _solved(self, right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """Return det M, and det M times the solution y of M y = right, from minors: (M | right) annihilates (y, -1)."""
+    def _solve(self, right_side: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        """Return det M, then det M times the solution y of M y = r = `right_side`; (M | r) annihilates (y, -1)."""
         n = self.dim
-        rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right, strict=True)]
-        *minors, last = kernel_minors(rows, times)
+        rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right_side, strict=True)]
+        *minors, last_minor = kernel_minors(rows, times)
         sign = -1 if n % 2 else 1  # the last signed minor is (-1)^n det M
-        return [sign * last, *(-sign * minor for minor in minors)]
+        return [sign * last_minor, *(-sign * minor for minor in minors)]
 
 
 @dataclass(frozen=True)
@@ -231,31 +231,32 @@ def map_data(
         raise InputError(f"expected a map in at most {MAX_DIMENSION} variables for a certificate, got {n}")
     multiples = (lcm(*(int(common_denominator(entry)) for entry in row)) for row in equation)
     rows = [[entry * multiple for entry in row] for row, multiple in zip(equation, multiples, strict=True)]
-    commons = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic; the next line makes the quotients integral again
-    primitive = (common * common_denominator(common) for common in commons)
-    divided = tuple(tuple(entry / c for entry in row) for row, c in zip(rows, primitive, strict=True))
-    return MapData(tuple(variables), tuple(new), tuple(names), divided)
+    row_gcds = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic; the next line makes the quotients integral again
+    integer_gcds = (gcd * common_denominator(gcd) for gcd in row_gcds)
+    primitive_rows = tuple(tuple(entry / c for entry in row) for row, c in zip(rows, integer_gcds, strict=True))
+    return MapData(tuple(variables), tuple(new), tuple(names), primitive_rows)
 
 
-def restricted(data: MapData, function: RationalFunction) -> MapData:
+def restrict(data: MapData, function: RationalFunction) -> MapData:
     """Restrict the map to the fewest variables that determine the function along orbits, such as those of one plane."""
     n, names = data.dim, data.names
-    used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
+    used_names = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
     while True:
-        rows = [row for name, row in zip(names, data.rows, strict=False) if name in used]
-        more = {names[j] for row in rows for j in range(n) if row[j]}
-        more |= {name for row in rows for entry in row for name in occurring(entry)} & set(names[:n])
-        if more <= used:
+        rows = [row for name, row in zip(names, data.rows, strict=False) if name in used_names]
+        further_names = {names[j] for row in rows for j in range(n) if row[j]}
+        further_names |= {name for row in rows for entry in row for name in occurring(entry)} & set(names[:n])
+        if further_names <= used_names:
             break
-        used |= more
-    if len(used) in (0, n):
+        used_names |= further_names
+    if len(used_names) in (0, n):
         return data
-    kept = [j for j in range(n) if names[j] in used]
-    context = ring((*(names[j] for j in kept), *names[n:]))
-    letters = dict(zip(context.names(), context.gens(), strict=True))
-    images = [letters.get(name, context.constant(0)) for name in names]
-    small = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*kept, n)) for row in rows)
-    return MapData(tuple(names[j] for j in kept), tuple(data.new[j] for j in kept), tuple(context.names()), small)
+    indices = [j for j in range(n) if names[j] in used_names]
+    variables, new = (tuple(letters[j] for j in indices) for letters in (names, data.new))
+    context = ring((*variables, *names[n:]))
+    generators = dict(zip(context.names(), context.gens(), strict=True))
+    images = [generators.get(name, context.constant(0)) for name in names]
+    restricted_rows = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*indices, n)) for row in rows)
+    return MapData(variables, new, tuple(context.names()), restricted_rows)
 
 
 def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalFunction]]) -> InvariantTensor:
@@ -268,8 +269,8 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
     n, context = data.dim, ring(data.names)
     letters = dict(zip(data.names, context.gens(), strict=True))
     entries = {(i, j): rows[i][j] for i, j in combinations(range(n), 2)}
-    used = next(iter(entries.values())).names if entries else ()
-    numerators, Q = over_one_denominator(list(entries.values()), context, [letters[name] for name in used])
+    used_names = next(iter(entries.values())).names if entries else ()
+    numerators, Q = over_one_denominator(list(entries.values()), context, [letters[name] for name in used_names])
     multiple = lcm(*(int(common_denominator(P)) for P in (*numerators, Q)))
     Q, upper = Q * multiple, {pair: P * multiple for pair, P in zip(entries, numerators, strict=True)}
     if not any(upper.values()):
@@ -284,19 +285,22 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
                 total += times(P[i][s], times(P[j][l].derivative(s), Q) - times(P[j][l], Q.derivative(s)))
         if total:
             raise FalseClaim(f"{name} is no Poisson tensor: no certificate can be written")
-    flat, new = data.at_points(*(entry for row in (*P, *data.rows) for entry in row), Q)
-    at_old, M = [flat[n * i : n * i + n] for i in range(n)], [flat[n * n + (n + 1) * i :][:n] for i in range(n)]
-    at_new = [new[n * i : n * i + n] for i in range(n)]
-    if _sandwich(data.derivative, at_old, new[-1]) == _sandwich(M, at_new, flat[-1]):
+    x_entries, image_entries = data.at_points(*(entry for row in (*P, *data.rows) for entry in row), Q)
+    P_at_x, M = (
+        [x_entries[n * i : n * i + n] for i in range(n)],
+        [x_entries[n * n + (n + 1) * i :][:n] for i in range(n)],
+    )
+    P_at_image = [image_entries[n * i : n * i + n] for i in range(n)]
+    if _congruence(data.derivative, P_at_x, image_entries[-1]) == _congruence(M, P_at_image, x_entries[-1]):
         return claim
-    moved = [[homogeneous_value(entry, k, data) for entry in row] for row in P]
-    left = _sandwich(derivative_at_image(data), P, homogeneous_value(Q, k, data))
-    if left != _sandwich([row[:-1] for row in data.rows], moved, times(Q, data.determinant**2)):
+    P_values = [[homogeneous_value(entry, k, data) for entry in row] for row in P]
+    left = _congruence(derivative_at_image(data), P, homogeneous_value(Q, k, data))
+    if left != _congruence([row[:-1] for row in data.rows], P_values, times(Q, data.determinant**2)):
         raise FalseClaim(f"the map is not Poisson for {name}: no certificate can be written")
     return replace(claim, is_free=False)
 
 
-def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fmpq_mpoly]:
+def _congruence(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fmpq_mpoly]:
     """Return the entries of factor A P A^T with i < j."""
     n = len(P)
     zero = factor * 0
@@ -312,8 +316,8 @@ def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
     def at_image(entry: fmpq_mpoly) -> fmpq_mpoly:
         total = context.constant(0)
         for exponents, coefficient in entry.terms():
-            which = next((k for k in range(n) if exponents[n + k]), -1)  # x~_which = N_which/D, or 1 = D/D
-            total += context.from_dict({exponents[:n] + exponents[2 * n :]: coefficient}) * data.solution[1 + which]
+            i = next((k for k in range(n) if exponents[n + k]), -1)  # x~_i = N_i/D, or 1 = D/D
+            total += context.from_dict({exponents[:n] + exponents[2 * n :]: coefficient}) * data.solution[1 + i]
         return total
 
     return [[at_image(entry) for entry in row] for row in data.derivative]
@@ -321,19 +325,19 @@ def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
 
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
     """Return the determinant of a square matrix of polynomials. Raises InputError if it has too many terms."""
-    *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], times)
-    signed: fmpq_mpoly = -last if len(matrix) % 2 else last  # the last of the signed minors
-    return signed
+    *_, last_minor = kernel_minors([[*row, row[0] * 0] for row in matrix], times)
+    value: fmpq_mpoly = -last_minor if len(matrix) % 2 else last_minor  # the minors are signed
+    return value
 
 
-def letters_of(data: MapData, taken: str) -> dict[str, str]:
+def letters_of(data: MapData, reserved: str) -> dict[str, str]:
     """Return names for the letters of a map in a script: x, x1, x1_new and eps do not change, others become v_NAME.
 
-    `taken` is a regular expression for the names that the script itself defines.
+    `reserved` is a regular expression for the names that the script itself defines.
     """
     letters: dict[str, str] = {}
     for name in (*data.names, *data.new, *(f"{name}2" for name in data.new)):
-        is_plain = re.fullmatch(r"eps|[a-z]\d*(_new2?)?", name) and not re.fullmatch(taken, name)
+        is_plain = re.fullmatch(r"eps|[a-z]\d*(_new2?)?", name) and not re.fullmatch(reserved, name)
         text = name if is_plain else "v_" + re.sub(r"[^A-Za-z0-9_]", "_", name)
         while text in letters.values():
             text += "_"
@@ -373,10 +377,10 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
             raise InputError(f"found {unknown[0]} in a function, expected {', '.join(names)} for a certificate")
         images = [letters.get(name, context.constant(0)) for name in function.names]
         P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
-    common = P.gcd(Q)
-    P, Q = P / common, Q / common
-    scale = common_denominator(P), common_denominator(Q)
-    multiple = scale[0] * scale[1] / scale[0].gcd(scale[1])
+    gcd = P.gcd(Q)
+    P, Q = P / gcd, Q / gcd
+    denominators = common_denominator(P), common_denominator(Q)
+    multiple = denominators[0] * denominators[1] / denominators[0].gcd(denominators[1])
     return P * multiple, Q * multiple
 
 

@@ -30,7 +30,7 @@ from kahanmaps.certificates.identities import (
     InvariantTensor,
     MapData,
     letters_of,
-    restricted,
+    restrict,
 )
 from kahanmaps.certificates.rocq_entropy import LIBRARY, entropy_proof
 
@@ -51,10 +51,11 @@ class _Script:
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
         self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are defined by the script itself
-        self.old = [self.letters[name] for name in data.variables]
-        self.new = [self.letters[name] for name in data.new]
-        self.third = [self.letters[f"{name}2"] for name in data.new]
-        self.x, self.y, self.z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        # `xs`, `ys`, `zs` are the letters of x, its image y and the image z of y; `x`, `y`, `z` join them by blanks.
+        self.xs = [self.letters[name] for name in data.variables]
+        self.ys = [self.letters[name] for name in data.new]
+        self.zs = [self.letters[f"{name}2"] for name in data.new]
+        self.x, self.y, self.z = (" ".join(letters) for letters in (self.xs, self.ys, self.zs))
 
     @property
     def cramer(self) -> str:
@@ -68,7 +69,7 @@ class _Script:
 
     def image_letters(self, at_n: bool) -> list[str]:
         """Return the text of det(M) x~: the names of N, or products that Cramer's rule rewrites to N."""
-        return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
+        return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
     def constants(self) -> list[str]:
@@ -82,22 +83,22 @@ class _Script:
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
         """Define the equation of the map as a relation between arbitrary points, with the residuals e1, e2, ..."""
-        rows, arguments = (data or self.data).rows, " ".join([*self.old, *self.new])
+        rows, arguments = (data or self.data).rows, " ".join([*self.xs, *self.ys])
         lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
         for i, row in enumerate(rows):
-            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.new, strict=True) if entry]
+            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.ys, strict=True) if entry]
             total = f"{' + '.join(terms)} - ({self.text(row[-1])})"
             lines.append(f"Definition {letter}{i + 1} ({arguments} : R) : R := {total}.")
         equations = " /\\ ".join(f"{letter}{i + 1} {arguments} = 0" for i in range(len(rows)))
         return [*lines, f"Definition {relation} ({arguments} : R) : Prop := {equations}."]
 
-    def unique(self, letter: str, data: MapData) -> list[str]:
+    def uniqueness_lemma(self, letter: str, data: MapData) -> list[str]:
         """State the lemma that a point with det M not 0 has one image; the proof uses adjugates of the blocks of M."""
         x, y, z = self.x, self.y, self.z
-        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
+        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.ys, self.zs, strict=True))
         one = ring(data.names).constant(1)
-        of_each = [restricted(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
-        blocks = list({block.variables: block for block in of_each}.values())
+        block_of_variable = [restrict(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
+        blocks = list({block.variables: block for block in block_of_variable}.values())
         dets = [f"{letter}_det_{b + 1}" for b in range(len(blocks))]
         lines = [
             *self.functions(x, **{name: block.determinant for name, block in zip(dets, blocks, strict=True)}),
@@ -107,30 +108,30 @@ class _Script:
             f"Proof. intros {x} {y} {z} H {self.hypothesis('A')} {self.hypothesis('B')}.",
         ]
         for name in dets:
-            steps = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
-            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({steps}).")
-        for i, block in enumerate(of_each):
-            name = dets[[other.variables for other in blocks].index(block.variables)]
+            tactics = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
+            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({tactics}).")
+        for i, block in enumerate(block_of_variable):
+            name = dets[[other_block.variables for other_block in blocks].index(block.variables)]
             rows = [data.variables.index(variable) + 1 for variable in block.variables]
             terms = [
                 f"({self.text(a)}) * ({letter}{j} {x} {y} - {letter}{j} {x} {z})"
                 for j, a in zip(rows, block.adjugate[rows.index(i + 1)], strict=True)
                 if a
             ]
-            defined = " ".join([name, *(f"{letter}{j}" for j in rows)])
-            steps = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
-            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{defined}] beta; ring |"
-            steps += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
-            lines.append(f"  split. {{ {steps} }}" if i < data.dim - 1 else f"  {steps}")
+            definitions = " ".join([name, *(f"{letter}{j}" for j in rows)])
+            tactics = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
+            tactics += f"transitivity ({' + '.join(terms)}); [cbv delta [{definitions}] beta; ring |"
+            tactics += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
+            lines.append(f"  split. {{ {tactics} }}" if i < data.dim - 1 else f"  {tactics}")
         return [*lines, "Qed."]
 
     def chain(self, claim: Chain, theorem: str) -> list[str]:
         """State the theorem that the last points of two chains of images are equal."""
         n, lines = self.data.dim, list[str]()
         for letter, data in claim.maps.items():
-            lines += [*self.predicate(letter, f"{letter}_maps", data), *self.unique(letter, data)]
+            lines += [*self.predicate(letter, f"{letter}_maps", data), *self.uniqueness_lemma(letter, data)]
         lines += [f"Variables {self.x} : R.  (* a point x *)"]
-        points, denominators = [self.old], [[""] * n]
+        points, denominators = [self.xs], [[""] * n]
         for v, value in enumerate(claim.values[1:], 1):
             for i, P in enumerate(value.numerators):
                 lines.append(f"Definition w{v}_{i + 1} : R := {self.text(P)}.")
@@ -140,76 +141,79 @@ class _Script:
                     f"Hypothesis h{v}_{k + 1} : d{v}_{k + 1} <> 0.",
                 ]
             points.append([f"w{v}_{i + 1}" for i in range(n)])
-            denominators.append([f"d{v}_{k + 1}" for k in value.which])
-        texts = [
-            " ".join(f"({a} / {q})" if q else a for a, q in zip(point, dens, strict=True))
-            for point, dens in zip(points, denominators, strict=True)
+            denominators.append([f"d{v}_{k + 1}" for k in value.denominator_indices])
+        point_texts = [
+            " ".join(f"({a} / {q})" if q else a for a, q in zip(point, point_denominators, strict=True))
+            for point, point_denominators in zip(points, denominators, strict=True)
         ]
-        defined = " ".join(dict.fromkeys(name for names in (*points[1:], *denominators) for name in names if name))
+        definitions = " ".join(dict.fromkeys(name for names in (*points[1:], *denominators) for name in names if name))
         for k, (letter, source, v) in enumerate(claim.arrows, 1):
             s, data = claim.value_of(source), claim.maps[letter]
             for i, residual in enumerate(data.residual(data.two_points, 0, n)):
-                moved, powers = self._without_denominators(
+                numerator_text, denominator_text = self._fraction_text(
                     residual, [*points[s], *points[v]], [*denominators[s], *denominators[v]]
                 )
                 lines += [
-                    f"Lemma arrow{k}_{i + 1} : {letter}{i + 1} {texts[s]} {texts[v]} = 0.",
+                    f"Lemma arrow{k}_{i + 1} : {letter}{i + 1} {point_texts[s]} {point_texts[v]} = 0.",
                     "Proof.",
-                    f"  transitivity (({moved}) / ({powers})).",
+                    f"  transitivity (({numerator_text}) / ({denominator_text})).",
                     f"  - unfold {letter}{i + 1}. field. repeat split; assumption.",
-                    f"  - replace ({moved}) with 0; [unfold Rdiv; ring |].",
-                    f"    cbv delta [{defined}] beta; ring.",
+                    f"  - replace ({numerator_text}) with 0; [unfold Rdiv; ring |].",
+                    f"    cbv delta [{definitions}] beta; ring.",
                     "Qed.",
                 ]
             proofs = [f"exact arrow{k}_{i + 1}" for i in range(n)]
-            steps = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
-            lines.append(f"Lemma arrow{k} : {letter}_maps {texts[s]} {texts[v]}. Proof. {steps} {proofs[-1]}. Qed.")
-        nodes = [self.old, *([f"{a}_p{k}" for a in self.old] for k in range(1, len(claim.arrows) + 1))]
+            tactics = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
+            lines.append(
+                f"Lemma arrow{k} : {letter}_maps {point_texts[s]} {point_texts[v]}. Proof. {tactics} {proofs[-1]}. Qed."
+            )
+        point_names = [self.xs, *([f"{a}_p{k}" for a in self.xs] for k in range(1, len(claim.arrows) + 1))]
         hypotheses, proof = [], []
         for k, (letter, source, _) in enumerate(claim.arrows, 1):
-            before, after = " ".join(nodes[source]), " ".join(nodes[k])
-            hypotheses.append(f"  {letter}_det {before} <> 0 -> {letter}_maps {before} {after} ->")
+            source_names, image_names = " ".join(point_names[source]), " ".join(point_names[k])
+            hypotheses.append(f"  {letter}_det {source_names} <> 0 -> {letter}_maps {source_names} {image_names} ->")
             proof.append(f"  intros D M. destruct ({letter}_unique _ _ D M arrow{k}) as {self.hypothesis('A')}.")
             proof[-1] = proof[-1].replace("_unique _ _", "_unique" + " _" * (3 * n))
-            proof.append(f"  subst {after}. clear D M.")
-        i, j = claim.says
-        conclusion = " /\\ ".join(f"{a} = {b}" for a, b in zip(nodes[i], nodes[j], strict=True))
+            proof.append(f"  subst {image_names}. clear D M.")
+        all_names = " ".join(name for names in point_names[1:] for name in names)
+        i, j = claim.equal_points
+        conclusion = " /\\ ".join(f"{a} = {b}" for a, b in zip(point_names[i], point_names[j], strict=True))
         return [
             *lines,
-            f"Theorem {theorem} : forall {' '.join(name for node in nodes[1:] for name in node)},",
+            f"Theorem {theorem} : forall {all_names},",
             *hypotheses,
             f"  {conclusion}.",
-            f"Proof. intros {' '.join(name for node in nodes[1:] for name in node)}.",
+            f"Proof. intros {all_names}.",
             *proof,
             "  repeat (split; [reflexivity |]). reflexivity.",
             "Qed.",
         ]
 
-    def _without_denominators(
+    def _fraction_text(
         self, polynomial: fmpq_mpoly, numerators: Sequence[str], denominators: Sequence[str]
     ) -> tuple[str, str]:
         """Return the value of a polynomial at fractions as a numerator and a product of powers of denominators."""
-        distinct = [q for q in dict.fromkeys(denominators) if q]
+        distinct_denominators = [q for q in dict.fromkeys(denominators) if q]
         count = len(numerators)
         constants = [self.letters[name] for name in names_of(polynomial)[count:]]
         rows = [([int(e) for e in exponents], c) for exponents, c in polynomial.terms()]
 
         def degree(row: Sequence[int], q: str) -> int:
-            return sum(e for e, other in zip(row[:count], denominators, strict=True) if other == q)
+            return sum(e for e, denominator in zip(row[:count], denominators, strict=True) if denominator == q)
 
-        powers = {q: max((degree(row, q) for row, _ in rows), default=0) for q in distinct}
-        pieces = []
+        powers = {q: max((degree(row, q) for row, _ in rows), default=0) for q in distinct_denominators}
+        terms = []
         for row, coefficient in rows:
             exponents = [*row, *(power - degree(row, q) for q, power in powers.items())]
-            pieces.append(" * ".join([f"({coefficient})", *powers_text([*numerators, *constants, *powers], exponents)]))
-        return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
+            terms.append(" * ".join([f"({coefficient})", *powers_text([*numerators, *constants, *powers], exponents)]))
+        return " + ".join(terms), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
         """Return the pattern that splits the hypothesis `maps` into its parts: (A1 & A2)."""
         names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
         return f"({' & '.join(names)})" if len(names) > 1 else names[0]
 
-    def along_orbit(self, claim: OrbitIntegral, theorem: str) -> list[str]:
+    def orbit_integral(self, claim: OrbitIntegral, theorem: str) -> list[str]:
         """State the theorem that a function of x and x~ has the same value one step later."""
         n = self.data.dim
         x, y, z = self.x, self.y, self.z
@@ -234,57 +238,57 @@ class _Script:
             "Qed.",
         ]
 
-    def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
+    def affine_symmetry(self, claim: AffineSymmetry, theorem: str) -> list[str]:
         """State the theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
         n, is_own = self.data.dim, claim.target is claim.data
         x, y = self.x, self.y
         polynomials = self.data.at_points(*claim.image)
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
-        first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
+        first_point, second_point = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
         target, letters = ("maps", "e") if is_own else ("target", "ef")
-        onto = " /\\ ".join(f"{image} = {name}" for image, name in zip(points[1], self.old, strict=True))
+        onto_equations = " /\\ ".join(f"{image} = {name}" for image, name in zip(points[1], self.xs, strict=True))
         preimage = [f"(({self.text(P)}) / {divisor})" for P, divisor in claim.inverse]
         lines = [
             *self.predicate(),
             *([] if is_own else self.predicate("f", target, claim.target)),
             f"(* {'To the inverse' if claim.reversing else 'Map to map'} by T: {', '.join(points[0])} *)",
-            f"Theorem {theorem}_is_onto : forall {x}, exists {y}, {onto}.",
+            f"Theorem {theorem}_is_onto : forall {x}, exists {y}, {onto_equations}.",
             f"Proof. intros {x}. exists {', '.join(preimage)}. {'split; [field |]. ' * (n - 1)}field. Qed.",
             f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
-            f"  {target} {first} {second}.",
+            f"  {target} {first_point} {second_point}.",
             "Proof.",
             f"  intros {x} {y} {self.hypothesis('A')}.",
         ]
         for i, row in enumerate(claim.matrix):
             terms = [f"({c}) * e{j + 1} {x} {y}" for j, c in enumerate(row) if c]
-            steps = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
-            steps += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
-            steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
-            lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
+            tactics = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
+            tactics += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
+            tactics += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
+            lines.append(f"  split; [{tactics[:-1]} |]." if i < n - 1 else f"  {tactics}")
         return [*lines, "Qed."]
 
-    def changed(self, claim: ChangedFunction, theorem: str) -> list[str]:
+    def coordinate_change(self, claim: ChangedFunction, theorem: str) -> list[str]:
         """State the theorem that a function of x = T z equals another function of z."""
         z, names = self.x, ("num", "den", "num_z", "den_z")
-        at = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
+        point_text = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
         return [
-            *self.functions(z, **dict(zip(names, (*claim.given, *claim.moved), strict=True))),
+            *self.functions(z, **dict(zip(names, (*claim.old_function, *claim.new_function), strict=True))),
             f"Theorem {theorem} : forall {z},",
-            f"  num {at} * den_z {z} = num_z {z} * den {at}.",
+            f"  num {point_text} * den_z {z} = num_z {z} * den {point_text}.",
             f"Proof. intros {z}. cbv delta [{' '.join(names)}] beta; field. Qed.",
         ]
 
-    def expand(self, *further: str) -> str:
+    def expand_tactic(self, *names: str) -> str:
         """Return the tactic that unfolds all definitions and proves a polynomial identity."""
         n = self.data.dim
-        defined = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
-        defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
+        definitions = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
+        definitions += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
         if not self.is_solved:
-            return f"cbv delta [{' '.join((*further, 'det', *defined))}] beta; ring."
-        first = f"cbv delta [{' '.join(further)}] beta; " if further else ""
-        return f"{first}rewrite ?det_value; cbv delta [{' '.join(('d', *defined))}] beta; ring."
+            return f"cbv delta [{' '.join((*names, 'det', *definitions))}] beta; ring."
+        unfolding = f"cbv delta [{' '.join(names)}] beta; " if names else ""
+        return f"{unfolding}rewrite ?det_value; cbv delta [{' '.join(('d', *definitions))}] beta; ring."
 
-    def map(self, is_solved: bool) -> list[str]:
+    def map_equation(self, is_solved: bool) -> list[str]:
         """Write the variables, the equation of the map, and Cramer's rule if it is needed."""
         data, n = self.data, self.data.dim
         self.is_solved = is_solved
@@ -298,115 +302,115 @@ class _Script:
         for i, row in enumerate(data.rows):
             lines += [f"Definition m{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row[:-1])]
             lines.append(f"Definition r{i + 1} : R := {self.text(row[-1])}.")
-        left = [" + ".join(f"m{i + 1}{j + 1} * {name}" for j, name in enumerate(self.new)) for i in range(n)]
-        lines += [f"Hypothesis equation{i + 1} : {left[i]} = r{i + 1}." for i in range(n)]
+        left_sides = [" + ".join(f"m{i + 1}{j + 1} * {name}" for j, name in enumerate(self.ys)) for i in range(n)]
+        lines += [f"Hypothesis equation{i + 1} : {left_sides[i]} = r{i + 1}." for i in range(n)]
         lines += [f"Definition det : R := {determinant_text(entries('m', n))}.", "Hypothesis regular : det <> 0."]
         if not is_solved:
             return lines
-        used = " ".join(["det", "d", *(name for row in entries("m", n) for name in row)])
+        definitions = " ".join(["det", "d", *(name for row in entries("m", n) for name in row)])
         lines += [
             "",
             f"Definition d : R := {self.text(data.determinant)}.",
-            f"Lemma det_value : det = d. Proof. cbv delta [{used}] beta; ring. Qed.",
+            f"Lemma det_value : det = d. Proof. cbv delta [{definitions}] beta; ring. Qed.",
             "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)",
         ]
         for i in range(n):
             lines += [f"Definition a{i + 1}{j + 1} : R := {self.text(data.adjugate[i][j])}." for j in range(n)]
             lines.append(f"Definition n{i + 1} : R := {self.text(data.numerators[i])}.")
         for i in range(n):
-            combination = " + ".join(f"a{i + 1}{j + 1} * ({left[j]})" for j in range(n))
+            combination = " + ".join(f"a{i + 1}{j + 1} * ({left_sides[j]})" for j in range(n))
             lines += [
-                f"Lemma cramer{i + 1} : det * {self.new[i]} = n{i + 1}.",
+                f"Lemma cramer{i + 1} : det * {self.ys[i]} = n{i + 1}.",
                 "Proof.",
                 f"  transitivity ({combination}).",
-                f"  - {self.expand()}",
-                f"  - rewrite {', '.join(f'equation{j + 1}' for j in range(n))}. {self.expand()}",
+                f"  - {self.expand_tactic()}",
+                f"  - rewrite {', '.join(f'equation{j + 1}' for j in range(n))}. {self.expand_tactic()}",
                 "Qed.",
             ]
         return lines
 
-    def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str = "", *also: str) -> list[str]:
-        """State the lemma det^degree P(x~) = value, where `label` is the name of P; `also`: definitions in the value.
+    def image_lemma(self, label: str, P: fmpq_mpoly, degree: int, value: str = "", *definitions: str) -> list[str]:
+        """State the lemma det^degree P(x~) = value, where `label` is the name of P; `definitions` occur in the value.
 
         By default the value is the homogenized P at N and det.
         """
         n = self.data.dim
         constants = [self.letters[name] for name in self.data.names[n:]]
-        scaled, at_n = (
-            _homogeneous_text(polynomial, [*self.image_letters(at_n), *constants], degree, slice(n))
-            for at_n in (False, True)
+        scaled_text, value_at_n = (
+            _homogeneous_text(P, [*self.image_letters(is_at_n), *constants], degree, slice(n))
+            for is_at_n in (False, True)
         )
-        last = f"{self.expand(label, *also)}" if value else "ring."
+        tactic = f"{self.expand_tactic(label, *definitions)}" if value else "ring."
         return [
-            f"Lemma {label}_image : {label} {self.y} * det ^ {degree} = {value or at_n}.",
+            f"Lemma {label}_image : {label} {self.y} * det ^ {degree} = {value or value_at_n}.",
             "Proof.",
-            f"  transitivity ({scaled}).",
+            f"  transitivity ({scaled_text}).",
             f"  - cbv delta [{label}] beta; ring.",
-            f"  - rewrite {self.cramer}. {last}",
+            f"  - rewrite {self.cramer}. {tactic}",
             "Qed.",
         ]
 
-    def products(self, fraction: DarbouxProducts, *named: tuple[str, str]) -> list[str]:
+    def products(self, fraction: DarbouxProducts, *labels: tuple[str, str]) -> list[str]:
         """Define the products of Darboux polynomials, and state the lemmas that the map multiplies them by cofactors.
 
-        `named` contains for each product its name and the name of its cofactor.
+        `labels` contains, for each product, its name and the name of its cofactor.
         """
-        old, new, k = self.x, self.y, fraction.degree
-        lines = [f"Definition c{j} : R := {self.text(c)}." for j, c in enumerate(fraction.letters, 1)]
-        for (label, letter), product, total in zip(named, fraction.products, fraction.cofactors, strict=True):
+        x, y, k = self.x, self.y, fraction.degree
+        lines = [f"Definition c{j} : R := {self.text(c)}." for j, c in enumerate(fraction.common_factors, 1)]
+        for (label, letter), product, cofactor in zip(labels, fraction.products, fraction.cofactors, strict=True):
             is_single = product.is_single and product.degree == k
             names = [label if is_single else f"{label}_{i}" for i in range(1, len(product.factors) + 1)]
-            definition = f"Definition {letter} : R := {_monomial_text(total)}."
+            definition = f"Definition {letter} : R := {_monomial_text(cofactor)}."
             lines += [] if definition in lines else [definition]
             for name, factor in zip(names, product.factors, strict=True):
-                lines += self.functions(old, **{name: factor.polynomial})
+                lines += self.functions(x, **{name: factor.polynomial})
                 value = letter if is_single else f"({_monomial_text(factor.cofactor)})"
-                used = [f"c{j}" for j, power in enumerate(factor.cofactor.powers[1:], 1) if power]
-                used += [letter] if is_single else []
-                lines += self.moved(name, factor.polynomial, factor.degree, f"{value} * {name} {old}", *used)
+                definitions = [f"c{j}" for j, power in enumerate(factor.cofactor.powers[1:], 1) if power]
+                definitions += [letter] if is_single else []
+                lines += self.image_lemma(name, factor.polynomial, factor.degree, f"{value} * {name} {x}", *definitions)
             if is_single:
                 continue
             content = [] if product.content.is_one() and names else [f"({self.text(product.content)})"]
             factors = list(zip(names, product.factors, strict=True))
-            text = " * ".join(content + [f"{name} {old}" + _power(factor.exponent) for name, factor in factors])
-            scaled = [f"({name} {new} * det ^ {f.degree})" + _power(f.exponent) for name, f in factors]
-            scaled = [*content, *scaled, f"det ^ {k - product.degree}"]
+            text = " * ".join(content + [f"{name} {x}" + _power_text(factor.exponent) for name, factor in factors])
+            scaled_factors = [f"({name} {y} * det ^ {f.degree})" + _power_text(f.exponent) for name, f in factors]
+            scaled_factors = [*content, *scaled_factors, f"det ^ {k - product.degree}"]
             images = "".join(f"?{name}_image, " for name in names)[:-2]
             lines += [
-                f"Definition {label} ({old} : R) : R := {text}.",
-                f"Lemma {label}_image : {label} {new} * det ^ {k} = {letter} * {label} {old}.",
+                f"Definition {label} ({x} : R) : R := {text}.",
+                f"Lemma {label}_image : {label} {y} * det ^ {k} = {letter} * {label} {x}.",
                 "Proof.",
-                f"  transitivity ({' * '.join(scaled)}); [unfold {label}; ring |].",
+                f"  transitivity ({' * '.join(scaled_factors)}); [unfold {label}; ring |].",
                 f"  {f'rewrite {images}. ' if images else ''}unfold {label}, {letter}. ring.",
                 "Qed.",
             ]
         return lines
 
-    def conserved(self, claim: ConservedFunction, theorem: str) -> list[str]:
+    def conserved_function(self, claim: ConservedFunction, theorem: str) -> list[str]:
         """State the theorem that a function has the same value at x and x~."""
-        old, new, k = self.x, self.y, claim.fraction.degree
+        x, y, k = self.x, self.y, claim.fraction.degree
         lines = [
             "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
             *self.products(claim.fraction, ("num", "cofactor"), ("den", "cofactor")),
             f"Theorem {theorem} :",
-            f"  den {old} <> 0 -> den {new} <> 0 ->",
-            f"  num {new} / den {new} = num {old} / den {old}.",
+            f"  den {x} <> 0 -> den {y} <> 0 ->",
+            f"  num {y} / den {y} = num {x} / den {x}.",
             "Proof.",
             "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
             f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {k} * den {old}); [ring |]. rewrite num_image.",
-            f"  transitivity (num {old} * (den {new} * det ^ {k})); [rewrite den_image; ring | ring].",
+            f"  transitivity (num {y} * det ^ {k} * den {x}); [ring |]. rewrite num_image.",
+            f"  transitivity (num {x} * (den {y} * det ^ {k})); [rewrite den_image; ring | ring].",
             "Qed.",
         ]
         return lines
 
-    def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
+    def darboux_polynomial(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
         """State the theorem that P(x~) is P(x) times the cofactor."""
-        old, new, k = self.x, self.y, claim.product.degree
+        x, y, k = self.x, self.y, claim.product.degree
         return [
             "(* A Darboux polynomial, with its cofactor over a power of det. *)",
             *self.products(claim.product, ("num", "cofactor")),
-            f"Theorem {theorem} : num {new} = cofactor / det ^ {k} * num {old}.",
+            f"Theorem {theorem} : num {y} = cofactor / det ^ {k} * num {x}.",
             "Proof.",
             f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
             "  rewrite num_image. field. exact regular.",
@@ -417,15 +421,15 @@ class _Script:
         """Return the definitions of l11, l12, ..., the entries of L, and these names."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
-        flat = [entry for row in self.data.derivative for entry in row]
-        lines += [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, flat, strict=True)]
+        entries_of_L = [entry for row in self.data.derivative for entry in row]
+        lines += [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, entries_of_L, strict=True)]
         for i, difference in enumerate(self.data.residuals, 1):
-            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.new))
-            used = " ".join(f"m{i}{k + 1}" for k in range(self.data.dim))
+            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.ys))
+            definitions = " ".join(f"m{i}{k + 1}" for k in range(self.data.dim))
             lines += [
                 f"Definition e{i} ({self.x} : R) : R := {self.text(difference)}.",
                 f"Lemma residual{i} : e{i} {self.x} = r{i} - ({terms}).",
-                f"Proof. cbv delta [e{i} r{i} {used}] beta; ring. Qed.",
+                f"Proof. cbv delta [e{i} r{i} {definitions}] beta; ring. Qed.",
             ]
             for s in range(self.data.dim):
                 lines += self.slope(f"e{i}", difference, s, f"l{i}{s + 1}")
@@ -433,35 +437,38 @@ class _Script:
 
     def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
         """State the lemma that d (called `name`) is a derivative: P(x + t e_s) = P(x) + t d + t^2 (polynomial)."""
-        names, spare, old = names_of(P), "t_", " ".join(self.old)
+        names, t_name, x_text = names_of(P), "t_", " ".join(self.xs)
         context = ring((*names, "".join(names) + "_"))  # t may be a variable, so take a name longer than all others
         *letters, t = context.gens()
-        moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
-        at = [polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s))]
-        rest = polynomial_text((moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names), spare])
-        point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
+        P_shifted = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
+        P_x, slope = (polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s)))
+        remainder = (P_shifted - P_x - t * slope) / t**2
+        remainder_text = polynomial_text(remainder, [*(self.letters[x] for x in names), t_name])
+        point = " ".join(f"({x} + {t_name})" if k == s else x for k, x in enumerate(self.xs))
         return [
-            f"Lemma derivative_{function}_{s + 1} : forall {spare}, exists rest,",
-            f"  {function} {point} = {function} {old} + {spare} * {name} + {spare} ^ 2 * rest.",
-            f"Proof. intro {spare}. exists ({rest}). cbv delta [{function} {name}] beta; ring. Qed.",
+            f"Lemma derivative_{function}_{s + 1} : forall {t_name}, exists rest,",
+            f"  {function} {point} = {function} {x_text} + {t_name} * {name} + {t_name} ^ 2 * rest.",
+            f"Proof. intro {t_name}. exists ({remainder_text}). cbv delta [{function} {name}] beta; ring. Qed.",
         ]
 
-    def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
+    def poisson_tensor(self, claim: InvariantTensor, theorem: str) -> list[str]:
         """State the theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
-        n, k, old, new = claim.dim, claim.degree, self.x, self.y
-        lines, flat = self.derivative()
+        n, k, x, y = claim.dim, claim.degree, self.x, self.y
+        lines, L_names = self.derivative()
         lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
-        pairs = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
-        functions = {name: claim.upper[pair] for pair, name in pairs.items()} | {"den": claim.denominator}
-        lines += self.functions(old, **functions)
+        name_of_pair = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
+        functions = {name: claim.upper[pair] for pair, name in name_of_pair.items()} | {"den": claim.denominator}
+        lines += self.functions(x, **functions)
         names = " ".join(functions)
 
-        def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
-            """Return entry i, j of A T A^T den; `times` formats the entries `letter` of A, `form` those of T."""
-            a = [[times.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
-            minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in pairs.items())
+        def entry_text(
+            letter: str, i: int, j: int, point: str, entry_format: str = "{}", point_format: str = "{}"
+        ) -> str:
+            """Return entry i, j of A T A^T den; the formats are for the entries `letter` of A and for those of T."""
+            a = [[entry_format.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
+            minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in name_of_pair.items())
             return " + ".join(
-                f"({b} * {c} - {d} * {e}) * {form.format(f'{name} {point}')}" for b, c, d, e, name in minors
+                f"({b} * {c} - {d} * {e}) * {point_format.format(f'{name} {point}')}" for b, c, d, e, name in minors
             )
 
         if not claim.is_free:
@@ -473,105 +480,108 @@ class _Script:
                         f"Proof. transitivity ({forms[0]}); [unfold {label}; ring | rewrite {self.cramer}; ring]. Qed.",
                     ]
             for name, P in functions.items():
-                lines += self.moved(name, P, k)
+                lines += self.image_lemma(name, P, k)
         for i, j in combinations(range(n), 2):
-            left, right = sandwich("l", i, j, old), sandwich("m", i, j, new)
+            left, right = entry_text("l", i, j, x), entry_text("m", i, j, y)
             label = f"{theorem}_{i + 1}{j + 1}"
             lines += [
-                f"Theorem {label} : den {old} <> 0 -> den {new} <> 0 ->",
-                f"  ({left}) / den {old} =",
-                f"  ({right}) / den {new}.",
+                f"Theorem {label} : den {x} <> 0 -> den {y} <> 0 ->",
+                f"  ({left}) / den {x} =",
+                f"  ({right}) / den {y}.",
                 "Proof.",
                 "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
             ]
             if claim.is_free:
-                lines += [f"  (* This identity holds for any x and x~. *) {self.expand(names, flat)}", "Qed."]
+                lines += [f"  (* This identity holds for any x and x~. *) {self.expand_tactic(names, L_names)}", "Qed."]
                 continue
-            scaled = sandwich("l", i, j, old, "({} * det)"), sandwich("m", i, j, new, form=f"({{}} * det ^ {k})")
+            scaled_sides = (
+                entry_text("l", i, j, x, "({} * det)"),
+                entry_text("m", i, j, y, point_format=f"({{}} * det ^ {k})"),
+            )
             images = [f"?l{row + 1}{column + 1}_image" for row in (i, j) for column in range(n)]
             images += [f"?{name}_image" for name in names.split()]
             lines += [
                 f"  apply (Rmult_eq_reg_r (det ^ {k + 2})); [| apply pow_nonzero; exact regular].",
-                f"  transitivity (({scaled[0]}) * (den {new} * det ^ {k})); [ring |].",
-                f"  transitivity (({scaled[1]}) * den {old} * det ^ 2); [| ring].",
-                f"  rewrite {', '.join(images)}. {self.expand(names)}",
+                f"  transitivity (({scaled_sides[0]}) * (den {y} * det ^ {k})); [ring |].",
+                f"  transitivity (({scaled_sides[1]}) * den {x} * det ^ 2); [| ring].",
+                f"  rewrite {', '.join(images)}. {self.expand_tactic(names)}",
                 "Qed.",
             ]
-        return [*lines, *self.jacobi(claim, pairs, functions, theorem)] if claim.triples else lines
+        return [*lines, *self.jacobi(claim, name_of_pair, functions, theorem)] if claim.triples else lines
 
     def jacobi(
         self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
     ) -> list[str]:
         """State the Jacobi identities for i < j < k: the cyclic sum over T_is d/dx_s T_jk, times den^3, is 0."""
-        old, lines = self.x, list[str]()
+        x, lines = self.x, list[str]()
         for name, P in functions.items():
             for s in range(claim.dim):
                 lines.append(f"Definition {name}_{s + 1} : R := {self.text(P.derivative(s))}.")
                 lines += self.slope(name, P, s, f"{name}_{s + 1}")
-        used = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
+        definitions = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
 
         def entry(i: int, j: int, ending: str) -> str:
             return f"{'- ' * (i > j)}{names[min(i, j), max(i, j)]}{ending}"
 
         for i, j, k in claim.triples:
             terms = [
-                f"({entry(a, s, f' {old}')}) * (({entry(b, c, f'_{s + 1}')}) * den {old} - "
-                f"({entry(b, c, f' {old}')}) * den_{s + 1})"
+                f"({entry(a, s, f' {x}')}) * (({entry(b, c, f'_{s + 1}')}) * den {x} - "
+                f"({entry(b, c, f' {x}')}) * den_{s + 1})"
                 for a, b, c in ((i, j, k), (j, k, i), (k, i, j))
                 for s in range(claim.dim)
                 if s != a
             ]
             lines += [f"Theorem {theorem}_jacobi_{i + 1}{j + 1}{k + 1} :", f"  {' + '.join(terms)} = 0."]
-            lines.append(f"Proof. cbv delta [{used}] beta; ring. Qed.")
+            lines.append(f"Proof. cbv delta [{definitions}] beta; ring. Qed.")
         return lines
 
-    def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
+    def invariant_volume(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """State the theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
-        n, old, new = self.data.dim, self.x, self.y
-        lines, flat = self.derivative()
+        n, x, y = self.data.dim, self.x, self.y
+        lines, L_names = self.derivative()
         lines += [
             f"Definition volume : R := {determinant_text(entries('l', n))}.  (* det L *)",
             "(* dx/phi with phi = num / den is invariant: phi(x~) = phi(x) det(M^-1 L). *)",
         ]
         statement = [
             f"Theorem {theorem} :",
-            f"  den {old} <> 0 -> den {new} <> 0 ->",
-            f"  num {new} / den {new} = num {old} / den {old} * (volume / det).",
+            f"  den {x} <> 0 -> den {y} <> 0 ->",
+            f"  num {y} / den {y} = num {x} / den {x} * (volume / det).",
             "Proof.",
             "  intros Hx Hy.",
-            f"  replace (num {old} / den {old} * (volume / det)) with (num {old} * volume / (den {old} * det))",
+            f"  replace (num {x} / den {x} * (volume / det)) with (num {x} * volume / (den {x} * det))",
             "    by (field; split; [exact regular | assumption]).",
             "  apply equal_fractions; [assumption | apply Rmult_integral_contrapositive_currified; [assumption |"
             " exact regular] |].",
         ]
         if claim.fraction is None:
-            further = f"num den volume {flat}"
-            lines += self.functions(old, num=claim.numerator, den=claim.denominator)
-            return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
+            proof = self.expand_tactic(f"num den volume {L_names}")
+            lines += self.functions(x, num=claim.numerator, den=claim.denominator)
+            return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {proof}", "Qed."]
         lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
         # Each row of L has degree 1 in x~, so det^n det L is a determinant whose rows contain det and det x~.
-        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
-        common, left, right = map(_monomial_text, claim.balance)
-        used, k = [f"c{j}" for j in range(1, len(claim.fraction.letters) + 1)], claim.fraction.degree
+        scaled_rows = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
+        common_text, left, right = map(_monomial_text, claim.balance)
+        factor_names, k = [f"c{j}" for j in range(1, len(claim.fraction.common_factors) + 1)], claim.fraction.degree
         return [
             *lines,
-            f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
-            f"Proof. cbv delta [volume {flat}] beta; ring. Qed.",
+            f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled_rows)}.",
+            f"Proof. cbv delta [volume {L_names}] beta; ring. Qed.",
             f"Lemma shorter : {left} = {right} * (volume * det ^ {n}).",
-            f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand(*used)} Qed.",
+            f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand_tactic(*factor_names)} Qed.",
             f"Lemma balance : cofactor_num * (det * det ^ {n}) = cofactor_den * (volume * det ^ {n}).",
             "Proof.",
-            f"  transitivity ({common} * ({left})); [unfold cofactor_num; ring |].",
-            f"  transitivity ({common} * ({right} * (volume * det ^ {n})));",
+            f"  transitivity ({common_text} * ({left})); [unfold cofactor_num; ring |].",
+            f"  transitivity ({common_text} * ({right} * (volume * det ^ {n})));",
             "    [apply Rmult_eq_compat_l; exact shorter |].",
             "  unfold cofactor_den. ring.",
             "Qed.",
             *statement,
             f"  apply (Rmult_eq_reg_r (det ^ {k + n})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {k} * (den {old} * det * det ^ {n})); [ring |].",
-            f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {k})); [| ring].",
+            f"  transitivity (num {y} * det ^ {k} * (den {x} * det * det ^ {n})); [ring |].",
+            f"  transitivity (num {x} * (volume * det ^ {n}) * (den {y} * det ^ {k})); [| ring].",
             "  rewrite num_image, den_image.",
-            f"  transitivity (num {old} * den {old} * (cofactor_num * (det * det ^ {n}))); [ring |].",
+            f"  transitivity (num {x} * den {x} * (cofactor_num * (det * det ^ {n}))); [ring |].",
             "  rewrite balance. ring.",
             "Qed.",
         ]
@@ -586,15 +596,15 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     """
     # Nothing in a comment may end it, or begin another one or a string.
     # Commands quote ' as '"'"', which is written without the quotation marks of strings.
-    quoted = (line.replace("'\"'\"'", "'\\''").replace('"', "'") for line in header)
-    safe_lines = (line.replace("(*", "( *").replace("*)", "* )") for line in quoted)
+    unquoted_lines = (line.replace("'\"'\"'", "'\\''").replace('"', "'") for line in header)
+    safe_lines = (line.replace("(*", "( *").replace("*)", "* )") for line in unquoted_lines)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
     lines += [LIBRARY] if any(isinstance(claim, PositiveEntropy) for claim in claims) else []
     groups: dict[tuple[int, ...], list[Claim]] = {}  # grouped by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
-        own = k if isinstance(claim, Chain) else 0
-        groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
+        chain_number = k if isinstance(claim, Chain) else 0
+        groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), chain_number), []).append(claim)
     theorems = list[str]()
     for m, group in enumerate(groups.values(), 1):
         script = _Script(group[0].data)
@@ -602,13 +612,13 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
         if isinstance(group[0], EquationClaim):
             lines += script.constants
         else:
-            lines += [*script.map(any(claim.is_at_image for claim in group)), ""]
-        known: dict[str, str] = {}
+            lines += [*script.map_equation(any(claim.is_at_image for claim in group)), ""]
+        statement_of: dict[str, str] = {}
         for k, claim in enumerate(group, 1):
-            prove, ending = _PROOFS[type(claim)]
+            prove, ending = _PROOF_METHODS[type(claim)]
             name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
             theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
-            proof = _not_yet_known(prove(script, claim, theorem), known, f"_claim_{k}")
+            proof = _new_statements(prove(script, claim, theorem), statement_of, f"_claim_{k}")
             theorems += [f"Map{m}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
             lines += [*proof, ""]
         lines += ["End Map.", f"End Map{m}.", ""]
@@ -616,25 +626,25 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     return "\n".join(lines) + "\n"
 
 
-_PROOFS: dict[type[Claim], tuple[Any, str]] = {
-    ConservedFunction: (_Script.conserved, "conserved"),
-    DarbouxPolynomial: (_Script.darboux, "darboux"),
-    InvariantVolume: (_Script.invariant, "invariant"),
-    InvariantTensor: (_Script.poisson, "poisson"),
-    OrbitIntegral: (_Script.along_orbit, "conserved"),
-    AffineSymmetry: (_Script.symmetric, "symmetry"),
+_PROOF_METHODS: dict[type[Claim], tuple[Any, str]] = {
+    ConservedFunction: (_Script.conserved_function, "conserved"),
+    DarbouxPolynomial: (_Script.darboux_polynomial, "darboux"),
+    InvariantVolume: (_Script.invariant_volume, "invariant"),
+    InvariantTensor: (_Script.poisson_tensor, "poisson"),
+    OrbitIntegral: (_Script.orbit_integral, "conserved"),
+    AffineSymmetry: (_Script.affine_symmetry, "symmetry"),
     Chain: (_Script.chain, "everywhere"),
-    ChangedFunction: (_Script.changed, "coordinates"),
+    ChangedFunction: (_Script.coordinate_change, "coordinates"),
     PositiveEntropy: (lambda *arguments: [*entropy_proof(*arguments)], "exponential"),
 }
 
 
-def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> list[str]:
-    """Return the statements that are not `known`; `ending` is appended to a name that another statement already has.
+def _new_statements(lines: Sequence[str], statement_of: dict[str, str], ending: str) -> list[str]:
+    """Return the statements not yet in `statement_of`; `ending` is appended to a name that another statement has.
 
     A statement uses earlier statements only, so that a changed name is known before it is used.
     """
-    statements, renamed = list[str](), dict[str, str]()
+    statements, new_names = list[str](), dict[str, str]()
     for line in lines:
         if re.match(r"\(\*|(Definition|Lemma|Theorem|Variables|Hypothesis) ", line) and not (
             statements and statements[-1].startswith("(*") and "\n" not in statements[-1]
@@ -644,15 +654,15 @@ def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> 
             statements[-1] += f"\n{line}"
     result = list[str]()
     for statement in statements:
-        for old, new in renamed.items():
-            statement = re.sub(rf"\b{old}\b", new, statement)
+        for old_name, new_name in new_names.items():
+            statement = re.sub(rf"\b{old_name}\b", new_name, statement)
         name = re.sub(r"^\(\*.*\*\)\n", "", statement).split()[1]
-        if known.get(name) == statement:
+        if statement_of.get(name) == statement:
             continue
-        if name in known:
-            renamed[name] = name + ending
+        if name in statement_of:
+            new_names[name] = name + ending
             name, statement = name + ending, re.sub(rf"\b{name}\b", name + ending, statement)
-        known[name] = statement
+        statement_of[name] = statement
         result += statement.split("\n")
     return result
 
@@ -661,7 +671,7 @@ def _monomial_text(monomial: Monomial) -> str:
     return monomial.text("det", " * ", " ^ ")
 
 
-def _power(exponent: int) -> str:
+def _power_text(exponent: int) -> str:
     return "" if exponent == 1 else f" ^ {exponent}"
 
 
@@ -677,27 +687,27 @@ def powers_text(letters: Iterable[str], exponents: Iterable[Any], power: str = "
 
 def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str = " * ", power: str = " ^ ") -> str:
     """Return the text of a polynomial with integer coefficients in `letters`, as a sum of products."""
-    pieces: list[str] = []
+    terms: list[str] = []
     for exponents, coefficient in polynomial.terms():
         factors = powers_text(letters, exponents, power)
-        size = abs(coefficient)
-        product = times.join(([str(size)] if size != 1 or not factors else []) + factors)
-        sign = ("- " if coefficient < 0 else "") if not pieces else (" - " if coefficient < 0 else " + ")
-        pieces.append(sign + product)
-    return "".join(pieces) or "0"
+        absolute = abs(coefficient)
+        product = times.join(([str(absolute)] if absolute != 1 or not factors else []) + factors)
+        sign = ("- " if coefficient < 0 else "") if not terms else (" - " if coefficient < 0 else " + ")
+        terms.append(sign + product)
+    return "".join(terms) or "0"
 
 
 def determinant_text(entries: Sequence[Sequence[str]]) -> str:
     """Return the determinant of a matrix of texts, expanded along the first row."""
     if len(entries) == 1:
         return entries[0][0]
-    pieces: list[str] = []
+    products: list[str] = []
     for j, entry in enumerate(entries[0]):
         minor = [[*row[:j], *row[j + 1 :]] for row in entries[1:]]
-        inner = determinant_text(minor)
-        product = f"{entry} * {inner if len(minor) == 1 else f'({inner})'}"
-        pieces.append(product if j == 0 else f"{' - ' if j % 2 else ' + '}{product}")
-    return "".join(pieces)
+        minor_text = determinant_text(minor)
+        product = f"{entry} * {minor_text if len(minor) == 1 else f'({minor_text})'}"
+        products.append(product if j == 0 else f"{' - ' if j % 2 else ' + '}{product}")
+    return "".join(products)
 
 
 def _homogeneous_text(
@@ -709,16 +719,16 @@ def _homogeneous_text(
     """
     terms: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
     for exponents, coefficient in polynomial.terms():
-        powers, rest = tuple(map(int, exponents[image])), list(exponents)
-        rest[image] = [0] * len(powers)
-        terms.setdefault(powers, {})[tuple(rest)] = coefficient
-    pieces = []
+        powers, other_exponents = tuple(map(int, exponents[image])), list(exponents)
+        other_exponents[image] = [0] * len(powers)
+        terms.setdefault(powers, {})[tuple(other_exponents)] = coefficient
+    products = []
     for powers, coefficients in terms.items():
-        spare = degree - sum(powers)
-        factors = [*powers_text(letters[image], powers), *([det.format(spare)] if spare else [])]
-        collected = polynomial_text(polynomial.context().from_dict(coefficients), letters)
-        pieces.append(" * ".join([f"({collected})", *factors]))
-    return " + ".join(pieces) or "0"
+        det_exponent = degree - sum(powers)
+        factors = [*powers_text(letters[image], powers), *([det.format(det_exponent)] if det_exponent else [])]
+        coefficient_text = polynomial_text(polynomial.context().from_dict(coefficients), letters)
+        products.append(" * ".join([f"({coefficient_text})", *factors]))
+    return " + ".join(products) or "0"
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:

@@ -16,7 +16,7 @@ from flint import fmpq_mpoly, fmpz
 from kahanmaps.certificates.entropy import EPS, LINE, PositiveEntropy, image_degree
 from kahanmaps.errors import InputError
 
-_MOST_PRIMES = 20
+_MAX_PRIMES = 20
 
 LIBRARY = """\
 Require Import ZArith Znumtheory List.
@@ -126,26 +126,32 @@ Axiom degrees_grow_exponentially : forall (F B G : triple) (g : form) (n d : nat
 
 def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator[str]:
     """Yield the lines that prove the hypotheses of the axiom; `script` is the script about the map."""
-    n, prime = len(claim.forms), _prime_for(claim)
+    n = len(claim.forms)
+    # Coq proves that the prime is prime by trial, so take a small one for which the line has the same degree.
+    for prime in islice((p for p in count(1009, 2) if fmpz(p).is_prime()), _MAX_PRIMES):
+        if image_degree(claim.forms[0], 2 * n, prime) == claim.line_degree:
+            break
+    else:
+        raise InputError("the image of the line has a smaller degree modulo small primes: ask for --for gp")
     x, y, eps = (script.letters[name] for name in (*script.data.variables, script.data.names[-1]))
     for k, (triple, factor) in enumerate(zip(claim.forms, claim.factors, strict=True), 1):
-        yield from (f"Definition F{k}_{i} : form := {_form(P)}." for i, P in enumerate(triple, 1))
+        yield from (f"Definition F{k}_{i} : form := {_form_text(P)}." for i, P in enumerate(triple, 1))
         yield f"Definition F{k} : triple := Triple F{k}_1 F{k}_2 F{k}_3."
-        yield f"Definition c{k} : form := {_form(factor)}."
-        yield from _nonzero(f"c{k}", factor)
+        yield f"Definition c{k} : form := {_form_text(factor)}."
+        yield from _nonzero_lemma(f"c{k}", factor)
     gens = claim.forms[0][0].context().gens()
-    at_F1 = claim.inverse[2].compose(*claim.forms[0][:2], *gens[2:-1], claim.forms[0][2], ctx=gens[0].context())
-    g, rest = divmod(at_F1, gens[-1])
-    if rest:
+    B_at_F1 = claim.inverse[2].compose(*claim.forms[0][:2], *gens[2:-1], claim.forms[0][2], ctx=gens[0].context())
+    g, remainder = divmod(B_at_F1, gens[-1])
+    if remainder:
         raise InputError("the inverse is another map: no certificate is written")
-    yield f"Definition B : triple := Triple {' '.join(f'({_form(P)})' for P in claim.inverse)}."
-    yield f"Definition g : form := {_form(g)}."
-    yield from _nonzero("g", g)
+    yield f"Definition B : triple := Triple {' '.join(f'({_form_text(P)})' for P in claim.inverse)}."
+    yield f"Definition g : form := {_form_text(g)}."
+    yield from _nonzero_lemma("g", g)
     forms = " ".join(f"F{k}_{i}" for k in range(1, n + 1) for i in (1, 2, 3))
     unfold = f"cbv beta iota zeta delta [{forms} {' '.join(f'F{k} c{k}' for k in range(1, n + 1))} eval fold_right"
     compose = f"{unfold} B g point composed]; intros; split; [| split]; ring."
     coordinates = [f"eval c1 {x} {y} 1 {eps} * eval F1_{i} {x} {y} 1 {eps}" for i in (1, 2, 3)]
-    images = [*(f"det * {name}" for name in script.new), "det"]
+    images = [*(f"det * {name}" for name in script.ys), "det"]
     equations = " /\\ ".join(f"{a} = {b}" for a, b in zip(coordinates, images, strict=True))
     yield f"Theorem {theorem}_coordinates : {equations}."
     yield f"Proof. rewrite cramer1, cramer2, det_value. {unfold} n1 n2 d]. split; [| split]; ring. Qed."
@@ -159,24 +165,26 @@ def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator
     yield f"Lemma {theorem}_prime : prime {prime}. Proof. apply is_prime; [reflexivity | vm_compute; reflexivity]. Qed."
     yield f"Lemma line : image_degree {prime} F1 {EPS % prime} (2 * {n}) {line} = Some {claim.line_degree}%nat."
     yield "Proof. vm_compute. reflexivity. Qed."
-    low = claim.lower
-    yield f"(* Degrees of the iterates: the dynamical degree is more than {low} > 1. *)"
+    lower_bound = claim.lower
+    yield f"(* Degrees of the iterates: the dynamical degree is more than {lower_bound} > 1. *)"
     yield f"Theorem {theorem} : forall (k : nat) (H : triple), iterate F1 k H ->"
-    yield f"  ({low.numerator} / {low.denominator}) ^ k <= INR (degree3 H)."
-    arguments = f"F1 B F{n} g {n} {claim.line_degree} {prime} {EPS % prime} {low.numerator} {low.denominator}"
+    yield f"  ({lower_bound.numerator} / {lower_bound.denominator}) ^ k <= INR (degree3 H)."
+    arguments = (
+        f"F1 B F{n} g {n} {claim.line_degree} {prime} {EPS % prime} {lower_bound.numerator} {lower_bound.denominator}"
+    )
     arguments += "".join(f" {a} {b}" for a, b in LINE)
     yield f"Proof. apply (degrees_grow_exponentially {arguments}); [reflexivity | exact g_nonzero | exact inverse |"
     yield f"  exact F{n}_iterate | exact {theorem}_prime | exact line | split; reflexivity | vm_compute; reflexivity]."
     yield "Qed."
 
 
-def _form(polynomial: fmpq_mpoly) -> str:
+def _form_text(polynomial: fmpq_mpoly) -> str:
     """Return a polynomial in x, y, eps and the homogenizing variable h as a list of terms."""
     terms = [(int(c.p), tuple(map(int, e))) for e, c in polynomial.terms()]
     return f"[{'; '.join(f'T ({c}) {e[0]} {e[1]} {e[-1]} {e[-2]}' for c, e in terms)}]"
 
 
-def _nonzero(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
+def _nonzero_lemma(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
     """Yield the lemma that a polynomial is not 0, since its value is not 0 at a point with small coordinates."""
     for x, y, h, e in product(range(1, polynomial.total_degree() + 2), repeat=4):
         if value := polynomial(x, y, e, h):
@@ -184,11 +192,3 @@ def _nonzero(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
             yield f"  replace (eval {name} {x} {y} {h} {e}) with ({value}) by (cbv [{name} eval fold_right]; ring)."
             yield "  apply not_0_IZR; discriminate. Qed."
             return
-
-
-def _prime_for(claim: PositiveEntropy) -> int:
-    """Return a small prime for which the image of the line has the same degree as for the prime of the claim."""
-    for prime in islice((p for p in count(1009, 2) if fmpz(p).is_prime()), _MOST_PRIMES):
-        if image_degree(claim.forms[0], 2 * len(claim.forms), prime) == claim.line_degree:
-            return prime
-    raise InputError("the image of the line has a smaller degree modulo small primes: ask for --for gp")

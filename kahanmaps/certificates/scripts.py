@@ -177,7 +177,7 @@ def line_degree(F, steps, p, residue, start, slope):  # of the image of start + 
         curve = [X.exquo(common) for X in values]  # an error if all three are 0
     return max(X.degree() for X in curve)""",
 }
-_SAYS: dict[type[Claim], str] = {
+_STATEMENTS: dict[type[Claim], str] = {
     ConservedFunction: "P/Q is an integral",
     DarbouxPolynomial: "P is a Darboux polynomial, P(x~) = P C/D^k",
     InvariantVolume: "dx/phi is invariant, phi = P/Q",
@@ -188,7 +188,7 @@ _SAYS: dict[type[Claim], str] = {
     OrbitIntegral: "P(x, x~)/Q is an integral",
     AffineSymmetry: "x -> T takes the map to itself, its inverse or another map",
 }
-_NEEDS = {"act": ("dot",), "images": ("image",)}
+_REQUIRED_TOOLS = {"act": ("dot",), "images": ("image",)}
 
 
 @dataclass(frozen=True)
@@ -221,28 +221,28 @@ PYTHON = Language(
 class _Script:
     """The lines of a script about one map; `define` and `check` append to them."""
 
-    def __init__(self, to: Language, data: MapData) -> None:
-        self.to, self.data, self.lines = to, data, list[str]()
+    def __init__(self, language: Language, data: MapData) -> None:
+        self.language, self.data, self.lines = language, data, list[str]()
         self.has_points = self.has_equation = self.is_solved = False
         self.letters = letters_of(data, r"[hijknpqrst]|c\d+") | {homogenizing(data.names): "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
         """Return the text of a polynomial; a long sum is split, since Python cannot parse very deep expressions."""
         letters = [self.letters[name] for name in names_of(polynomial)]
-        text = polynomial_text(polynomial, letters, "*", self.to.power)
+        text = polynomial_text(polynomial, letters, "*", self.language.power)
         terms = re.split(r" (?=[+-] )", text)
-        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
-        return text if self.to is GP or len(parts) == 1 else f"sum([{', '.join(parts)}])"
+        partial_sums = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
+        return text if self.language is GP or len(partial_sums) == 1 else f"sum([{', '.join(partial_sums)}])"
 
     def vector(self, entries: Sequence[fmpq_mpoly]) -> str:
         """Return the text of a vector of polynomials."""
-        return self.to.vector.format(", ".join(map(self.text, entries)))
+        return self.language.vector.format(", ".join(map(self.text, entries)))
 
     def matrix(self, rows: Sequence[Sequence[str]]) -> str:
         """Return the text of a matrix whose entries are texts."""
-        if len(rows) == 1 and self.to is GP:  # in GP, [a] would be a vector
+        if len(rows) == 1 and self.language is GP:  # in GP, [a] would be a vector
             return f"Mat({rows[0][0]})"
-        return self.to.matrix.format(self.to.next_row.join(", ".join(row) for row in rows))
+        return self.language.matrix.format(self.language.next_row.join(", ".join(row) for row in rows))
 
     def polynomials(self, rows: Sequence[Sequence[fmpq_mpoly]]) -> str:
         """Return the text of a matrix of polynomials."""
@@ -250,17 +250,17 @@ class _Script:
 
     def define(self, name: str, text: str) -> None:
         """Append a definition; `text` is a polynomial or any other expression."""
-        self.lines.append(self.to.definition.format(name, text))
+        self.lines.append(self.language.definition.format(name, text))
 
     def polynomial(self, name: str, polynomial: fmpq_mpoly) -> None:
         """Append the definition of a polynomial."""
-        self.define(name, f"({self.text(polynomial)})" + " * one" * (self.to is PYTHON))
+        self.define(name, f"({self.text(polynomial)})" + " * one" * (self.language is PYTHON))
 
     def check(self, label: str, identity: str) -> None:
         """Append a check of an identity, in which ^ stands for a power."""
-        identity = identity.replace("^", self.to.power)
-        identity = identity.replace("&&", "and") if self.to is PYTHON else identity
-        self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
+        identity = identity.replace("^", self.language.power)
+        identity = identity.replace("&&", "and") if self.language is PYTHON else identity
+        self.lines.append(f'check("{label}", {identity})' + ";" * (self.language is GP))
 
     def begin(self, claim: Claim, count: int) -> None:
         """Append the map of the claim (unless the previous claim has the same map) and the names of points."""
@@ -286,8 +286,8 @@ class _Script:
         """Define M, r and E = M x~ - r, with `letter` appended to their names."""
         self.define(f"M{letter}", self.polynomials([row[:-1] for row in data.rows]))
         self.define(f"r{letter}", self.vector([row[-1] for row in data.rows]))
-        self.define(f"E{letter}", self.to.residual.format(letter))
-        self.lines[-1] += f"  {self.to.comment}0 where new is the image of old"
+        self.define(f"E{letter}", self.language.residual.format(letter))
+        self.lines[-1] += f"  {self.language.comment}0 where new is the image of old"
 
     def solution(self) -> None:
         """Append the definitions of N and D."""
@@ -299,7 +299,7 @@ class _Script:
     def claim(self, claim: Claim) -> None:
         """Append the statement of a claim, and its proof."""
         label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
-        self.lines.append(f"{self.to.comment}{label}: {_SAYS[type(claim)]}")
+        self.lines.append(f"{self.language.comment}{label}: {_STATEMENTS[type(claim)]}")
         self.prove(claim, label)
         self.lines.append("")
 
@@ -316,33 +316,32 @@ class _Script:
         for v, value in enumerate(claim.values):
             names.append((f"P{v}", f"Q{v}"))
             self.define(f"P{v}", self.vector(value.numerators))
-            self.define(f"Q{v}", self.vector([value.denominators[k] for k in value.which]))
+            self.define(f"Q{v}", self.vector([value.denominators[k] for k in value.denominator_indices]))
         self.define("zero", self.vector([self.data.rows[0][0] * 0] * self.data.dim))
         for k, (letter, source, v) in enumerate(claim.arrows, 1):
             (P, Q), (P_image, Q_image) = names[claim.value_of(source)], names[v]
             points = f"concat({P}, {P_image}), concat({Q}, {Q_image})"
-            says = f"point {k}, {P_image}/{Q_image}, is the image of point {source} under {letter}"
-            self.check(says, f"at(E{letter}, concat(old, new), {points}) == zero")
-            says = f"det M is not 0 at point {source}"
+            statement = f"point {k}, {P_image}/{Q_image}, is the image of point {source} under {letter}"
+            self.check(statement, f"at(E{letter}, concat(old, new), {points}) == zero")
+            statement = f"det M is not 0 at point {source}"
             eps = self.letters[self.data.names[-1]]
             determinant = claim.maps[letter].determinant
             if determinant.subs({"eps": 0}).is_constant():  # det M of a Kahan map is 1 at eps = 0, at every point
-                self.check(f"{says}, as eps -> 0", f"put(det(M{letter}), [{eps}], [0*{eps}]) != 0")
+                self.check(f"{statement}, as eps -> 0", f"put(det(M{letter}), [{eps}], [0*{eps}]) != 0")
                 self.check(f"point {source} is defined as eps -> 0", f"put(product({Q}), [{eps}], [0*{eps}]) != 0")
             else:
-                self.check(says, f"at(det(M{letter}), old, {P}, {Q}) != 0")
-        i, j = claim.says
-        self.lines.append(
-            f"{self.to.comment}So points {i} and {j} are equal: both are P{claim.value_of(i)}/Q{claim.value_of(j)}."
-        )
+                self.check(statement, f"at(det(M{letter}), old, {P}, {Q}) != 0")
+        i, j = claim.equal_points
+        common_value = f"P{claim.value_of(i)}/Q{claim.value_of(j)}"
+        self.lines.append(f"{self.language.comment}So points {i} and {j} are equal: both are {common_value}.")
 
     @prove.register
     def conserved(self, claim: ConservedFunction, label: str) -> None:
         k = claim.fraction.degree
         left, right = self.products(claim.fraction, label, "PQ", [k, k])
         self.check(f"{label}: Q is not 0", "Q != 0")
-        says = f"{label}: D^{k} P(N/D) = C P and D^{k} Q(N/D) = C Q with the same C, not 0"
-        self.check(says, f"{left} == {right} && {left} != 0")
+        statement = f"{label}: D^{k} P(N/D) = C P and D^{k} Q(N/D) = C Q with the same C, not 0"
+        self.check(statement, f"{left} == {right} && {left} != 0")
 
     @prove.register
     def darboux(self, claim: DarbouxPolynomial, label: str) -> None:
@@ -353,30 +352,30 @@ class _Script:
 
         The exponents of a product are written only once, so that all checks depend on the same exponents.
         """
-        for j, letter in enumerate(fraction.letters, 1):
-            self.polynomial(f"c{j}", letter)
+        for j, common_factor in enumerate(fraction.common_factors, 1):
+            self.polynomial(f"c{j}", common_factor)
         cofactors = []
         for name, product, power in zip(names, fraction.products, powers, strict=True):
-            parts = [name if product.is_single else f"{name}{i}" for i in range(1, len(product.factors) + 1)]
-            for part, factor in zip(parts, product.factors, strict=True):
+            factor_names = [name if product.is_single else f"{name}{i}" for i in range(1, len(product.factors) + 1)]
+            for factor_name, factor in zip(factor_names, product.factors, strict=True):
                 monomial = factor.cofactor.text("D")
-                self.polynomial(part, factor.polynomial)
-                says = f"{label}: D^{factor.degree} {part}(N/D) = {monomial} {part}"
-                self.check(says, f"image({part}, {factor.degree}, old) == {monomial}*{part}")
-            content = f"({self.text(product.content)})" + " * one" * (self.to is PYTHON)
-            if product.is_single or not parts:
-                monomial = product.cofactor(power, len(fraction.letters)).text("D")
-                if parts and power >= product.degree:
+                self.polynomial(factor_name, factor.polynomial)
+                statement = f"{label}: D^{factor.degree} {factor_name}(N/D) = {monomial} {factor_name}"
+                self.check(statement, f"image({factor_name}, {factor.degree}, old) == {monomial}*{factor_name}")
+            content_text = f"({self.text(product.content)})" + " * one" * (self.language is PYTHON)
+            if product.is_single or not factor_names:
+                monomial = product.cofactor(power, len(fraction.common_factors)).text("D")
+                if factor_names and power >= product.degree:
                     monomial = f"D^{power - product.degree}*{product.factors[0].cofactor.text('D')}"
-                if not parts:
-                    self.define(name, content)
+                if not factor_names:
+                    self.define(name, content_text)
             else:
                 self.define(f"e{name}", f"[{', '.join(str(factor.exponent) for factor in product.factors)}]")
-                content = "" if product.content.is_one() else f"{content}*"
-                self.define(name, f"{content}monomial([{', '.join(parts)}], e{name})")
-                gains = [factor.cofactor.powers[0] - factor.degree for factor in product.factors]
-                rests = ", ".join(factor.cofactor.text("") for factor in product.factors)
-                monomial = f"D^({power} + total({gains}, e{name}))*monomial([{rests}], e{name})"
+                content_text = "" if product.content.is_one() else f"{content_text}*"
+                self.define(name, f"{content_text}monomial([{', '.join(factor_names)}], e{name})")
+                D_exponents = [factor.cofactor.powers[0] - factor.degree for factor in product.factors]
+                other_monomials = ", ".join(factor.cofactor.text("") for factor in product.factors)
+                monomial = f"D^({power} + total({D_exponents}, e{name}))*monomial([{other_monomials}], e{name})"
             cofactors.append(monomial)
         return cofactors
 
@@ -387,20 +386,22 @@ class _Script:
 
     @prove.register
     def volume(self, claim: InvariantVolume, label: str) -> None:
-        says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
+        statement = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
         if claim.fraction is None:
             self.fraction(claim)
             self.check("P is not 0", "P != 0")
             self.derivative(label)
             identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
-            self.check(f"{says} for any x and x~", identity)
+            self.check(f"{statement} for any x and x~", identity)
             return
-        k, shared = claim.fraction.degree, claim.balance[0].powers[0]
-        left, right = self.products(claim.fraction, label, "PQ", [k + self.data.dim + 1 - shared, k - shared])
+        k, common_power = claim.fraction.degree, claim.balance[0].powers[0]
+        left, right = self.products(
+            claim.fraction, label, "PQ", [k + self.data.dim + 1 - common_power, k - common_power]
+        )
         self.check("P and Q are not 0", "P != 0 && Q != 0")
         self.derivative(label)
         self.check("D = det M", "D == det(M)")
-        self.check(f"{says} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
+        self.check(f"{statement} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
 
     @prove.register
     def tensor(self, claim: InvariantTensor, label: str) -> None:
@@ -409,15 +410,15 @@ class _Script:
         self.polynomial("Q", claim.denominator)
         self.check(f"{label}: P is skew", "transposed(P) == scale(-1, P)")
         self.derivative(label)
-        says = f"{label}: L(x, x~) T(x) L^T = M T(x~) M^T"
-        one, other = "mul(mul({}, P), transposed({}))", "mul(mul(M, {}), transposed(M))"
+        statement = f"{label}: L(x, x~) T(x) L^T = M T(x~) M^T"
+        left_form, right_form = "mul(mul({}, P), transposed({}))", "mul(mul(M, {}), transposed(M))"
         if claim.is_free:
-            left, right = one.format("L", "L"), other.format("put(P, old, new)")
-            self.check(f"{says} for any x and x~", f"scale(put(Q, old, new), {left}) == scale(Q, {right})")
+            left, right = left_form.format("L", "L"), right_form.format("put(P, old, new)")
+            self.check(f"{statement} for any x and x~", f"scale(put(Q, old, new), {left}) == scale(Q, {right})")
         else:
             self.define("S", "images(L, 1, new)")
-            left, right = one.format("S", "S"), other.format(f"images(P, {k}, old)")
-            self.check(f"{says} at x~ = N/D", f"scale(image(Q, {k}, old), {left}) == scale(Q*D^2, {right})")
+            left, right = left_form.format("S", "S"), right_form.format(f"images(P, {k}, old)")
+            self.check(f"{statement} at x~ = N/D", f"scale(image(Q, {k}, old), {left}) == scale(Q*D^2, {right})")
         for i, j, l in claim.triples:
             terms = (f"bracket(P, Q, {i}, {j}, {l})", f"bracket(P, Q, {j}, {l}, {i})", f"bracket(P, Q, {l}, {i}, {j})")
             self.check(f"{label}: Jacobi identity {i + 1}, {j + 1}, {l + 1}", " + ".join(terms) + " == 0")
@@ -427,14 +428,14 @@ class _Script:
         self.fraction(claim)
         self.define("first", self.vector(claim.first))
         self.define("second", self.vector(claim.second))
-        after = "put({}, concat(old, new), concat(new, third))"
-        identity = f"{after.format('P')} - P == dot(first, E) + dot(second, {after.format('E')})"
+        next_value = "put({}, concat(old, new), concat(new, third))"
+        identity = f"{next_value.format('P')} - P == dot(first, E) + dot(second, {next_value.format('E')})"
         self.check(f"{label}: P(y, z) - P(x, y) = first . E(x, y) + second . E(y, z)", identity)
 
     @prove.register
     def changed(self, claim: ChangedFunction, label: str) -> None:
         self._affine(claim)
-        for name, polynomial in zip(("P", "Q", "p", "q"), (*claim.given, *claim.moved), strict=True):
+        for name, polynomial in zip(("P", "Q", "p", "q"), (*claim.old_function, *claim.new_function), strict=True):
             self.polynomial(name, polynomial)
         self.check(f"{label}: P(T z) q(z) = p(z) Q(T z)", "put(P, old, T)*q == p*put(Q, old, T)")
 
@@ -457,7 +458,7 @@ class _Script:
     @prove.register
     def entropy(self, claim: PositiveEntropy, label: str) -> None:
         """Append the forms F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
-        comment = self.to.comment
+        comment = self.language.comment
         n, x, y = len(claim.forms), *(self.letters[name] for name in self.data.variables)
         self.lines += [
             f"{comment}Assumed, a theorem on birational maps f of the plane (docs/mathematics.md): with D_n = deg f^n",
@@ -470,31 +471,32 @@ class _Script:
             self.define(f"F{k}", self.vector(forms))
             self.polynomial(f"c{k}", factor)
             degree = max(sum(e) - sum(e[2:-1]) for e in (list(map(int, m)) for m in forms[0].monoms()))
-            homogeneous = f"put(F{k}, point, scale(h, point)) == scale(h^{degree}, F{k})"
-            self.check(f"F{k} is homogeneous of degree {degree}", homogeneous)
+            identity = f"put(F{k}, point, scale(h, point)) == scale(h^{degree}, F{k})"
+            self.check(f"F{k} is homogeneous of degree {degree}", identity)
             if k == 1:
-                says, value = "c1 F1 = (N : D) at h = 1, not 0", "put(scale(c1, F1), [h], [h^0]) == concat(N, [D])"
+                statement = "c1 F1 = (N : D) at h = 1, not 0"
+                identity = "put(scale(c1, F1), [h], [h^0]) == concat(N, [D])"
             else:
-                says = f"F1(F{k - 1}) = c{k} F{k}, not 0"
-                value = f"put(F1, point, F{k - 1}) == scale(c{k}, F{k})"
-            self.check(says, f"c{k} != 0 && {value}")
+                statement = f"F1(F{k - 1}) = c{k} F{k}, not 0"
+                identity = f"put(F1, point, F{k - 1}) == scale(c{k}, F{k})"
+            self.check(statement, f"c{k} != 0 && {identity}")
         self.define("G", "put(B, point, F1)")
-        third = "G[3]" if self.to is GP else "G[2]"
-        self.check("f is birational: B(F1) = point", f"{third} != 0 && scale(h, G) == scale({third}, point)")
+        G_3 = "G[3]" if self.language is GP else "G[2]"
+        self.check("f is birational: B(F1) = point", f"{G_3} != 0 && scale(h, G) == scale({G_3}, point)")
         self.check("the modulus is prime", f"isprime({PRIME})")
         start, slope = ([a for a, _ in LINE], [b for _, b in LINE])
-        says = f"the image of a line under {2 * n} steps modulo a prime has degree {claim.line_degree}"
-        line = f"line_degree(F1, {2 * n}, {PRIME}, {EPS}, {start}, {slope})"
-        self.check(says, f"{line} == {claim.line_degree}")
+        statement = f"the image of a line under {2 * n} steps modulo a prime has degree {claim.line_degree}"
+        line_degree = f"line_degree(F1, {2 * n}, {PRIME}, {EPS}, {start}, {slope})"
+        self.check(statement, f"{line_degree} == {claim.line_degree}")
         self.define("low", self.number(claim.lower))
         bound = self.number(Fraction(claim.line_degree - 1, claim.degree - 1))
-        says = f"the dynamical degree is more than {claim.lower} > 1"
-        self.check(says, f"low > 1 && low^{n} + 1/low^{n} + 2 < {bound}")
+        statement = f"the dynamical degree is more than {claim.lower} > 1"
+        self.check(statement, f"low > 1 && low^{n} + 1/low^{n} + 2 < {bound}")
 
     def number(self, value: Fraction) -> str:
         """Return the text of a rational number."""
         text = f"{value.numerator}, {value.denominator}"
-        return text.replace(", ", "/") if self.to is GP else f"QQ({text})"
+        return text.replace(", ", "/") if self.language is GP else f"QQ({text})"
 
     def fraction(self, claim: InvariantVolume | OrbitIntegral) -> None:
         """Append the numerator P and the denominator Q."""
@@ -503,28 +505,30 @@ class _Script:
         self.check("Q is not 0", "Q != 0")
 
 
-def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+def script_certificate(language: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
     """Write a script that expands the identities of the claims and compares their two sides.
 
     Args:
-        to: the language: GP, for `gp -q FILE`, or PYTHON, for SymPy.
+        language: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         claims: the statements to be checked.
         header: the lines of the comment at the beginning.
     """
     data = max((claim.data for claim in claims), key=lambda data: data.dim)
-    script = _Script(to, data)
+    script = _Script(language, data)
     has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
     for claim in claims:
         script.begin(claim, 2 + has_three_points)
         script.claim(claim)
-    used = set(re.findall(r"\w+", "\n".join(script.lines)))
-    used |= {other for name in used for other in _NEEDS.get(name, ())}
-    unused = set() if any(isinstance(claim, PositiveEntropy) for claim in claims) else {homogenizing(data.names)}
-    unused |= set() if has_three_points else {f"{name}2" for name in data.new}
-    names = [letter for name, letter in script.letters.items() if name not in unused]
-    top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
-    top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)
-    for name, text in to.tools.items():
-        if name in used:
-            top += ["", text, ""] if to is PYTHON else [text]
-    return "\n".join([*top, *script.lines, to.end]) + "\n"
+    used_names = set(re.findall(r"\w+", "\n".join(script.lines)))
+    used_names |= {tool for name in used_names for tool in _REQUIRED_TOOLS.get(name, ())}
+    has_entropy = any(isinstance(claim, PositiveEntropy) for claim in claims)
+    unused_letters = set() if has_entropy else {homogenizing(data.names)}
+    unused_letters |= set() if has_three_points else {f"{name}2" for name in data.new}
+    names = [letter for name, letter in script.letters.items() if name not in unused_letters]
+    lines = [f"{language.comment}{line}" for line in (*header, f"Check: {language.run}")]
+    start = language.start
+    lines.append(start.format(letters=", ".join(names), names=",".join(names)) if language is PYTHON else start)
+    for name, text in language.tools.items():
+        if name in used_names:
+            lines += ["", text, ""] if language is PYTHON else [text]
+    return "\n".join([*lines, *script.lines, language.end]) + "\n"

@@ -14,7 +14,7 @@ from typing import Any
 from kahanmaps.algebra.functions import DEFAULT_BUDGET, BudgetExceeded, FunctionField
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Witness
 from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
-from kahanmaps.checks.settings import OrbitRun, Settings, along
+from kahanmaps.checks.settings import OrbitRun, Settings, try_along_orbit
 
 METHOD = "expansion"
 # Above this dimension the budget never suffices for an expansion.
@@ -73,12 +73,12 @@ def certify(
         if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
     elif not control:
-        expanded = try_expand(identity, decision, settings.seed)
-        verdict, evidence, witness = expanded.verdict, expanded.evidence, expanded.witness
+        expanded_decision = try_expand(identity, decision, settings.seed)
+        verdict, evidence, witness = expanded_decision.verdict, expanded_decision.evidence, expanded_decision.witness
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
-        orbit_evidence, orbit_witness = along(identity, orbit)
+        orbit_evidence, orbit_witness = try_along_orbit(identity, orbit)
         also.append(orbit_evidence)
         if orbit_witness is not None and verdict is not Certainty.REFUTED:
             if verdict is Certainty.PROVED:
@@ -129,12 +129,12 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
             raise NotEqual("the two sides, expanded, are different rational functions")
     except BudgetExceeded:
         return None
-    scope = " of x, multiplied out"
+    scope_text = " of x, multiplied out"
     if identity.has_eps:
-        scope = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
+        scope_text = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
     return Evidence(
         METHOD,
-        f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope}",
+        f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope_text}",
         {"products_of_terms": budget - field.budget, "eps": "every" if identity.eps is None else str(identity.eps)},
     )
 
@@ -144,7 +144,7 @@ def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | 
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:
-        expanded = expansion(identity, budget)
+        expansion_evidence = expansion(identity, budget)
     except NotEqual as error:
         return fails_over_Q(identity, seed) or Decision(Certainty.REFUTED, Evidence(METHOD, str(error)))
-    return decision if expanded is None else Decision(Certainty.PROVED, expanded)
+    return decision if expansion_evidence is None else Decision(Certainty.PROVED, expansion_evidence)

@@ -66,9 +66,9 @@ class Witness(ResultPart):
     @property
     def text(self) -> str:
         """The point and the values of the two sides."""
-        at = "" if self.eps is None else f", eps = {self.eps}"
+        eps_text = "" if self.eps is None else f", eps = {self.eps}"
         sides = f"{self.left_label} = {', '.join(self.left)}, {self.right_label} = {', '.join(self.right)}"
-        return f"x = ({', '.join(self.point)}){at}: {sides}"
+        return f"x = ({', '.join(self.point)}){eps_text}: {sides}"
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -109,7 +109,7 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
         return not self.control or self.verdict is Certainty.REFUTED
 
     def to_json(self) -> dict[str, Any]:
-        plain: dict[str, Any] = {
+        data: dict[str, Any] = {
             **self.place,
             "claim": self.claim,
             "verdict": str(self.verdict),
@@ -117,17 +117,17 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
             "witness": self.witness.to_json() if self.witness else None,
         }
         if self.also:
-            plain["further_evidence"] = [evidence.to_json() for evidence in self.also]
+            data["further_evidence"] = [evidence.to_json() for evidence in self.also]
         if self.formula:
-            plain["formula"] = self.formula
+            data["formula"] = self.formula
         if self.source:
-            plain["source"] = self.source
+            data["source"] = self.source
         if not self.applies:
-            plain["applies"] = False
+            data["applies"] = False
         if self.control:
-            plain["control"] = True
-            plain["expected"] = str(Certainty.REFUTED)
-        return plain
+            data["control"] = True
+            data["expected"] = str(Certainty.REFUTED)
+        return data
 
 
 @dataclass(frozen=True)
@@ -186,8 +186,8 @@ def combined(verdicts: Iterable[Certainty]) -> Certainty:
     >>> combined([Certainty.PROVED, Certainty.SUPPORTED])
     <Certainty.SUPPORTED: 'supported'>
     """
-    distinct = set(verdicts)
+    distinct_verdicts = set(verdicts)
     for verdict in (Certainty.REFUTED, Certainty.UNDECIDED, Certainty.SUPPORTED, Certainty.PROVED):
-        if verdict in distinct:
+        if verdict in distinct_verdicts:
             return verdict
     return Certainty.UNDECIDED

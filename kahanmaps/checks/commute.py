@@ -14,7 +14,7 @@ from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.settings import Settings, run_orbit
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
@@ -26,8 +26,8 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 SOURCE = "petrera-suris-2016, Theorem 9"
 SAME_STEP = fmpq(1)
 # The number of pairs of maps tried along an orbit and at random points as well; the proof covers all pairs.
-_PAIRS_TRIED = 30
-_PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one pair takes many seconds
+_MAX_TRIED_PAIRS = 30
+_MAX_TRIED_PAIRS_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one pair takes many seconds
 
 
 def commutativity(
@@ -41,24 +41,24 @@ def commutativity(
 
     A system stands for its Kahan map. The map of g is taken at eps times `ratio`, where eps belongs to the map of f.
     """
-    first_map, second_map = as_map(f), as_map(g)
+    f_map, g_map = as_map(f), as_map(g)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
         with field.working():
-            other_eps = eps_value if ratio == 1 else eps_value * field.convert(ratio)
-        phi_f, phi_g = first_map.at(eps_value, field), second_map.at(other_eps, field)
+            g_eps = eps_value if ratio == 1 else eps_value * field.convert(ratio)
+        phi_f, phi_g = f_map.at(eps_value, field), g_map.at(g_eps, field)
         return phi_g.step(phi_f.step(point)), phi_f.step(phi_g.step(point))
 
-    first, second = names
-    labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
-    subject = (first_map.subject, second_map.subject, *([] if ratio == 1 else [ratio]))
-    has_eps = first_map.has_eps or second_map.has_eps
-    scales = first_map.scales_with_eps and second_map.scales_with_eps
-    root = first_map.root or second_map.root
-    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, scales_with_eps=scales, root=root, subject=subject)
+    f_name, g_name = names
+    labels = (f"Phi_{g_name}(Phi_{f_name}(x))", f"Phi_{f_name}(Phi_{g_name}(x))")
+    subject = (f_map.subject, g_map.subject, *([] if ratio == 1 else [ratio]))
+    has_eps = f_map.has_eps or g_map.has_eps
+    is_scaled = f_map.scales_with_eps and g_map.scales_with_eps
+    root = f_map.root or g_map.root
+    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, scales_with_eps=is_scaled, root=root, subject=subject)
 
 
-def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
+def _require_not_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
     """Raise InputError if the map is the identity (as for f = 0), which commutes with every map.
 
     The equation x~ = x is tested at random points, with an error probability below 2^-100.
@@ -69,9 +69,9 @@ def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamil
 
     properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
     if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **properties), seed).verdict is Certainty.SUPPORTED:
-        at_eps = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
+        eps_text = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
-            f"found {file.labelled(letter)}, whose map is the identity{at_eps}, expected another: "
+            f"found {file.labelled(letter)}, whose map is the identity{eps_text}, expected another: "
             "the identity commutes with every map"
         )
 
@@ -111,11 +111,11 @@ def check_commute(
                 "only a file of kind [family] is compared with its own associated maps"
             )
         return _check_member(file, file.member, settings)
-    second = as_file(other)
+    other_file = as_file(other)
     f = file.map
-    g, note = matched(file, second)
+    g, note = match_variables(file, other_file)
     notes = [note] if note else []
-    is_same_order = set(f.variables) != set(second.variables) or f.variables == second.variables
+    is_same_order = set(f.variables) != set(other_file.variables) or f.variables == other_file.variables
     ratio, is_same_step = SAME_STEP, True
     if eps2 is not None:
         if settings.eps is None:
@@ -125,26 +125,26 @@ def check_commute(
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         ratio = eps2 / settings.eps
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
-        if second.is_quadratic and isinstance(g, KahanFamily):
+        if other_file.is_quadratic and isinstance(g, KahanFamily):
             # The Kahan map of g depends only on the product eps g.
             g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
         notes.append(f"{note}; the evidence below is stated for eps")
-    _require_another_than_identity(file, "f", f, settings.eps, settings.seed)
-    at_g = None if settings.eps is None else settings.eps * ratio
-    _require_another_than_identity(second, "g", g, at_g, settings.seed)
+    _require_not_identity(file, "f", f, settings.eps, settings.seed)
+    g_eps = None if settings.eps is None else settings.eps * ratio
+    _require_not_identity(other_file, "g", g, g_eps, settings.seed)
     proof = None
-    if is_same_step and is_same_order and file.member is not None and second.member is not None:
-        proof = theorems.commuting_by_involution_of_members(file.member, second.member)
-    if proof is None and file.is_quadratic and second.is_quadratic and isinstance(g, KahanFamily):
+    if is_same_step and is_same_order and file.member is not None and other_file.member is not None:
+        proof = theorems.commuting_by_involution_of_members(file.member, other_file.member)
+    if proof is None and file.is_quadratic and other_file.is_quadratic and isinstance(g, KahanFamily):
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
-    certified = settings.certified(file, commute=second)
-    kahan = "Kahan maps" if file.is_quadratic and second.is_quadratic else "maps"
+    certified = settings.certified(file, commute=other_file)
+    maps_text = "Kahan maps" if file.is_quadratic and other_file.is_quadratic else "maps"
     finding = certify(
-        f"the {kahan} of {file.labelled('f')} and {second.labelled('g')} commute",
+        f"the {maps_text} of {file.labelled('f')} and {other_file.labelled('g')} commute",
         identity,
         settings,
         proof,
@@ -153,26 +153,26 @@ def check_commute(
         source=SOURCE if proof is not None and "Theorem 9" in proof.summary else "",
         certified=certified,
     )
-    extra_context = {"eps2": format_number(eps2)} if eps2 is not None else {}
-    context = settings.context([file, second], orbit=orbit.to_json(), **extra_context)
+    eps2_context = {"eps2": format_number(eps2)} if eps2 is not None else {}
+    context = settings.context([file, other_file], orbit=orbit.to_json(), **eps2_context)
     return Report("commute", (finding,), context, notes, settings.cut_short(orbit), certified)
 
 
 def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) -> Report:
-    _require_another_than_identity(file, "f_0", file.map, settings.eps, settings.seed)
+    _require_not_identity(file, "f_0", file.map, settings.eps, settings.seed)
     count = len(member.factors)
     notes = []
     associates = theorems.listed_associates(member)
     if count > theorems.MAX_FACTORS:
         notes.append(f"chi has {count} factors: of the 2^{count - 1} associated maps those with at most one minus sign")
-    base = theorems.member_hypotheses(member)
-    verified = {}
+    member_hypotheses = theorems.member_hypotheses(member)
+    hypotheses_of = {}
     for k, associate in enumerate(associates):
         settings.progress(f"associated system {k + 1} of {len(associates)}")
-        verified[associate.label] = theorems.associated_hypotheses(member, associate)
+        hypotheses_of[associate.label] = theorems.associated_hypotheses(member, associate)
     orbit = run_orbit(associates[0].system, settings, (member.A, member.H), is_integrable=True)
 
-    def certified(
+    def certify_pair(
         claim: str,
         systems: tuple[QuadraticSystem, QuadraticSystem],
         names: tuple[str, str],
@@ -190,55 +190,58 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
 
     findings = []
     pairs = list(combinations(associates, 2))
-    tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
-    for k, (first, second) in enumerate(pairs):
-        if k < tried:
-            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {tried} along an orbit as well")
+    max_tried = _MAX_TRIED_PAIRS if member.dim <= 16 else _MAX_TRIED_PAIRS_IN_HIGH_DIMENSION
+    for k, (left, right) in enumerate(pairs):
+        if k < max_tried:
+            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {max_tried} along an orbit as well")
         proof = theorems.evidence(
-            "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
+            "Theorem 9 of Petrera and Suris",
+            [*member_hypotheses, *hypotheses_of[left.label], *hypotheses_of[right.label]],
         )
-        names = (f"f_{first.label}", f"f_{second.label}")
+        names = (f"f_{left.label}", f"f_{right.label}")
         claim = f"the Kahan maps of {names[0]} and {names[1]} commute"
-        findings.append(certified(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
-    if len(pairs) > tried:
-        notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
+        findings.append(certify_pair(claim, (left.system, right.system), names, proof, k < max_tried, source=SOURCE))
+    if len(pairs) > max_tried:
+        notes.append(
+            f"the first {max_tried} pairs were also tried along an orbit; the hypotheses were verified for all"
+        )
     if len(associates) == 1:
         # If chi is irreducible, f_0 and -f_0 are the only rational associated systems: a map and its inverse.
-        only, inverse = associates[0].system, associates[0].system.scaled(-1)
+        f_0, minus_f_0 = associates[0].system, associates[0].system.scaled(-1)
         findings.append(
-            certified(
+            certify_pair(
                 "the Kahan maps of f_0 and -f_0, its only rational associated system, commute "
                 "(they are inverse to each other)",
-                (only, inverse),
+                (f_0, minus_f_0),
                 ("f_0", "-f_0"),
-                theorems.commuting_by_splitting(only, inverse),
+                theorems.commuting_by_splitting(f_0, minus_f_0),
                 formula="Phi_f(., eps) o Phi_f(., -eps) = id",
                 source="petrera-suris-2016, eq. (eq: reversible)",
             )
         )
-    irrational = [f"({factor})" for factor in member.factors if factor.degree > 1]
-    if irrational:
+    irrational_factors = [f"({factor})" for factor in member.factors if factor.degree > 1]
+    if irrational_factors:
         proof = theorems.commuting_over_splitting_field(member)
         reason = Evidence(theorems.METHOD, "the hypotheses of the theorem do not all hold, which decides nothing")
         claim = (
-            f"over the splitting field of chi, where {', '.join(irrational)} splits, the Kahan maps of all "
+            f"over the splitting field of chi, where {', '.join(irrational_factors)} splits, the Kahan maps of all "
             f"associated systems commute pairwise"
         )
         verdict = Certainty.UNDECIDED if proof is None else Certainty.PROVED
         findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
     # The control: Phi_{H_0} and Phi_{H_1}. For m = 1 there is no H_1: the map at eps and the same map at 2 eps.
-    f, *others = (CubicHamiltonian(H, standard_structure(member.dim)).system for H in member.chain[:2])
+    f, *other_systems = (CubicHamiltonian(H, standard_structure(member.dim)).system for H in member.chain[:2])
     g, claim, names = f.scaled(2), "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
     if member.m > 1:
         claim = "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute"
-        g, names = others[0], ("H_0", "H_1")
+        g, names = other_systems[0], ("H_0", "H_1")
     source = "petrera-suris-2016, Introduction: in general these maps do not commute"
-    control = certified(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True, source=source)
+    control = certify_pair(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True, source=source)
     if not control.is_as_expected:
         notes.append(
             "the control was not refuted: these maps commute as well, so this member cannot show that the check "
             "is able to fail"
         )
     context = settings.context([file], orbit=orbit.to_json(), m=member.m, factors=[str(f) for f in member.factors])
-    of_all = settings.certified(file, commute="associates")
-    return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit), of_all)
+    certified_all = settings.certified(file, commute="associates")
+    return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit), certified_all)

@@ -37,41 +37,42 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
+Candidate = tuple[PhaseFunction, Evidence | None, str]  # an integral, its proof by a theorem, and the source
 # The largest number of integrals that are tried along an orbit as well.
-_TRIED = 32
-_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
+_MAX_TRIED = 32
+_MAX_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
 
 
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """Return I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
-    cached: list[Any] = []  # along an orbit, I(x~) at one point is I(x) at the next point
-    in_iterates = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
-    if in_iterates is not None:  # x is the middle one of the points in the identity
+    last_value: list[Any] = []  # along an orbit, I(x~) at one point is I(x) at the next point
+    iterate_function = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
+    if iterate_function is not None:  # x is the middle one of the points in the identity
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        if in_iterates is not None:
-            points = orbit_about(map_.at(eps_value, field), point, in_iterates.iterates + 1)
-            value_before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
-            return None if after is None or value_before is None else ([after], [value_before])
+        if iterate_function is not None:
+            points = orbit_about(map_.at(eps_value, field), point, iterate_function.iterates + 1)
+            value, image_value = (iterate_function.on(field, eps_value, points[k:]) for k in (0, 1))
+            return None if image_value is None or value is None else ([image_value], [value])
         image = map_.at(eps_value, field).step(point)
-        is_cached = cached and cached[0] is field and cached[1] == eps_value and cached[2] == point
-        value_before = cached[3] if is_cached else integral.value(field, eps_value, point)
-        after = integral.value(field, eps_value, image)
-        cached[:] = [field, eps_value, image, after]
-        return None if after is None or value_before is None else ([after], [value_before])
+        is_cached = last_value and last_value[0] is field and last_value[1] == eps_value and last_value[2] == point
+        value = last_value[3] if is_cached else integral.value(field, eps_value, point)
+        image_value = integral.value(field, eps_value, image)
+        last_value[:] = [field, eps_value, image, image_value]
+        return None if image_value is None or value is None else ([image_value], [value])
 
     subject = (map_.subject, integral.subject)
-    scales = map_.scales_with_eps and integral.scales_with_eps
+    is_scaled = map_.scales_with_eps and integral.scales_with_eps
     return Identity(
-        map_.dim, sides, eps, *labels, has_eps=map_.has_eps, scales_with_eps=scales, root=map_.root, subject=subject
+        map_.dim, sides, eps, *labels, has_eps=map_.has_eps, scales_with_eps=is_scaled, root=map_.root, subject=subject
     )
 
 
-def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
+def known_integrals(file: SystemFile) -> list[Candidate]:
     """Return the integrals that theorems give for the system, each with its proof and source."""
-    integrals: list[tuple[PhaseFunction, Evidence | None, str]] = []
+    integrals: list[Candidate] = []
     member = file.member
     if member is None:
         if file.hamiltonian is not None:
@@ -83,11 +84,11 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
     # The modified H, its multiple H~, K~_s for every rational associated system, and integrals from the commutant. If
     # chi has many factors, the K~_s with several minus signs are linear combinations of the listed ones.
     associates = theorems.listed_associates(member)
-    base = associates[0]
-    proof = theorems.shared_integral(member, base)
+    f_0 = associates[0]
+    proof = theorems.shared_integral(member, f_0)
     integrals += [
-        (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
-        (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
+        (ModifiedHamiltonian(f_0.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
+        (PaperIntegral(f_0.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
     ]
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
@@ -130,15 +131,15 @@ def functions_along(
                     "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
                 )
             functions += known_functions
-        elif text in (declared := {**file.integrals, **file.integrals_in_iterates}):
-            claims = {name or text: declared[text]}
+        elif text in (file_integrals := {**file.integrals, **file.integrals_in_iterates}):
+            claims = {name or text: file_integrals[text]}
         else:
-            short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
-            claims = {name or short: claimed_function(file, text)}
-        if in_floats and (in_iterates := [name for name, function in claims.items() if iterates_in(*function.names)]):
-            named = ", ".join(in_iterates)
+            short_text = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
+            claims = {name or short_text: claimed_function(file, text)}
+        if in_floats and (iterate_names := [name for name, function in claims.items() if iterates_in(*function.names)]):
+            names_text = ", ".join(iterate_names)
             raise InputError(
-                f"found {named} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
+                f"found {names_text} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
             )
         functions += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
     names = [*taken, *(function.name for function in functions)]
@@ -182,56 +183,54 @@ def check_integrals(
     """
     file = as_file(system)
     settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
-    claims, of_file = claimed_functions(file, extra), {**file.integrals, **file.integrals_in_iterates}
+    claims, file_integrals = claimed_functions(file, extra), {**file.integrals, **file.integrals_in_iterates}
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)
-        if known and of_file.get(name, function) != function:
+        if known and file_integrals.get(name, function) != function:
             raise InputError(f"found two integrals of the name {name}, expected different names")
 
-    def stated(functions: Mapping[str, RationalFunction]) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-        map_ = file.map
-        return [
-            (ClaimedIntegral(k, function, settings.eps, map_.root, map_), None, "") for k, function in functions.items()
-        ]
+    def without_proof(functions: Mapping[str, RationalFunction]) -> list[Candidate]:
+        integrals = (ClaimedIntegral(k, f, settings.eps, file.map.root, file.map) for k, f in functions.items())
+        return [(integral, None, "") for integral in integrals]
 
-    candidates = stated(claims)
+    candidates = without_proof(claims)
     if known or extra is None:
         candidates += known_integrals(file)
-        candidates += stated({name: declared for name, declared in of_file.items() if name not in claims})
+        candidates += without_proof({name: f for name, f in file_integrals.items() if name not in claims})
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
             "or give --integral 'NAME=EXPRESSION', in Python extra=\"EXPRESSION\""
         )
-    claimed = [integral.subject for integral, _, _ in candidates]
-    orbit = run_orbit(file.map, settings, claimed, file.member is not None)
+    claim_data = [integral.subject for integral, _, _ in candidates]
+    orbit = run_orbit(file.map, settings, claim_data, file.member is not None)
     findings = []
-    tried = _TRIED if file.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
+    max_tried = _MAX_TRIED if file.dim <= 16 else _MAX_TRIED_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
         details: dict[str, Any] = {"formula": integral.formula, "source": source}
         details["certified"] = _certified(file, integral, settings, claims)
         if _is_constant(integral, settings):
-            at_eps = "" if settings.eps is None else f" at eps = {settings.eps}"
+            eps_text = "" if settings.eps is None else f" at eps = {settings.eps}"
             reason = Evidence(
-                "constant", f"it is a constant{at_eps}: every map conserves constants, so this is no integral"
+                "constant", f"it is a constant{eps_text}: every map conserves constants, so this is no integral"
             )
             is_claimed = isinstance(integral, ClaimedIntegral)  # integrals from theorems do not count
             finding = Finding(claim, Certainty.UNDECIDED, reason, **details, applies=is_claimed)
-        elif proof is not None and k >= tried and file.dim > 16:
+        elif proof is not None and k >= max_tried and file.dim > 16:
             finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **details)
         else:
-            identity, is_tried = conservation(file.map, integral, settings.eps), k < tried or proof is None
+            identity, is_tried = conservation(file.map, integral, settings.eps), k < max_tried or proof is None
             finding = certify(claim, identity, settings, proof, orbit if is_tried else None, **details)
         findings.append(finding)
     notes = []
-    proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
-    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):
-        notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
+    proved_findings = [finding for finding in findings if finding.verdict is Certainty.PROVED]
+    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved_findings):
+        notes.append(f"of the proved integrals the first {max_tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
-    of_theorems = {"known": "integrals"} if known or extra is None else {}
-    certified = settings.certified(file, **of_theorems, **({"integrals": claims} if claims else {}))
+    known_argument = {"known": "integrals"} if known or extra is None else {}
+    certified = settings.certified(file, **known_argument, **({"integrals": claims} if claims else {}))
     return Report("integrals", tuple(findings), context, notes, settings.cut_short(orbit), certified)
 
 
@@ -245,8 +244,8 @@ def _certified(
         return settings.certified(file, claims=[integral.name])
     assert isinstance(integral, ImageFunction)
     if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # integral of an associated system
-        why = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
-        return {"why_not": f"{why}: type km.certificate(system, checker)"}
+        reason = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
+        return {"why_not": f"{reason}: type km.certificate(system, checker)"}
     power = integral.power if isinstance(integral, CommutantIntegral) else 0
     is_form = file.member is not None and not isinstance(integral, ModifiedHamiltonian)
     return settings.certified(file, claims=[f"H{power}" if is_form else "modified_hamiltonian"])
@@ -271,10 +270,10 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     field = random_prime_field(rng)
     try:
         eps = field.random(rng) if settings.eps is None else field.convert(settings.eps)
-        first, second = (integral.value(field, eps, tuple(field.random(rng) for _ in range(H.dim))) for _ in range(2))
+        a, b = (integral.value(field, eps, tuple(field.random(rng) for _ in range(H.dim))) for _ in range(2))
     except (BadPrime, SingularMatrix, SingularStep):
         return False
-    if not field.equal(first, second):
+    if not field.equal(a, b):
         return False
     functions = FunctionField([*H.system.variables, "eps"])
     *point, symbol = functions.variables

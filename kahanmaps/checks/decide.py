@@ -37,8 +37,8 @@ DEFAULT_ERROR_BITS = 100
 # By Rosser and Schoenfeld there are at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
 _MAX_UNDEFINED_POINTS = 200
-_WITNESS_TRIES = 400
-_HIGH_TRIES = 20  # further trials at points with long coordinates, where a nonzero function hardly ever vanishes
+_SMALL_POINT_COUNT = 400
+_HIGH_POINT_COUNT = 20  # further points with long coordinates, where a nonzero function hardly ever vanishes
 _HIGH_BITS = 62
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
@@ -77,10 +77,10 @@ class Identity:
 
         They are computed by evaluating the two sides with bounds instead of numbers.
         """
-        field, before = BoundField(), work.counted()
+        field, units_before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        work.count_work(7 * (work.counted() - before))  # bounds take longer than numbers, for which work was counted
+        work.count_work(7 * (work.counted() - units_before))  # work was counted for numbers; bounds take longer
         # If the sides are not defined, there is no bound, and the identity cannot be supported.
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
@@ -131,14 +131,14 @@ class Identity:
                 while self.eps is None and eps == 0:
                     eps = field.random(rng)
                 sides = None if eps == 0 else self.at(field, point, eps)  # eps = 0 if the prime divides it
-            if sides is None or _equal(field, sides):
+            if sides is None or _sides_agree(field, sides):
                 yield Trial(None if sides is None else field.prime)
                 continue
             decision = fails_over_Q(self, seed)
             if decision is None:  # no rational witness was found; the witness modulo p also refutes the identity
                 summary = (
                     f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
-                    f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
+                    f"none of {_SMALL_POINT_COUNT + _HIGH_POINT_COUNT} rational points shows it"
                 )
                 proof = Evidence("point over GF(p)", summary, {"prime": str(field.prime)})
                 decision = Decision(Certainty.REFUTED, proof, witness_of(self, field, point, eps, sides))
@@ -198,46 +198,46 @@ class Decidable(Protocol):
 
 def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
     """Test a statement at random points over GF(p): supported (error below 2^-error_bits), refuted or undecided."""
-    equation, pole_degree = statement.bound
-    per_trial = log2_error(equation, pole_degree, statement.conjugates)
-    is_bounded = not math.isinf(equation.bits)
-    if is_bounded and per_trial >= -1:
-        text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
-        return _undecided(text, points=0, degree_bound=equation.degree)
-    needed = max(1, math.ceil(error_bits / -per_trial)) if is_bounded else 1
-    undefined = 0
+    size, pole_degree = statement.bound
+    log2_trial_error = log2_error(size, pole_degree, statement.conjugates)
+    is_bounded = not math.isinf(size.bits)
+    if is_bounded and log2_trial_error >= -1:
+        text = f"the degree bound {size.degree} is too large for primes of 63 bits to decide anything"
+        return _undecided(text, points=0, degree_bound=size.degree)
+    point_count = max(1, math.ceil(error_bits / -log2_trial_error)) if is_bounded else 1
+    undefined_count = 0
     primes: list[int] = []
     for trial in statement.trials(seed):
         if trial.decision is not None:
             return trial.decision
         if trial.prime is not None:
             primes.append(trial.prime)
-            if len(primes) == needed:
+            if len(primes) == point_count:
                 break
             continue
-        undefined += 1
-        if undefined > statement.max_failures:
-            text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
-            return _undecided(f"{text}: {statement.undefined_reason}", poles_met=undefined)
+        undefined_count += 1
+        if undefined_count > statement.max_failures:
+            text = f"the {statement.name} is not defined at any of {undefined_count} random points over GF(p)"
+            return _undecided(f"{text}: {statement.undefined_reason}", poles_met=undefined_count)
     else:
         return _undecided("no prime was found at which chi splits into distinct factors", points=0)
     if not is_bounded:
         return _undecided("held at a random point, which says nothing: the two sides have no values over bounds")
-    bound = math.floor(-per_trial * needed)
+    error_bits_bound = math.floor(-log2_trial_error * point_count)
     return Decision(
         Certainty.SUPPORTED,
         Evidence(
             METHOD,
-            f"held at {counted(needed, 'random point')} over GF(p), p random of 63 bits{statement.where}; "
-            f"false with probability below 2^-{bound}",
+            f"held at {counted(point_count, 'random point')} over GF(p), p random of 63 bits{statement.where}; "
+            f"false with probability below 2^-{error_bits_bound}",
             {
-                "points": needed,
-                "error_bound": f"2^-{bound}",
-                "degree_bound": equation.degree,
-                "coefficient_bits_bound": math.ceil(equation.bits),
+                "points": point_count,
+                "error_bound": f"2^-{error_bits_bound}",
+                "degree_bound": size.degree,
+                "coefficient_bits_bound": math.ceil(size.bits),
                 "pole_degree_bound": pole_degree,
                 "primes": [str(prime) for prime in primes],
-                **statement.data(undefined),
+                **statement.data(undefined_count),
             },
         ),
     )
@@ -247,21 +247,21 @@ def _undecided(text: str, **data: Any) -> Decision:
     return Decision(Certainty.UNDECIDED, Evidence(METHOD, text, data))
 
 
-def log2_error(equation: CoefficientSize, pole_degree: int, conjugates: int = 1) -> float:
+def log2_error(size: CoefficientSize, pole_degree: int, conjugates: int = 1) -> float:
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
     at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many
     are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides the norm.
     """
-    if max(equation.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
+    if max(size.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
-    bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)
-    scale = 2.0**PRIME_BITS
+    bad_prime_probability = 2 ** (math.log2(max(1.0, conjugates * size.bits / PRIME_BITS)) - primes_log2)
+    min_prime = 2.0**PRIME_BITS
     # The factor 2 accounts for the condition that no denominator vanishes at the point. It holds with probability at
     # least 1/2: the denominators have degree below 2^60, and coefficients that fit into a computer's memory.
-    return math.log2(2 * (bad_primes + equation.degree / scale))
+    return math.log2(2 * (bad_prime_probability + size.degree / min_prime))
 
 
 def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:
@@ -277,16 +277,16 @@ def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, .
 def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
     """Refute an identity by a rational point, a small one if possible; return None if no point is found."""
     rng = random.Random(f"witness {identity.seed(seed)}")
-    points = small_points(identity.dim, rng, _WITNESS_TRIES)
-    points += [tuple(fmpq(rng.getrandbits(_HIGH_BITS)) for _ in range(identity.dim)) for _ in range(_HIGH_TRIES)]
-    ground = identity.ground
-    for k, candidate in enumerate(points):
-        at_eps = ground.convert(identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5))
-        point = tuple(ground.convert(entry) for entry in candidate)
-        sides = identity.at(ground, point, at_eps)
-        witness = witness_of(identity, ground, point, at_eps, sides) if sides is not None else None
+    points = small_points(identity.dim, rng, _SMALL_POINT_COUNT)
+    points += [tuple(fmpq(rng.getrandbits(_HIGH_BITS)) for _ in range(identity.dim)) for _ in range(_HIGH_POINT_COUNT)]
+    ground_field = identity.ground
+    for k, rational_point in enumerate(points):
+        eps = ground_field.convert(identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5))
+        point = tuple(ground_field.convert(entry) for entry in rational_point)
+        sides = identity.at(ground_field, point, eps)
+        witness = witness_of(identity, ground_field, point, eps, sides) if sides is not None else None
         if witness is not None:
-            height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
+            height = max(max(abs(int(entry.p)), int(entry.q)) for entry in rational_point)
             summary = f"fails at a rational point of height at most {height}, exactly"
             return Decision(Certainty.REFUTED, Evidence("exact rational point", summary, {}), witness)
     return None
@@ -295,7 +295,7 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
 def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:
     """Return the two sides at a point as a witness; None if the sides are equal."""
     left, right = sides
-    if _equal(field, sides):
+    if _sides_agree(field, sides):
         return None
     labels = (identity.left_label, identity.right_label)
     if identity.entries:
@@ -312,6 +312,6 @@ def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: An
     )
 
 
-def _equal(field: Field, sides: Sides) -> bool:
+def _sides_agree(field: Field, sides: Sides) -> bool:
     left, right = sides
     return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))

@@ -33,7 +33,7 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_NO_TENSOR = "the map seems to be defined nowhere, or the tensor or a denominator to vanish identically"
+_UNDEFINED_TENSOR = "the map seems to be defined nowhere, or the tensor or a denominator to vanish identically"
 
 
 def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
@@ -46,13 +46,13 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         map_at_eps = map_.at(eps_value, field)
         image = _image(map_at_eps, point)
-        density_after, density_before = density.value(field, eps_value, image), density.value(field, eps_value, point)
-        if density_after is None or density_before is None:
+        image_density, point_density = density.value(field, eps_value, image), density.value(field, eps_value, point)
+        if image_density is None or point_density is None:
             return None
         numerator, denominator = jacobian_determinant_fraction(map_at_eps, point, image)
         if field.is_zero(numerator) or field.is_zero(denominator):
             return None  # if the map has no inverse, both sides may be 0, which says nothing about a measure
-        return [density_after * denominator], [density_before * numerator]
+        return [image_density * denominator], [point_density * numerator]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     if not isinstance(map_, KahanFamily):
@@ -75,9 +75,9 @@ def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
     if not isinstance(map_at_eps, KahanMap) or (field is not QQ and not field.characteristic):
         return image  # other fields need no test: the equation was tested at points, and expanding it takes long
     factor = field.convert(2) * map_at_eps.eps
-    means = map_at_eps.local.polarised(point, image)
-    for x, after, mean in zip(point, image, means, strict=True):
-        if not field.equal(after - x, factor * mean):
+    polarized_values = map_at_eps.local.polarised(point, image)
+    for x, x_tilde, polarized_value in zip(point, image, polarized_values, strict=True):
+        if not field.equal(x_tilde - x, factor * polarized_value):
             raise Contradiction("the point computed for x~ does not satisfy the defining equation of the Kahan map")
     return image
 
@@ -138,8 +138,8 @@ def check_measure(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
             'or give --density EXPRESSION, in Python extra="EXPRESSION" (the measure is dx/phi)'
         )
-    claimed = [density.subject for density, *_ in candidates]
-    orbit = run_orbit(file.map, settings, claimed, file.member is not None)
+    claim_data = [density.subject for density, *_ in candidates]
+    orbit = run_orbit(file.map, settings, claim_data, file.member is not None)
     findings = tuple(
         certify(
             f"the measure dx/phi is invariant{f', {density.condition}' if density.condition else ''}",
@@ -154,8 +154,8 @@ def check_measure(
         for density, proof, source, certified in candidates
     )
     context = settings.context([file], orbit=orbit.to_json())
-    of_theorems = {"known": "measure"} if known or extra is None else {}
-    certified = settings.certified(file, **of_theorems, **({} if extra is None else {"density": phi}))
+    known_argument = {"known": "measure"} if known or extra is None else {}
+    certified = settings.certified(file, **known_argument, **({} if extra is None else {"density": phi}))
     return Report("measure", findings, context, (), settings.cut_short(orbit), certified)
 
 
@@ -165,8 +165,8 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
 
     def sides(field: Field, point_and_values: tuple[Any, ...], eps_value: Any) -> Sides | None:
         point, values = point_and_values[:n], point_and_values[n:]
-        local = map_.at(eps_value, field, values)
-        sides_at_point = transformation_sides(local, tensor, point, _image(local, point), values)
+        map_at_eps = map_.at(eps_value, field, values)
+        sides_at_point = transformation_sides(map_at_eps, tensor, point, _image(map_at_eps, point), values)
         return None if sides_at_point is None else (sides_at_point[0].entries(), sides_at_point[1].entries())
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
@@ -176,7 +176,9 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
     subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
     has_eps = map_.has_eps or tensor.has_eps
-    return Identity(dim, sides, eps, *labels, entries, has_eps=has_eps, undefined_reason=_NO_TENSOR, subject=subject)
+    return Identity(
+        dim, sides, eps, *labels, entries, has_eps=has_eps, undefined_reason=_UNDEFINED_TENSOR, subject=subject
+    )
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
@@ -193,7 +195,7 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     labels, dim = ("the cyclic sum", "what it should be"), n + len(tensor.symbols)
     subject = tensor.subject
     return Identity(
-        dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, undefined_reason=_NO_TENSOR, subject=subject
+        dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, undefined_reason=_UNDEFINED_TENSOR, subject=subject
     )
 
 

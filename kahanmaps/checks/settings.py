@@ -83,7 +83,7 @@ class Settings:
             return {"why_not": f"a certificate is about a map, for every eps: found a claim for eps = {self.eps}"}
         return {"system": system, **arguments}
 
-    def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
+    def context(self, files: Sequence[SystemFile], **details: Any) -> dict[str, Any]:
         """Return the data needed to reproduce the check, including the systems."""
         return {
             "version": __version__,
@@ -93,7 +93,7 @@ class Settings:
             "arithmetic": "exact",
             "seed": self.seed,
             "error_bits": self.error_bits,
-            **more,
+            **details,
             "document": files[0].document,
             **({"other_document": files[1].document} if len(files) > 1 else {}),
         }
@@ -134,15 +134,15 @@ def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
 def run_orbit(
     system: QuadraticSystem | MapFamily,
     settings: Settings,
-    subject: Sequence[Any] = (),
+    claim_data: Sequence[Any] = (),
     is_integrable: bool = False,
 ) -> OrbitRun:
     """Compute the exact orbit of the given initial point, or of random points until an orbit has no singular point.
 
-    A claim for every eps is tried at a random eps. Random choices depend on the system and on the claim (`subject`), so
+    A claim for every eps is tried at a random eps. Random choices depend on the system and on `claim_data`, so
     that no claim can be constructed for an orbit known in advance.
     """
-    seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, subject)
+    seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, claim_data)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
@@ -168,35 +168,35 @@ def run_orbit(
             return OrbitRun(orbit.start, tuple(points), eps, end)
 
 
-def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
+def try_along_orbit(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
-    tried = undefined = 0
+    tried_count = undefined_count = 0
     number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
-    ground = number_fields[0] if number_fields else identity.ground
-    for exact in run.points:
-        point, eps = tuple(map(ground.convert, exact)), ground.convert(run.eps)
-        sides = identity.at(ground, point, eps)
+    ground_field = number_fields[0] if number_fields else identity.ground
+    for orbit_point in run.points:
+        point, eps = tuple(map(ground_field.convert, orbit_point)), ground_field.convert(run.eps)
+        sides = identity.at(ground_field, point, eps)
         if sides is None:
-            undefined += 1
+            undefined_count += 1
             continue
-        tried += 1
-        witness = witness_of(identity, ground, point, eps, sides)
+        tried_count += 1
+        witness = witness_of(identity, ground_field, point, eps, sides)
         if witness is not None:
-            text = f"fails at step {tried + undefined - 1} of an exact orbit"
-            return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), witness
-    at_eps = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
-    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at_eps}"
-    if not tried:
-        text = f"could not be tried at any point of an orbit{at_eps}"
-    if undefined:
-        text += f", undefined at {undefined}"
+            text = f"fails at step {tried_count + undefined_count - 1} of an exact orbit"
+            return Evidence("exact orbit", text, _orbit_data(run, tried_count, undefined_count)), witness
+    eps_text = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
+    text = f"held exactly at {tried_count} point{'s' * (tried_count != 1)} of an orbit{eps_text}"
+    if not tried_count:
+        text = f"could not be tried at any point of an orbit{eps_text}"
+    if undefined_count:
+        text += f", undefined at {undefined_count}"
     if not run.end.is_complete:
         text += f" ({run.end.message})"
-    return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), None
+    return Evidence("exact orbit", text, _orbit_data(run, tried_count, undefined_count)), None
 
 
-def _orbit_data(run: OrbitRun, tried: int, undefined: int) -> Mapping[str, Any]:
-    return {"points": tried, "undefined_at": undefined, "eps": format_number(run.eps)}
+def _orbit_data(run: OrbitRun, tried_count: int, undefined_count: int) -> Mapping[str, Any]:
+    return {"points": tried_count, "undefined_at": undefined_count, "eps": format_number(run.eps)}
 
 
 # ---- claims as the user gives them: formulas as text or SymPy expressions -----------------------------------------
@@ -221,9 +221,9 @@ def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
     claim = getattr(claim, "function", claim) if isinstance(claim, ResultPart) else claim
     if isinstance(claim, RationalFunction):
         return claim
-    of_file, names = {**file.integrals, **file.integrals_in_iterates}, file.claim_names
-    if isinstance(claim, str) and claim in of_file and claim not in names:
-        return of_file[claim]
+    file_integrals, names = {**file.integrals, **file.integrals_in_iterates}, file.claim_names
+    if isinstance(claim, str) and claim in file_integrals and claim not in names:
+        return file_integrals[claim]
     return parse_with_iterates(formula_text(claim), names[: file.dim], names[file.dim :], file.parameters)
 
 
@@ -232,15 +232,18 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
-        unnamed = list(claims) if isinstance(claims, list | tuple | PrintableResult) else [claims]
-        of_file = {**file.integrals, **file.integrals_in_iterates}
-        free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
-        claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
+        unnamed_claims = list(claims) if isinstance(claims, list | tuple | PrintableResult) else [claims]
+        file_integrals = {**file.integrals, **file.integrals_in_iterates}
+        unused_names = (f"I{k}" for k in count(1) if f"I{k}" not in file_integrals)
+        claims = {
+            function if isinstance(function, str) and function in file_integrals else next(unused_names): function
+            for function in unnamed_claims
+        }
     if not claims:
         raise InputError(
             "found no integral, expected at least one, or None for the known integrals and those of the file"
         )
-    return {name: claimed_function(file, claim) for name, claim in claims.items()}
+    return {name: claimed_function(file, value) for name, value in claims.items()}
 
 
 def claimed_tensor(file: SystemFile, claim: Any) -> MatrixPoissonTensor | None:

@@ -62,12 +62,6 @@ class Check:
         return report
 
 
-def _tensor(file: SystemFile, path: str) -> Any:
-    from kahanmaps.invariants.poisson import MatrixPoissonTensor
-
-    return MatrixPoissonTensor.read(path, file.variables, file.parameters)
-
-
 _CHECKS = [
     Check(
         "commute",
@@ -89,11 +83,11 @@ _CHECKS = [
         they are expected NOT to commute, and this does not affect the exit status.
 
         SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
-        sets a parameter of both systems, or of the one that has it. The first system on the command line is called f,
-        the second g; one of them may be given by --rhs.
+        sets a parameter of both systems, or of the system that has it. The first system on the command line is called
+        f, the second g; one of them may be given by --rhs.
 
         --arithmetic float measures the size of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)) along a float orbit, and its order
-        in eps; the verdict and the exit status are those of the exact check beside it.
+        in eps; the verdict and the exit status are those of the exact check, which is run as well.
         """,
         "they commute",
         is_of_pair=True,
@@ -114,15 +108,16 @@ _CHECKS = [
         Without --eps the integrals are checked for every eps.
 
         A Hamiltonian system has a known integral, the modified H, and its multiple H~ = x^T J x~/eps for homogeneous H
-        and standard J; a member of the family has those of all rational associated systems. The section [integrals]
-        claims further ones. By default all of them are checked, with --integral only the given ones.
+        and standard J; a member of the family has the integrals of all rational associated systems. The section
+        [integrals] claims further integrals. By default all these integrals are checked, with --integral only the given
+        ones.
         """,
         "conserved",
         ClaimOption(
             "--integral",
             "[NAME=]EXPR",
             "An integral to check: a rational function of x, its images x~, x~~ and eps; the name of an integral of "
-            "the file; or the word 'known': all known and claimed ones.",
+            "the file; or the word 'known': all known and claimed integrals.",
             many=True,
         ),
     ),
@@ -145,7 +140,7 @@ _CHECKS = [
         "kahanmaps.checks.preserve:check_poisson",
         "Is J - eps^2 f'(x)^2 J, or a given tensor, invariant?",
         "Is Pi(x) = J - eps^2 f'(x)^2 J, or the tensor P of a file, a Poisson tensor that the map of SYSTEM preserves?",
-        ("paper_m3", "henon_heiles    # Hamiltonian, and it fails", "lotka_volterra --tensor p.toml"),
+        ("paper_m3", "henon_heiles    # Pi is not invariant here", "lotka_volterra --tensor p.toml"),
         """
         The transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are both checked. Without --eps they are
         checked for every eps. Without --tensor P is Pi, and the system has to be Hamiltonian.
@@ -155,7 +150,9 @@ _CHECKS = [
             "--tensor",
             "FILE",
             "A claimed tensor P: a section [poisson] with rows of functions, as find-poisson --toml prints it.",
-            _tensor,
+            lambda file, path: import_module("kahanmaps.invariants.poisson").MatrixPoissonTensor.read(
+                path, file.variables, file.parameters
+            ),
         ),
         for_batch="Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?",
     ),

@@ -30,18 +30,18 @@ MAX_FACTORS = 8
 
 def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
     """Return the evidence that a theorem applies; None unless every hypothesis holds."""
-    checked = list(dict.fromkeys(hypotheses))
-    if not all(holds for _, holds in checked):
+    distinct_hypotheses = list(dict.fromkeys(hypotheses))
+    if not all(is_true for _, is_true in distinct_hypotheses):
         return None
-    names = [name for name, _ in checked]
+    names = [name for name, _ in distinct_hypotheses]
     return Evidence(METHOD, f"{theorem} applies: {'; '.join(names)}", {"theorem": theorem, "hypotheses": names})
 
 
 def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
     """Return the verified conditions under which `associate` is an associated system of f_0 = J grad H."""
-    at_A = evaluate_at_matrix(fmpq_poly(list(associate.coefficients)), member.A)
+    polynomial_at_A = evaluate_at_matrix(fmpq_poly(list(associate.coefficients)), member.A)
     return [
-        (f"B_{associate.label} is a polynomial in A", bool(at_A == associate.B)),
+        (f"B_{associate.label} is a polynomial in A", bool(polynomial_at_A == associate.B)),
         (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == QQ.identity(member.dim))),
         (
             f"grad K_{associate.label} = B_{associate.label} grad H",
@@ -103,15 +103,15 @@ def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evid
 
 def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
     """Over the splitting field of chi, every choice of signs gives a B_s with B_s^2 = I (Chinese remainder theorem)."""
-    at_A = QQ.identity(member.dim)
+    chi_at_A = QQ.identity(member.dim)
     for factor in member.factors:
-        at_A = at_A * evaluate_at_matrix(factor.polynomial, member.A) ** factor.multiplicity
-    vanishes = not any(entry != 0 for entry in at_A.entries())
+        chi_at_A = chi_at_A * evaluate_at_matrix(factor.polynomial, member.A) ** factor.multiplicity
+    is_zero = not any(entry != 0 for entry in chi_at_A.entries())
     return evidence(
         "Theorem 9 of Petrera and Suris over the splitting field",
         [
             *member_hypotheses(member),
-            ("chi(A) = 0, so that B_s^2 = I for the Chinese remainders B_s of the signs", vanishes),
+            ("chi(A) = 0, so that B_s^2 = I for the Chinese remainders B_s of the signs", is_zero),
         ],
     )
 
@@ -191,7 +191,7 @@ def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
     if f.dim != g.dim:
         return None
     n = f.dim
-    F, G = _coefficients(f), _coefficients(g)
+    F, G = _coefficient_matrix(f), _coefficient_matrix(g)
     if rank(QQ, F) < n:
         identity: fmpq_mat = QQ.identity(n)
         return next((identity * fmpq(sign) for sign in (1, -1) if G == F * fmpq(sign)), None)
@@ -210,7 +210,7 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
     ]
 
 
-def _coefficients(system: QuadraticSystem) -> fmpq_mat:
+def _coefficient_matrix(system: QuadraticSystem) -> fmpq_mat:
     """Return the coefficients: a row for each component, a column for each monomial of degree at most 2."""
     n = system.dim
     rows = []

@@ -37,51 +37,51 @@ html_form.register(Certainty, markup.verdict)
 
 def verdict_html(finding: Finding) -> str:
     """Return the verdict of a finding; for a control it says whether the verdict is as expected."""
-    word = markup.verdict(finding.verdict)
+    verdict = markup.verdict(finding.verdict)
     if finding.place.get("misprint"):
-        return f"{word} as printed"
+        return f"{verdict} as printed"
     if finding.control:
-        return f"{word} (as expected)" if finding.is_as_expected else f"{word} (expected: refuted)"
-    return word if finding.applies else f"{word} (does not count here)"
+        return f"{verdict} (as expected)" if finding.is_as_expected else f"{verdict} (expected: refuted)"
+    return verdict if finding.applies else f"{verdict} (does not count here)"
 
 
 @html_form.register
 def finding_html(finding: Finding) -> str:
     """Return a claim with its verdict, evidence and witness."""
     rows = [("verdict", verdict_html(finding)), *evidence_rows(finding)]
-    return markup.titled(markup.shortened(finding.claim, _MAX_TEXT), markup.definitions(rows))
+    return markup.block(markup.abbreviate(finding.claim, _MAX_TEXT), markup.definitions(rows))
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
     """Return the details of a claim as pairs of a word and HTML: formula, evidence, witness, source."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
-        rows.append(("formula", f"<code>{_text(finding.formula, limits.formula)}</code>"))
+        rows.append(("formula", f"<code>{_escaped(finding.formula, limits.formula)}</code>"))
     rows.append(("because", because(finding.evidence, limits)))
-    rows += [("also", _text(evidence.summary, limits.text)) for evidence in finding.also[: limits.entries]]
+    rows += [("also", _escaped(evidence.summary, limits.text)) for evidence in finding.also[: limits.entries]]
     if len(finding.also) > limits.entries:
         rows.append(("also", f"… and {len(finding.also) - limits.entries} more"))
     if finding.witness is not None:
-        rows.append(("witness", _witness(finding.witness, limits)))
-    origin = {**{word: finding.place.get(word) for word in ("misprint", "violation")}, "source": finding.source}
-    return rows + [(word, _text(str(what), limits.text)) for word, what in origin.items() if what]
+        rows.append(("witness", _witness_html(finding.witness, limits)))
+    origin = {**{label: finding.place.get(label) for label in ("misprint", "violation")}, "source": finding.source}
+    return rows + [(label, _escaped(str(value), limits.text)) for label, value in origin.items() if value]
 
 
 def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
     """Return the evidence of a claim as a sentence, with the verified hypotheses."""
-    return _text(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
+    return _escaped(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
 def counts(findings: Iterable[Finding]) -> str:
     """Count the claims by verdict as text: 3 proved, 1 refuted."""
     findings = list(findings)
     verdicts = Counter(str(f.verdict) for f in findings if f.applies and not f.control)
-    parts = [f"{number} {verdict}" for verdict, number in verdicts.items()]
+    phrases = [f"{number} {verdict}" for verdict, number in verdicts.items()]
     controls = sum(f.control and not f.place.get("misprint") for f in findings)
     misprints = sum(bool(f.place.get("misprint")) for f in findings)
-    parts += [counted(controls, "control")] * bool(controls)
-    parts += [f"{counted(misprints, 'misprint')}, refuted as printed"] * bool(misprints)
-    return ", ".join(parts) or "no claims"
+    phrases += [counted(controls, "control")] * bool(controls)
+    phrases += [f"{counted(misprints, 'misprint')}, refuted as printed"] * bool(misprints)
+    return ", ".join(phrases) or "no claims"
 
 
 def eps_sentence(report: Report) -> str:
@@ -89,7 +89,7 @@ def eps_sentence(report: Report) -> str:
     context = report.context
     if "eps" not in context:
         return ""
-    second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
+    second = f", second map at eps2 = {markup.abbreviate(context['eps2'])}" if "eps2" in context else ""
     return markup.eps_phrase(context) + second
 
 
@@ -109,24 +109,24 @@ def systems_sentence(report: Report) -> str:
 def report_html(report: Report) -> str:
     """Return the findings of a check as a table; for many claims, counts by section and the unproved claims only."""
     title = f"{report.check}: {systems_sentence(report)}"
-    pieces = [f"<p>{markup.verdict(report.verdict)} ({_text(counts(report.findings))})</p>"]
-    chosen = list(report.findings)
-    if len(chosen) > _MAX_CLAIMS:
+    pieces = [f"<p>{markup.verdict(report.verdict)} ({_escaped(counts(report.findings))})</p>"]
+    shown_findings = list(report.findings)
+    if len(shown_findings) > _MAX_CLAIMS:
         sections = sections_of(report.findings).items()
-        rows = [(_text(title or "claims"), _text(counts(findings))) for title, findings in sections]
+        rows = [(_escaped(title or "claims"), _escaped(counts(findings))) for title, findings in sections]
         pieces.append(markup.table(["section", "claims"], rows))
-        chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
-    if chosen:
+        shown_findings = [f for f in shown_findings if str(f.verdict) != "proved" and not f.control and f.applies]
+    if shown_findings:
         cells = [
-            (verdict_html(f), _text(f.claim), because(f.evidence) if f.witness is None else _witness(f.witness))
-            for f in chosen[:_MAX_CLAIMS]
+            (verdict_html(f), _escaped(f.claim), because(f.evidence) if f.witness is None else _witness_html(f.witness))
+            for f in shown_findings[:_MAX_CLAIMS]
         ]
         pieces.append(markup.table(["verdict", "claim", "because"], cells))
-    if len(chosen) > _MAX_CLAIMS:
-        pieces.append(f"<p>… and {len(chosen) - _MAX_CLAIMS} more claims</p>")
+    if len(shown_findings) > _MAX_CLAIMS:
+        pieces.append(f"<p>… and {len(shown_findings) - _MAX_CLAIMS} more claims</p>")
     notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]
-    pieces += [f"<p>{_text(note)}</p>" for note in notes]
-    return markup.titled(markup.shortened(title, 200), "\n".join(pieces), eps_sentence(report))
+    pieces += [f"<p>{_escaped(note)}</p>" for note in notes]
+    return markup.block(markup.abbreviate(title, 200), "\n".join(pieces), eps_sentence(report))
 
 
 def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
@@ -139,15 +139,15 @@ def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
     return by_section
 
 
-def _witness(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
+def _witness_html(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
     lines = witness_lines(witness, limits.number)
     if (more := len(witness.vectors) - limits.entries) > 0:
         lines[limits.entries + 1 : -2] = [f"… and {more} more vectors"]
-    return "<br/>".join(_text(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
+    return "<br/>".join(_escaped(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
 
 
-def _text(text: str, width: int = _MAX_TEXT) -> str:
-    return markup.escape(markup.shortened(text, width))
+def _escaped(text: str, width: int = _MAX_TEXT) -> str:
+    return markup.escape(markup.abbreviate(text, width))
 
 
 # -- as text
@@ -207,12 +207,12 @@ def summary(evidence: Evidence, printed: set[str] | None = None) -> str:
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary
-    new = [text for text in hypotheses if text not in (printed or ())]
+    new_hypotheses = [text for text in hypotheses if text not in (printed or ())]
     if printed is not None:
-        printed.update(new)
-    repeated = len(hypotheses) - len(new)
+        printed.update(new_hypotheses)
+    repeated = len(hypotheses) - len(new_hypotheses)
     earlier = f"{repeated} hypotheses as above" if repeated > 1 else "1 hypothesis as above" if repeated else ""
-    return f"{evidence.data['theorem']} applies: {'; '.join(new + [earlier] * bool(earlier))}"
+    return f"{evidence.data['theorem']} applies: {'; '.join(new_hypotheses + [earlier] * bool(earlier))}"
 
 
 def witness_lines(witness: Witness, width: int | None) -> list[str]:

@@ -7,7 +7,7 @@ from kahanmaps.display_protocols import html_form
 from kahanmaps.experiments.results.store import Store, StoreError
 from kahanmaps.experiments.results.summary import Summary
 
-_ROWS = 40
+_MAX_ROWS = 40
 
 
 @html_form.register
@@ -16,21 +16,21 @@ def store_html(store: Store) -> str:
     try:
         status = store.status()
     except StoreError as error:  # the store is closed
-        return markup.titled("database of results", f"<p>{markup.escape(error)}</p>")
+        return markup.block("database of results", f"<p>{markup.escape(error)}</p>")
     rows = [
         (
-            markup.escape(markup.shortened(entry.name)),
-            str(entry.tasks),
-            str(entry.missing),
-            "<br/>".join(f"{count} {markup.escape(word)}" for word, count in sorted(entry.outcomes.items())),
-            "<br/>".join(f"{count} {markup.verdict(word)}" for word, count in sorted(entry.verdicts.items())),
+            markup.escape(markup.abbreviate(experiment.name)),
+            str(experiment.tasks),
+            str(experiment.missing),
+            "<br/>".join(f"{count} {markup.escape(word)}" for word, count in sorted(experiment.outcomes.items())),
+            "<br/>".join(f"{count} {markup.verdict(word)}" for word, count in sorted(experiment.verdicts.items())),
         )
-        for entry in status[:_ROWS]
+        for experiment in status[:_MAX_ROWS]
     ]
-    inside = markup.table(["experiment", "tasks", "missing", "outcomes", "verdicts"], rows)
-    if len(status) > _ROWS:
-        inside += f"\n<p>… and {len(status) - _ROWS} more experiments</p>"
-    return markup.titled("database of results", inside)
+    content = markup.table(["experiment", "tasks", "missing", "outcomes", "verdicts"], rows)
+    if len(status) > _MAX_ROWS:
+        content += f"\n<p>… and {len(status) - _MAX_ROWS} more experiments</p>"
+    return markup.block("database of results", content)
 
 
 @html_form.register
@@ -38,11 +38,11 @@ def summary_html(summary: Summary) -> str:
     """Return the tables of a summary as HTML."""
     pieces = []
     for table in summary.tables(6):
-        rows = [[markup.escape(cell) for cell in row] for row in table.rows[:_ROWS]]
+        rows = [[markup.escape(cell) for cell in row] for row in table.rows[:_MAX_ROWS]]
         pieces.append(markup.table(table.columns, rows, table.title))
         if more := len(table.rows) - len(rows):
             pieces.append(f"<p>… and {more} more rows</p>")
-    return markup.titled("summary", "\n".join(pieces))
+    return markup.block("summary", "\n".join(pieces))
 
 
 def summary_markdown(summary: Summary) -> str:

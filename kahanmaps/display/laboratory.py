@@ -39,9 +39,9 @@ from kahanmaps.maps.convention import eps_record, eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_ROWS = 60  # maximal number of rows of a table in a notebook
-_TEXT = 300
-_LENGTHS_SHOWN = 12
+_MAX_ROWS = 60  # maximal number of rows of a table in a notebook
+_MAX_TEXT = 300
+_MAX_LENGTHS = 12
 WORDS = (
     "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
     "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
@@ -104,22 +104,22 @@ def result_text(result: object) -> str:
 def result_html(result: Any, map_: MapFamily | None = None) -> str:
     """Return the lines of a result as a table; `map_` is needed if the result does not contain its map."""
 
-    def shown(cell: object) -> str:
+    def cell_html(cell: object) -> str:
         if isinstance(cell, HtmlCell):
             return cell.html()
         text = str(cell).strip().removeprefix("# ")
-        return markup.verdict(text) if text in markup.WORDS else _text(text)
+        return markup.verdict(text) if text in markup.WORDS else _html(text)
 
-    rows = [[shown(cell) for cell in line] for line in islice(lines_of(result), _ROWS + 1)]
-    more = "\n<p>… print shows all lines</p>" if len(rows) > _ROWS else ""
+    rows = [[cell_html(cell) for cell in line] for line in islice(lines_of(result), _MAX_ROWS + 1)]
+    more = "\n<p>… print shows all lines</p>" if len(rows) > _MAX_ROWS else ""
     title, subtitle = _TITLES[type(result)](result)
     if map_ is not None:
         subtitle = eps_sentence(result.eps, map_)
-    return markup.titled(title, (markup.folded(rows[:_ROWS]) if rows else "<p>none</p>") + more, subtitle)
+    return markup.block(title, (markup.folded_table(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + more, subtitle)
 
 
-def _text(text: str, width: int = _TEXT) -> str:
-    return markup.escape(markup.shortened(text, width))
+def _html(text: str, width: int = _MAX_TEXT) -> str:
+    return markup.escape(markup.abbreviate(text, width))
 
 
 # -- complete analyses
@@ -152,17 +152,17 @@ def analysis_text(analysis: Analysis) -> str:
 @html_form.register
 def analysis_html(analysis: Analysis) -> str:
     """Return the verdict, then the statements, as HTML."""
-    final = analysis.conclusion
+    conclusion = analysis.conclusion
     statements = [(title, line) for title, lines in analysis.sections for line in lines]
-    rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_ROWS]]
-    more = f"<p>… and {len(statements) - _ROWS} more statements</p>" if len(statements) > _ROWS else ""
-    inside = [
+    rows = [(_html(title), markup.verdict(line.status), _html(line.text)) for title, line in statements[:_MAX_ROWS]]
+    more = f"<p>… and {len(statements) - _MAX_ROWS} more statements</p>" if len(statements) > _MAX_ROWS else ""
+    pieces = [
         f"<p>{map_html(analysis.file.map)}</p>",
-        f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
-        markup.folded(rows, ["", "known how", ""]) + more,
+        f"<p><strong>{_html(conclusion.kind)}</strong>: {_html(conclusion.sentence, 800)}</p>",
+        markup.folded_table(rows, ["", "known how", ""]) + more,
     ]
     subtitle = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
-    return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), subtitle)
+    return markup.block(markup.abbreviate(analysis.file.name), "\n".join(pieces), subtitle)
 
 
 # -- preserved structures
@@ -183,12 +183,12 @@ def _densities(search: DensitySearch) -> Iterator[Line]:
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
     """List each tensor with its verdict and properties, then the reason why there are no more."""
-    named = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
-    return _formulas(named, (search.note, search.reason))
+    named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
+    return _formulas(named_results, (search.note, search.reason))
 
 
-def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> Iterator[Line]:
-    for name, result, properties in named:
+def _formulas(named_results: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> Iterator[Line]:
+    for name, result, properties in named_results:
         is_tensor = hasattr(result, "tensor")
         yield name, result.verdict, _brackets(result) if is_tensor else _formula(result.text, result.function, name)
         yield "", f"{properties}{result.evidence.summary}"
@@ -196,7 +196,7 @@ def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> It
 
 
 def _brackets(tensor: Any) -> HtmlCell:
-    brackets = islice(tensor.tensor.brackets.items(), _ROWS)
+    brackets = islice(tensor.tensor.brackets.items(), _MAX_ROWS)
     return HtmlCell(
         tensor.text, lambda: "<br/>".join(formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets)
     )
@@ -263,7 +263,7 @@ def _census(census: Census) -> Iterator[Line]:
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"
-    longest = list(census.lengths.items())[-_LENGTHS_SHOWN:]
+    longest = list(census.lengths.items())[-_MAX_LENGTHS:]
     if longest:
         label = "length x cycles" if census.complete else "length x points"
         more = "... " if len(census.lengths) > len(longest) else ""
@@ -302,9 +302,9 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 @lines_of.register
 def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
     """Yield one-parameter groups, a scaling, generators of the finite group, and the completed searches."""
-    for x in symmetries.infinitesimal:
-        kind = "linear" if x.is_linear else "affine"
-        yield "one-parameter group", f"{kind}, the flow of ({', '.join(x.rhs)})"
+    for generator in symmetries.infinitesimal:
+        kind = "linear" if generator.is_linear else "affine"
+        yield "one-parameter group", f"{kind}, the flow of ({', '.join(generator.rhs)})"
     if symmetries.scaling is not None:
         rhs = ", ".join(symmetries.scaling.rhs)
         yield "scaling", f"the flow of ({rhs}) by t takes the map at eps to that at e^-t eps"
@@ -315,8 +315,8 @@ def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
     for name, t in elements:
         yield name, f"{t.kind} {t.text}", *["trivial"] * t.is_trivial
     yield from (("searched", sentence) for sentence in symmetries.searched)
-    end = "complete: every search was completed"
-    yield (f"# {end if symmetries.complete else f'undecided: {symmetries.undecided[0]}'}",)
+    ending = "complete: every search was completed"
+    yield (f"# {ending if symmetries.complete else f'undecided: {symmetries.undecided[0]}'}",)
 
 
 @lines_of.register
@@ -326,10 +326,10 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
         yield "proved", "f = 0 and its map is x -> x: every g commutes"
-    listed: list[QuadraticSystem] = []
+    shown_systems: list[QuadraticSystem] = []
     for g in systems.nontrivial:
-        if g.system.scaled(-1) not in listed:
-            listed.append(g.system)
+        if g.system.scaled(-1) not in shown_systems:
+            shown_systems.append(g.system)
             yield g.finding.verdict, "g and -g", _as_options(g, systems.root)
             yield "", g.finding.evidence.summary
     for family in systems.families:
@@ -337,8 +337,8 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
         base = "" if family.base.trivial == "0" else "base + "
         total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
         yield family.finding.verdict, "family", f"g = {base}{total} for all {', '.join(letters)}"
-        named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
-        yield from (("", name, _as_options(g, systems.root)) for name, g in named)
+        pairs = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
+        yield from (("", name, _as_options(g, systems.root)) for name, g in pairs)
         yield "", family.finding.evidence.summary
     if systems.irrational:
         yield "note", f"more solutions, not rational: {'; '.join(systems.irrational)}"
@@ -349,7 +349,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
     if systems.every_g_commutes:
         yield ("# complete: every g commutes",)
     elif systems.complete:
-        has_others = bool(listed or systems.families or systems.irrational)
+        has_others = bool(shown_systems or systems.families or systems.irrational)
         exceptions = "these, 0, f and -f" if has_others else "0, f and -f"
         yield (f"# complete: among the {systems.kind_text} only {exceptions} commute with f",)
     else:
@@ -371,24 +371,24 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 # -- titles
 
 
-def _about(what: str, result: Any, *subtitle: str) -> tuple[str, str]:
+def _title(subject: str, result: Any, *subtitle: str) -> tuple[str, str]:
     """Return a title that contains the name of the system, and a subtitle that ends with eps."""
-    parts = (*subtitle, eps_sentence(result.eps, result.file.map))
-    return f"{what} of {markup.shortened(result.file.name)}", "; ".join(filter(None, parts))
+    phrases = (*subtitle, eps_sentence(result.eps, result.file.map))
+    return f"{subject} of {markup.abbreviate(result.file.name)}", "; ".join(filter(None, phrases))
 
 
 # Titles and subtitles of the results that are displayed as lines.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
-    IntegralSearch: lambda result: _about("integrals", result, f"{result.formula_count} found; {result.count_text}"),
-    DensitySearch: lambda result: _about("densities", result, "dx/phi is invariant"),
-    PoissonSearch: lambda result: _about("Poisson tensors", result),
-    DarbouxSearch: lambda result: _about("Darboux polynomials", result, f"by cofactor, up to degree {result.degree}"),
+    IntegralSearch: lambda result: _title("integrals", result, f"{result.formula_count} found; {result.count_text}"),
+    DensitySearch: lambda result: _title("densities", result, "dx/phi is invariant"),
+    PoissonSearch: lambda result: _title("Poisson tensors", result),
+    DarbouxSearch: lambda result: _title("Darboux polynomials", result, f"by cofactor, up to degree {result.degree}"),
     ConstantStructures: lambda result: (
         "Hamiltonian with a constant J" if result.hamiltonian else "not Hamiltonian with a constant J",
         "proved" if result.proved or result.hamiltonian else "undecided",
     ),
     DegreeGrowth: lambda result: ("degrees of the iterates", f"measured, {eps_sentence(result.eps)}"),
-    Scan: lambda result: _about("scan", result, f"over {', '.join(result.over)}"),
+    Scan: lambda result: _title("scan", result, f"over {', '.join(result.over)}"),
     HeightSurvey: lambda result: ("heights of exact orbits", "the time step is 2 eps" if result.has_eps else ""),
     Census: lambda result: (f"cycles on P^{result.dim} over GF({result.prime})", eps_sentence(result.eps)),
     SingularityRun: lambda result: (f"singularities: {result.text}", eps_sentence(result.eps)),

@@ -29,7 +29,7 @@ GREEK_NAMES = (
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
 )
-_WITH_INDEX = re.compile(r"([A-Za-z]+)([0-9]*)")
+_INDEXED_NAME = re.compile(r"([A-Za-z]+)([0-9]*)")
 _ESCAPES = {
     "\\": r"\textbackslash{}",
     "^": r"\textasciicircum{}",
@@ -50,10 +50,10 @@ def latex_name(name: str) -> str:
     """
     if not name or not name.isprintable():
         raise InputError(f"found the name {name[:40]!r}, expected printable text")
-    bare = name.rstrip("~")  # x~ is the image of x, x~~ the image of x~
-    if bare and bare != name:
+    name_without_tildes = name.rstrip("~")  # x~ is the image of x, x~~ the image of x~
+    if name_without_tildes and name_without_tildes != name:
         return r"\tilde{" + latex_name(name[:-1]) + "}"
-    match = _WITH_INDEX.fullmatch(name)
+    match = _INDEXED_NAME.fullmatch(name)
     if match is None:
         return r"\mathrm{" + "".join(_ESCAPES.get(mark, mark) for mark in name) + "}"
     letters, digits = match.groups()
@@ -105,40 +105,40 @@ def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
     x^9 + 9 x^8 + \cdots\ \text{(10 terms)}
     """
-    shown = first_terms(polynomial, characters)
-    if len(shown) == len(polynomial):
+    shown_terms = first_terms(polynomial, characters)
+    if len(shown_terms) == len(polynomial):
         return latex_polynomial(polynomial)
     terms = counted(len(polynomial), "term")
-    if len(shown) == 0:
+    if len(shown_terms) == 0:
         return rf"\text{{({terms}, not shown)}}"
-    return rf"{latex_polynomial(shown)} + \cdots\ \text{{({terms})}}"
+    return rf"{latex_polynomial(shown_terms)} + \cdots\ \text{{({terms})}}"
 
 
-def latex_matrix(entries: fmpq_mat, most: int = 8) -> str:
-    r"""Return a matrix over Q, or its size if it has more than `most` rows or columns, or long entries.
+def latex_matrix(entries: fmpq_mat, max_size: int = 8) -> str:
+    r"""Return a matrix over Q, or its size if it has more than `max_size` rows or columns, or long entries.
 
     >>> print(latex_matrix(fmpq_mat([[1, 0]])))
     \begin{pmatrix} 1 & 0 \end{pmatrix}
     """
     rows, columns = int(entries.nrows()), int(entries.ncols())
     bits = max((max(int(entry.p.bit_length()), int(entry.q.bit_length())) for entry in entries.entries()), default=0)
-    if max(rows, columns) > most or bits > 100:
+    if max(rows, columns) > max_size or bits > 100:
         return rf"\text{{a matrix with {rows} rows and {columns} columns}}"
     lines = r" \\ ".join(" & ".join(map(latex_number, row)) for row in entries.tolist())
     return rf"\begin{{pmatrix}} {lines} \end{{pmatrix}}"
 
 
-def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
-    r"""Return at most `most` aligned equations left = right, then dots; both sides are LaTeX.
+def latex_aligned(equations: Sequence[tuple[str, str]], max_rows: int = 12) -> str:
+    r"""Return at most `max_rows` aligned equations left = right, then dots; both sides are LaTeX.
 
     >>> print(latex_aligned([("x", "1"), ("y", "2")]))
     $\displaystyle \begin{aligned} x &= 1 \\ y &= 2 \end{aligned}$
     """
-    rows = [f"{left} &= {right}" for left, right in equations[:most]]
-    if len(equations) > most:
+    rows = [f"{left} &= {right}" for left, right in equations[:max_rows]]
+    if len(equations) > max_rows:
         rows.append(rf"&\ \vdots\ \text{{({len(equations)} equations)}}")
-    inside = r" \\ ".join(rows)
-    return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
+    lines = r" \\ ".join(rows)
+    return rf"$\displaystyle \begin{{aligned}} {lines} \end{{aligned}}$"
 
 
 def _braced(digits: str) -> str:
@@ -156,8 +156,8 @@ LATEX = Notation(
 
 
 # A formula with at most this number of characters as plain text fits on a phone, and is not broken.
-_ONE_PIECE = 32
-_FLAT = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
+_MAX_UNBROKEN = 32
+_ONE_LINE = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
 
 
 def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
@@ -174,12 +174,12 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
     is_negative, *sides = integer_fraction(function) if isinstance(function, RationalFunction) else (False, function)
     sides = sides if is_quotient else sides[:1]
     if characters is not None and any(len(first_terms(side, characters)) < len(side) for side in sides):
-        cut = [latex_cut(side, characters) for side in sides]
-        text, is_long = "-" * is_negative + (f"({cut[0]}) / ({cut[1]})" if is_quotient else cut[0]), True
+        texts = [latex_cut(side, characters) for side in sides]
+        text, is_long = "-" * is_negative + (f"({texts[0]}) / ({texts[1]})" if is_quotient else texts[0]), True
     else:
-        plain = PLAIN.rational(function) if isinstance(function, RationalFunction) else PLAIN.polynomial(function)
-        is_long = max(map(len, plain.split("/"))) > _ONE_PIECE if is_quotient else len(plain) > _ONE_PIECE
-        notation = _FLAT if is_long else LATEX
+        source = PLAIN.rational(function) if isinstance(function, RationalFunction) else PLAIN.polynomial(function)
+        is_long = max(map(len, source.split("/"))) > _MAX_UNBROKEN if is_quotient else len(source) > _MAX_UNBROKEN
+        notation = _ONE_LINE if is_long else LATEX
         text = notation.rational(function) if isinstance(function, RationalFunction) else notation.polynomial(function)
     if left:
         name = latex_name(left) if left == "'" or not left.endswith("'") else f"{latex_name(left[:-1])}'"
@@ -196,15 +196,15 @@ def typeset(latex: str, is_long: bool = True) -> str:
     <span class="formula">\(\frac{x + 1}{2}\) \({}- y = 0\)</span>
     """
     pieces, depth = [""], 0
-    flat = latex.replace(r"\left(", "(").replace(r"\right)", ")")
-    for word in flat.split(" ") if is_long else [flat]:
-        if word in ("+", "-") and depth == 0 and pieces[-1]:
-            pieces.append(f"{{}}{word}")  # the empty group makes the sign a binary operator, with spaces
+    one_line = latex.replace(r"\left(", "(").replace(r"\right)", ")")
+    for token in one_line.split(" ") if is_long else [one_line]:
+        if token in ("+", "-") and depth == 0 and pieces[-1]:
+            pieces.append(f"{{}}{token}")  # the empty group makes the sign a binary operator, with spaces
         else:
-            pieces[-1] += f" {word}" if pieces[-1] else word
-        depth += word.count("{") - word.count("}")
-    inside = " ".join(rf"\({escape(piece)}\)" for piece in pieces)
-    return f'<span class="formula">{inside}</span>'
+            pieces[-1] += f" {token}" if pieces[-1] else token
+        depth += token.count("{") - token.count("}")
+    spans = " ".join(rf"\({escape(piece)}\)" for piece in pieces)
+    return f'<span class="formula">{spans}</span>'
 
 
 def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: int | None = None) -> str:
@@ -213,7 +213,7 @@ def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: i
     return "<br/>\n".join(lines)
 
 
-def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
-    """Return a matrix over Q as HTML, or its size if it has more than `most` rows or columns, or long entries."""
-    text = latex_matrix(entries, most)
+def matrix(entries: fmpq_mat, left: str = "", max_size: int = 8) -> str:
+    """Return a matrix over Q as HTML, or its size if it has more than `max_size` rows or columns, or long entries."""
+    text = latex_matrix(entries, max_size)
     return typeset(f"{latex_name(left)} = {text}" if left else text, False)

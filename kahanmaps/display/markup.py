@@ -27,7 +27,7 @@ WORDS = {
 }
 _LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
 _OPEN_ROWS = 12
-_SHORTENED = 60  # maximal number of characters of a displayed number or name
+_MAX_LETTERS = 60  # maximal number of characters of a displayed number or name
 
 
 def escape(text: object) -> str:
@@ -47,8 +47,8 @@ def markdown(text: object) -> str:
     >>> markdown("<b>2*x*y|[a](b)</b>")
     '&lt;b>2\\\\*x\\\\*y\\\\|\\\\[a\\\\](b)&lt;/b>'
     """
-    marked = re.sub(r"[\\`*\[\]|]", r"\\\g<0>", " ".join(printable(str(text)).split()))
-    return marked.replace("&", "&amp;").replace("<", "&lt;")
+    escaped = re.sub(r"[\\`*\[\]|]", r"\\\g<0>", " ".join(printable(str(text)).split()))
+    return escaped.replace("&", "&amp;").replace("<", "&lt;")
 
 
 def code(text: object) -> str:
@@ -63,17 +63,17 @@ def code(text: object) -> str:
     return f"{fence}{margin}{line}{margin}{fence}"
 
 
-def shortened(text: object, width: int = _SHORTENED) -> str:
+def abbreviate(text: object, width: int = _MAX_LETTERS) -> str:
     """Shorten a text that is longer than `width` to its beginning, its end and its length, without escaping it.
 
-    >>> shortened("1" * 100, 20)
+    >>> abbreviate("1" * 100, 20)
     '11111111…11111111 (100 characters)'
     """
-    full = str(text)
-    if len(full) <= width:
-        return full
-    keep = max(4, (width - 4) // 2)
-    return f"{full[:keep]}…{full[-keep:]} ({len(full)} characters)"
+    whole_text = str(text)
+    if len(whole_text) <= width:
+        return whole_text
+    kept_length = max(4, (width - 4) // 2)
+    return f"{whole_text[:kept_length]}…{whole_text[-kept_length:]} ({len(whole_text)} characters)"
 
 
 def eps_phrase(record: Mapping[str, Any]) -> str:
@@ -82,12 +82,12 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
     >>> eps_phrase({"eps": "1/10", "time_step": "1/5"})
     'eps = 1/10 (time step 2 eps = 1/5)'
     """
-    step = record["time_step"] and shortened(record["time_step"])
-    return eps_record_suffix({**record, "eps": shortened(record["eps"]), "time_step": step}).removeprefix(", ")
+    step = record["time_step"] and abbreviate(record["time_step"])
+    return eps_record_suffix({**record, "eps": abbreviate(record["eps"]), "time_step": step}).removeprefix(", ")
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table; `head` and `caption` are text, cells are HTML. The last cell of a short row fills the row.
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
+    """Return a table; `headings` and `caption` are text, cells are HTML. The last cell of a short row fills the row.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
@@ -95,42 +95,42 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
     </tbody></table>
     """
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
-    names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in head)
+    names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in headings)
     names = f"<thead><tr>{names}</tr></thead>" if names else ""
     body = [list(row) for row in rows]
-    width = max(map(len, (head, *body)))
+    width = max(map(len, (headings, *body)))
     lines = []
     for *cells, last in body:
-        wide = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
+        colspan = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
         line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
-        lines.append(f"<tr>{line}<td{wide} {_LEFT}>{last}</td></tr>")
+        lines.append(f"<tr>{line}<td{colspan} {_LEFT}>{last}</td></tr>")
     return "\n".join([f"<table>{title}{names}<tbody>", *lines, "</tbody></table>"])
 
 
-def folded(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     """Return a table that shows the first 12 rows; a click on the number of further rows shows all.
 
-    >>> print(folded([["a"]]) == table((), [["a"]]), folded([["a"]] * 15).count("<summary>3 more lines</summary>"))
-    True 1
+    >>> folded_table([["a"]]) == table((), [["a"]]), "<summary>3 more lines</summary>" in folded_table([["a"]] * 15)
+    (True, True)
     """
-    first, others = rows[:_OPEN_ROWS], rows[_OPEN_ROWS:]
-    if not others:
+    open_rows, more_rows = rows[:_OPEN_ROWS], rows[_OPEN_ROWS:]
+    if not more_rows:
         return table(head, rows)
-    more = f"<details><summary>{counted(len(others), 'more line')}</summary>\n{table(head, others)}\n</details>"
-    return f"{table(head, first)}\n{more}"
+    more = f"<details><summary>{counted(len(more_rows), 'more line')}</summary>\n{table(head, more_rows)}\n</details>"
+    return f"{table(head, open_rows)}\n{more}"
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of two columns: a word (text) and its value (HTML)."""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
-        f"<td {_LEFT}>{what}</td></tr>"
-        for word, what in rows
+        f"<td {_LEFT}>{value}</td></tr>"
+        for word, value in rows
     ]
     return "\n".join(["<table><tbody>", *lines, "</tbody></table>"])
 
 
-def listed(entries: Iterable[str]) -> str:
+def bullet_list(entries: Iterable[str]) -> str:
     """Return an HTML list of entries, which are HTML."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
 
@@ -149,7 +149,7 @@ def verdict(word: object) -> str:
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 
 
-def titled(title: str, inside: str, more: str = "") -> str:
+def block(title: str, content: str, remark_text: str = "") -> str:
     """Return a block of HTML with a title and an optional remark, both text."""
-    remark = f" — {escape(more)}" if more else ""
-    return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{inside}\n</div>"
+    remark = f" — {escape(remark_text)}" if remark_text else ""
+    return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{content}\n</div>"

@@ -39,17 +39,17 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CHARACTERS = 300  # approximate limit for the length of one formula
-_TEXT = 200
-_EQUATIONS = 12
+_MAX_TEXT = 200
+_MAX_EQUATIONS, _MAX_LATEX_EQUATIONS = 12, 8
 
 
 @latex_form.register
 def system_latex(system: QuadraticSystem) -> str:
     """Return the equations x' = f(x)."""
     names = [rf"\dot{{{latex_name(name)}}}" for name in system.variables]
-    rows = [(x, latex_cut(f, CHARACTERS)) for x, f in zip(names, system.rhs[: _EQUATIONS + 1], strict=False)]
+    rows = [(x, latex_cut(f, CHARACTERS)) for x, f in zip(names, system.rhs[: _MAX_LATEX_EQUATIONS + 1], strict=False)]
     rows += [(x, "") for x in names[len(rows) :]]  # these rows are only counted
-    return latex_aligned(rows, _EQUATIONS)
+    return latex_aligned(rows, _MAX_LATEX_EQUATIONS)
 
 
 @latex_form.register
@@ -69,13 +69,15 @@ def map_html(map_: MapFamily) -> str:
     """Return the equations of the vector field of a Kahan map, or the equations of another map."""
     if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
-    return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
+    return "<br/>\n".join(markup.escape(markup.abbreviate(line, CHARACTERS)) for line in str(map_).split("\n"))
 
 
-def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:
-    """Return at most `most` equations as HTML, each cut after about `characters` characters."""
-    shown = equations(system.variables[:most], system.rhs[:most], characters)
-    return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
+def equations_html(
+    system: QuadraticSystem, characters: int | None = CHARACTERS, max_count: int = _MAX_EQUATIONS
+) -> str:
+    """Return at most `max_count` equations as HTML, each cut after about `characters` characters."""
+    text = equations(system.variables[:max_count], system.rhs[:max_count], characters)
+    return text if system.dim <= max_count else f"{text}<br/>\n… ({system.dim} equations)"
 
 
 @html_form.register
@@ -83,20 +85,20 @@ def file_html(file: SystemFile) -> str:
     """Return the equations, parameters and claims of a system file."""
     rows = [("equations", map_html(file.map))]
     if file.parameters:
-        values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
+        values = (f"{name} = {markup.abbreviate(format_number(v))}" for name, v in list(file.parameters.items())[:20])
         rows.append(("parameters", markup.escape(", ".join(values))))
     if file.member is not None:
         rows.append(("member of the commuting family", matrix(file.member.A, "A")))
     if file.hamiltonian is not None:
         rows.append(("Hamiltonian", formula(file.hamiltonian.H, "H", CHARACTERS)))
     rows += [
-        (f"integral {markup.shortened(name)}".strip(), formula(function, characters=CHARACTERS))
+        (f"integral {markup.abbreviate(name)}".strip(), formula(function, characters=CHARACTERS))
         for name, function in [*file.integrals.items(), *file.integrals_in_iterates.items()][:10]
     ]
     if file.density is not None:
         rows.append(("density (claimed)", formula(file.density, "phi", CHARACTERS)))
     title = file.catalog.get("title", "")
-    return markup.titled(markup.shortened(file.name), markup.definitions(rows), markup.shortened(str(title), 200))
+    return markup.block(markup.abbreviate(file.name), markup.definitions(rows), markup.abbreviate(str(title), 200))
 
 
 @html_form.register
@@ -108,18 +110,18 @@ def member_html(member: FamilyMember) -> str:
     rows = [
         ("A", matrix(member.A)),
         ("H", formula(member.H, characters=CHARACTERS)),
-        ("chi", markup.escape(markup.shortened(factors, _TEXT))),
+        ("chi", markup.escape(markup.abbreviate(factors, _MAX_TEXT))),
         ("signs", markup.escape(member.chosen.label)),
         ("associated systems over Q", str(2 ** (len(member.factors) - 1))),
     ]
-    return markup.titled(f"member of the commuting family, m = {member.m}", markup.definitions(rows))
+    return markup.block(f"member of the commuting family, m = {member.m}", markup.definitions(rows))
 
 
 @html_form.register
 def associated_html(system: AssociatedSystem) -> str:
     """Return B, K and the equations of an associated system."""
     powers = [
-        f"{markup.shortened(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
+        f"{markup.abbreviate(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
         for k, c in enumerate(system.coefficients[:12])
         if c != 0
     ]
@@ -128,24 +130,23 @@ def associated_html(system: AssociatedSystem) -> str:
         ("K", formula(system.K, characters=CHARACTERS)),
         ("equations", equations_html(system.system)),
     ]
-    return markup.titled(f"associated system {system.label}", markup.definitions(rows))
+    return markup.block(f"associated system {system.label}", markup.definitions(rows))
 
 
 @html_form.register
 def normal_form_html(form: NormalForm) -> str:
     """Return chi, h, D and the planes over Q of a normal form."""
     texts = {"chi(t)": form.chi_text, "h(X, Y)": form.h_text, "D(X, Y)": form.D_text}
-    rows = [(name, markup.escape(markup.shortened(text, _TEXT))) for name, text in texts.items()]
+    rows = [(name, markup.escape(markup.abbreviate(text, _MAX_TEXT))) for name, text in texts.items()]
     rows.append(("S", matrix(form.S)))
     rows += [
-        (f"plane at t = {markup.shortened(format_number(part.root), 20)}", formula(part.h, "h", CHARACTERS))
+        (f"plane at t = {markup.abbreviate(format_number(part.root), 20)}", formula(part.h, "h", CHARACTERS))
         for part in form.parts[:8]
     ]
     more = "x = S z, a planar system over K = Q[t]/chi"
-    return markup.titled(f"normal form, m = {form.m}", markup.definitions(rows), more)
+    return markup.block(f"normal form, m = {form.m}", markup.definitions(rows), more)
 
 
-_EQUATIONS = 8
 _COORDINATES = 8
 _POINTS = 6
 _MAX_DIGITS = 2_000  # longer numbers are not converted to text
@@ -156,27 +157,27 @@ def map_latex(kahan: KahanMap) -> str:
     """Return the equation that defines a Kahan map."""
     system, field = kahan.system, kahan.field
     rows = []
-    for name, f in zip(system.variables[:_EQUATIONS], system.rhs, strict=False):
+    for name, f in zip(system.variables[:_MAX_LATEX_EQUATIONS], system.rhs, strict=False):
         change = rf"{latex_name(name + '~')} - {latex_name(name)}"
-        rows.append((rf"\frac{{{change}}}{{2 \varepsilon}}", _polarised(f, system.variables)))
-    if system.dim > _EQUATIONS:
+        rows.append((rf"\frac{{{change}}}{{2 \varepsilon}}", _polarized_component(f, system.variables)))
+    if system.dim > _MAX_LATEX_EQUATIONS:
         rows.append((r"\vdots", rf"\text{{({system.dim} equations)}}"))
     with field.working():
-        eps, step = (markup.shortened(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
-    over_field = "" if str(field) == "QQ" else rf"\text{{ over {_plain(field)}}}"
+        eps, step = (markup.abbreviate(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
+    over_field = "" if str(field) == "QQ" else rf"\text{{ over {_tex(field)}}}"
     rows.append(
         (
             r"\varepsilon",
-            rf"\text{{{_plain(eps)}}},\quad \text{{time step }} 2 \varepsilon = \text{{{_plain(step)}}}{over_field}",
+            rf"\text{{{_tex(eps)}}},\quad \text{{time step }} 2 \varepsilon = \text{{{_tex(step)}}}{over_field}",
         )
     )
-    return latex_aligned(rows, _EQUATIONS + 2)
+    return latex_aligned(rows, _MAX_LATEX_EQUATIONS + 2)
 
 
 @latex_form.register
 def composition_latex(map_: Map) -> str:
     """Return a map other than Kahan's as text."""
-    return rf"$\text{{{_plain(map_)}}}$"
+    return rf"$\text{{{_tex(map_)}}}$"
 
 
 @latex_form.register
@@ -187,25 +188,25 @@ def birational_latex(map_: MapFamily) -> str:
     if isinstance(map_, ComposedMap) and not map_.is_small:
         return latex_aligned([(r"\widetilde{x}", rf"\text{{{len(map_.parts)} maps one after the other}}")])
     assert isinstance(map_, ImplicitMap | ComposedMap)
-    equations_shown = map_.equations[: _EQUATIONS + 1]
-    return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in equations_shown], _EQUATIONS)
+    equations_shown = map_.equations[: _MAX_LATEX_EQUATIONS + 1]
+    return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in equations_shown], _MAX_LATEX_EQUATIONS)
 
 
-def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
+def _polarized_component(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
     """Return the component Q(x, x~) + B (x + x~)/2 + c of the polarization, 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
     terms_shown = first_terms(polynomial, CHARACTERS // 2)
     context = ring((*variables, *(f"{name}~" for name in variables)))
     x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
-    middle = [(a + b) / 2 for a, b in zip(x, y, strict=True)]
-    at_middle, at_x, at_y = (terms_shown.compose(*point, ctx=context) for point in (middle, x, y))
+    midpoint = [(a + b) / 2 for a, b in zip(x, y, strict=True)]
+    at_midpoint, at_x, at_y = (terms_shown.compose(*point, ctx=context) for point in (midpoint, x, y))
     terms = counted(len(polynomial), "term")
     if not len(terms_shown) and len(polynomial):
         return rf"\text{{({terms}, not shown)}}"
     more = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
-    return latex_polynomial(2 * at_middle - (at_x + at_y) / 2) + more
+    return latex_polynomial(2 * at_midpoint - (at_x + at_y) / 2) + more
 
 
-def _plain(text: object) -> str:
+def _tex(text: object) -> str:
     return str(text).replace("_", r"\_")
 
 
@@ -215,11 +216,11 @@ def orbit_html(orbit: Orbit) -> str:
     variables = orbit.map.variables
     first_points, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
-    rows = [_cells(point, len(variables)) for point in first_points]
+    rows = [_point_cells(point, len(variables)) for point in first_points]
     if last is not None and last.step > first_points[-1].step:
         if last.step > first_points[-1].step + 1:
             rows.append(["…"] * len(head))
-        rows.append(_cells(last, len(variables)))
+        rows.append(_point_cells(last, len(variables)))
     if orbit.end is not None:
         word = orbit.end.status
         status = f"{markup.verdict(word)}: {markup.escape(orbit.end.message)}"
@@ -230,10 +231,10 @@ def orbit_html(orbit: Orbit) -> str:
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
     eps, flow = orbit.map.eps, orbit.map.flow  # None for compositions of maps with different eps or vector fields
-    at_eps = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
-    at_eps += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
+    at_eps = "" if eps is None else f" eps = {markup.abbreviate(field.format(eps))},"
+    at_eps += "" if flow is None else f" time step {markup.abbreviate(field.format(flow[1]))},"
     title = f"orbit{direction},{at_eps} over {field}"
-    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
+    return markup.block(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
 
 
 @html_form.register
@@ -243,7 +244,7 @@ def trajectory_html(orbit: Trajectory) -> str:
     points_shown = orbit.preview(_POINTS) if computed is None else [*computed[:_POINTS], *computed[_POINTS:][-1:]]
     variables = orbit.variables
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
-    rows = [_cells(point, len(variables)) for point in points_shown]
+    rows = [_point_cells(point, len(variables)) for point in points_shown]
     if computed is not None and len(computed) > _POINTS + 1:
         rows.insert(_POINTS, ["…"] * len(head))
     if computed is None:
@@ -251,10 +252,10 @@ def trajectory_html(orbit: Trajectory) -> str:
     else:
         status = f"{markup.verdict(orbit.end.status)}: {markup.escape(orbit.end.message)}"
     title = f"orbit, {orbit.arithmetic} arithmetic, {orbit.method} method"
-    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>")
+    return markup.block(title, f"{markup.table(head, rows)}\n<p>{status}</p>")
 
 
-def _cells(point: OrbitPoint, count: int) -> list[str]:
+def _point_cells(point: OrbitPoint, count: int) -> list[str]:
     """Return a row: the step, the first of `count` coordinates, and the number of digits."""
     is_long = point.digits > _MAX_DIGITS
     texts = [t if len(t) <= 24 else f"{t[:10]}…{t[-10:]}" for t in (["(long)"] * count if is_long else point.text)]
@@ -266,8 +267,8 @@ def _cells(point: OrbitPoint, count: int) -> list[str]:
 def period_html(period: OrbitPeriod) -> str:
     """Return the period of an orbit and the periods in its planes."""
     sentence, *planes = period.text.split("\n")
-    inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
-    return markup.titled(markup.shortened(sentence, 200), inside)
+    planes_html = markup.bullet_list(markup.escape(markup.abbreviate(line, 200)) for line in planes[:20])
+    return markup.block(markup.abbreviate(sentence, 200), planes_html)
 
 
 @text_form.register
@@ -297,6 +298,6 @@ def geometry_text(geometry: LevelGeometry | OrbitCurve) -> str:
 def geometry_html(geometry: LevelGeometry | OrbitCurve) -> str:
     """Return the curves, translations and rotation numbers in the planes of an orbit as an HTML list."""
     lines = (
-        markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
+        markup.escape(markup.abbreviate(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
     )
-    return markup.titled("geometry of the level set", markup.listed(lines))
+    return markup.block("geometry of the level set", markup.bullet_list(lines))

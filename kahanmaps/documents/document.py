@@ -36,7 +36,7 @@ from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
-_LONGEST_NAME = 1000
+_MAX_NAME = 1000
 _MAX_FACTORS = 64  # maximal number of maps in a composition, including maps of its parts
 _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number if a rational number reveals the same mistakes
 
@@ -66,7 +66,7 @@ class _Part(NamedTuple):
     map: MapFamily
     power: int
     values: Values
-    plain: dict[str, Any]
+    table: dict[str, Any]
 
 
 class DocumentReader(PartReader):
@@ -78,43 +78,43 @@ class DocumentReader(PartReader):
             self.document, notes = without_left_sides(self.document)
         except InputError as error:
             raise SystemFileError(self.where, [("system.rhs", str(error))]) from error
-        self._unknown_keys("", self.document)
+        self._report_unknown_keys("", self.document)
         kinds = [kind for kind in KINDS if kind in self.document]
         if len(kinds) != 1:
             sections = ", ".join(f"[{kind}]" for kind in kinds) or "none"
-            self._mistake(
+            self._report(
                 "file",
                 f"found {sections} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
         stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
         name = self.document.get("name", "".join(c if c.isprintable() else "_" for c in stem))
-        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
+        if not isinstance(name, str) or not name.isprintable() or len(name) > _MAX_NAME:
             # The name occurs in the first line of many outputs: it must not contain line ends or escape sequences.
-            self._mistake(
-                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
+            self._report(
+                "name", f"found {show(name)}, expected printable text on one line, at most {_MAX_NAME} characters"
             )
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
-        map_, hamiltonian, member = self._read_section(kind, self._table(kind) if kind else None)
+        map_, hamiltonian, member = self._read_section(kind, self._read_table(kind) if kind else None)
         claims = {}
-        for name_of_claim, value in (self._table("integrals") or {}).items():
+        for name_of_claim, value in (self._read_table("integrals") or {}).items():
             if not name_of_claim.isprintable():
-                self._mistake(f"integrals.{quoted(name_of_claim)}", "expected a printable name")
-            elif (claim := self._claim(f"integrals.{name_of_claim}", value)) is not None:
+                self._report(f"integrals.{quoted(name_of_claim)}", "expected a printable name")
+            elif (claim := self._read_claim(f"integrals.{name_of_claim}", value)) is not None:
                 claims[name_of_claim] = claim
         in_iterates = {name: function for name, function in claims.items() if iterates_in(*function.names)}
         integrals = {name: function for name, function in claims.items() if name not in in_iterates}
-        density, section = None, self._table("density") if "density" in self.document else None
+        density, section = None, self._read_table("density") if "density" in self.document else None
         if section is not None:
-            self._unknown_keys("density", section)
-            value = self._required("density", section, "phi")
-            density = self._claim("density.phi", value) if value is not None else None
+            self._report_unknown_keys("density", section)
+            value = self._require("density", section, "phi")
+            density = self._read_claim("density.phi", value) if value is not None else None
             if density is not None and density.numerator.is_zero() and not self.has_bad_parameter:
-                self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
-        if catalog := self._table("catalog"):
-            self._unknown_keys("catalog", catalog)
-            read_structured_facts(catalog, self.variables, self._mistake)
+                self._report("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
+        if catalog := self._read_table("catalog"):
+            self._report_unknown_keys("catalog", catalog)
+            read_structured_facts(catalog, self.variables, self._report)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
         # The document, with the name and the current parameter values; long integers are text, as JSON requires.
@@ -145,16 +145,16 @@ class DocumentReader(PartReader):
         if section is None:
             return None, None, None
         map_, hamiltonian, member = None, None, None
-        self._unknown_keys(kind, section)
+        self._report_unknown_keys(kind, section)
         if self.root is not None and kind in ("family", "composition"):
-            self._mistake(
+            self._report(
                 f"parameters.{self.root[0]}", f"found an algebraic number in a [{kind}], expected rational ones"
             )
         elif self.root is not None and kind == "hamiltonian":
             self.parameters[self.root[0]] = _STAND_IN
-            is_good = self._read_hamiltonian(section) is not None
+            is_valid = self._read_hamiltonian(section) is not None
             del self.parameters[self.root[0]]
-            map_ = self._read_field(section) if is_good else None
+            map_ = self._read_symbolic_field(section) if is_valid else None
         elif kind == "hamiltonian":
             hamiltonian = self._read_hamiltonian(section)
         elif kind == "family":
@@ -168,16 +168,16 @@ class DocumentReader(PartReader):
             if self.root is not None:
                 parameter, root = self.root
 
-                def at_number(value: fmpq) -> MapFamily:  # for floats
+                def map_at(value: fmpq) -> MapFamily:  # for floats
                     overrides = {**self.overrides, parameter: value}
                     reader = DocumentReader(self.document, self.where, overrides, self.look_up)
                     parsed_map: MapFamily = reader.read()["map"]
                     return parsed_map
 
-                map_ = AlgebraicMap(map_, root, at_number)
+                map_ = AlgebraicMap(map_, root, map_at)
             self.variables = map_.variables  # a polarised map has more variables than its system
-            for clash in set(self.variables) & set(self.parameters):
-                self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
+            for name in set(self.variables) & set(self.parameters):
+                self._report(f"parameters.{name}", "is a variable of the map as well, expected distinct names")
         return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
@@ -192,33 +192,33 @@ class DocumentReader(PartReader):
         self.symbols = tuple(symbols)
         self.parameters = {name: value for name, value in self.parameters.items() if name not in symbols}
         section = self.document[kind]
-        map_ = self._read_field(section) if kind == "hamiltonian" else self._read_map_of_kind(kind, section)
+        map_ = self._read_symbolic_field(section) if kind == "hamiltonian" else self._read_map_of_kind(kind, section)
         if map_ is None or self.mistakes:
             raise SystemFileError(f"{self.where} with {', '.join(symbols)} as symbols", self.mistakes)
         return map_
 
     def _read_map_of_kind(self, kind: str, section: Mapping[str, Any]) -> MapFamily | None:
-        read = {"system": self._read_system, "composition": self._read_composition, "bilinear": self._read_bilinear}
-        return read.get(kind, self._read_map)(section)
+        readers = {"system": self._read_system, "composition": self._read_composition, "bilinear": self._read_bilinear}
+        return readers.get(kind, self._read_map)(section)
 
     def _read_parameters(self) -> None:
-        for name, value in (self._table("parameters") or {}).items():
+        for name, value in (self._read_table("parameters") or {}).items():
             path = f"parameters.{name}"
             if name == "eps":
-                self._mistake(
+                self._report(
                     path, "eps is half the time step of the map and cannot be a parameter: rename it, to epsilon, say"
                 )
                 continue
             try:
                 check_names([name])
             except InputError as error:
-                self._mistake(path, str(error))
+                self._report(path, str(error))
                 continue
+            raw_value = self.overrides.get(name, value)
             try:
-                given = self.overrides.get(name, value)
-                given = number(given)
-                root = parse_root(given) if isinstance(given, str) else given if isinstance(given, Root) else None
-                if root is not None:
+                raw_value = number(raw_value)
+                root = parse_root(raw_value) if isinstance(raw_value, str) else raw_value
+                if isinstance(root, Root):
                     if self.root is not None:
                         raise InputError("found a second algebraic parameter, expected at most one")
                     if root.degree == 1:
@@ -226,13 +226,13 @@ class DocumentReader(PartReader):
                     else:
                         self.root = name, root
                     continue
-                if isinstance(given, list | dict):
-                    raise InputError(f"found {show(given)}, expected a number")
-                self.parameters[name] = rational(given)
+                if isinstance(raw_value, list | dict):
+                    raise InputError(f"found {show(raw_value)}, expected a number")
+                self.parameters[name] = rational(raw_value)
             except InputError as error:
-                written = "\nan algebraic number is written: root of t^2 - 2"
-                hint = written if isinstance(given, str) and "sqrt" in given else ""
-                self._mistake(path, f"{error}{hint}")
+                example = "\nan algebraic number is written: root of t^2 - 2"
+                hint = example if isinstance(raw_value, str) and "sqrt" in raw_value else ""
+                self._report(path, f"{error}{hint}")
                 self.parameters[name] = fmpq(1)  # so that its uses are not reported as further mistakes
                 self.has_bad_parameter = True
         if self.root is not None:
@@ -242,38 +242,38 @@ class DocumentReader(PartReader):
             if not isinstance(declared, dict) or name not in declared:
                 known_names = ", ".join(self.parameters) or "none"
                 hint = suggestion(name, list(self.parameters))
-                self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known_names}{hint}")
+                self._report("parameters", f"unknown parameter {quoted(name)}, this system has: {known_names}{hint}")
 
     def _read_variables(self, kind: str) -> None:
         names = self.document.get("variables")
         if names is None:
             if kind == "family":
-                A = (self._table("family") or {}).get("A")
+                A = (self._read_table("family") or {}).get("A")
                 if isinstance(A, list) and 0 < len(A) <= MAX_DIMENSION:
                     from kahanmaps.family.cubics import default_variables
 
                     self.variables = default_variables(len(A))
             elif kind != "composition":  # a composition has the variables of its first map
-                self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
+                self._report("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
         if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-            self._mistake("variables", f'found {show(names)}, expected a list of names, e.g. ["x", "y"]')
+            self._report("variables", f'found {show(names)}, expected a list of names, e.g. ["x", "y"]')
             return
         if len(names) > MAX_DIMENSION:
-            self._mistake("variables", f"found {len(names)} variables, expected at most {MAX_DIMENSION}")
+            self._report("variables", f"found {len(names)} variables, expected at most {MAX_DIMENSION}")
             return
         try:
             check_names(names)
         except InputError as error:
-            self._mistake("variables", str(error))
+            self._report("variables", str(error))
             return
-        clash = [name for name in names if name in self.parameters]
+        shared_names = [name for name in names if name in self.parameters]
         if "eps" in names:
-            self._mistake(
+            self._report(
                 "variables", "eps is half the time step of the map and cannot be a variable: rename it, to epsilon, say"
             )
-        elif clash:
-            self._mistake("variables", f"{quoted(clash[0])} is a parameter as well, expected distinct names")
+        elif shared_names:
+            self._report("variables", f"{quoted(shared_names[0])} is a parameter as well, expected distinct names")
         else:
             self.variables = tuple(names)
 
@@ -282,71 +282,66 @@ class DocumentReader(PartReader):
         method = "polarised" if method == "polarized" else method
         if method not in _DISCRETIZATIONS:
             allowed = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
-            return self._refused("system.discretization", f"found {show(method)}, expected one of {allowed}")
-        make, default_degree, largest = _DISCRETIZATIONS[method]
+            return self._refuse("system.discretization", f"found {show(method)}, expected one of {allowed}")
+        make_map, default_degree, max_degree = _DISCRETIZATIONS[method]
         degree = section.get("degree", default_degree)
-        if type(degree) is not int or not 2 <= degree <= largest:
-            return self._refused("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
-        formulas = self._required("system", section, "rhs")
-        polynomials = self._each("system.rhs", formulas, lambda path, value: self._polynomial(path, value, degree))
-        texts = self._list("system", "rhs", formulas, "right-hand side")
+        if type(degree) is not int or not 2 <= degree <= max_degree:
+            return self._refuse("system.degree", f"found {show(degree)}, expected a number from 2 to {max_degree}")
+        formulas = self._require("system", section, "rhs")
+        polynomials = self._read_each("system.rhs", formulas, partial(self._read_polynomial, max_degree=degree))
+        texts = self._read_list("system", "rhs", formulas, "right-hand side")
         if texts is None or polynomials is None or self.variables is None or self.has_bad_parameter:
             return None
-        return self._try_make("system.rhs", make, polynomials, degree)
+        return self._try_make("system.rhs", make_map, polynomials, degree)
 
     def _read_bilinear(self, section: Mapping[str, Any]) -> MapFamily | None:
-        new = section.get("new", [name.upper() for name in self.variables or ()])
-        new = self._list("bilinear", "new", new, "name")
-        formulas = self._list("bilinear", "equations", self._required("bilinear", section, "equations"), "equation")
-        if new is None or formulas is None or self.variables is None:
+        new_names = section.get("new", [name.upper() for name in self.variables or ()])
+        new_names = self._read_list("bilinear", "new", new_names, "name")
+        formulas = self._read_list("bilinear", "equations", self._require("bilinear", section, "equations"), "equation")
+        if new_names is None or formulas is None or self.variables is None:
             return None
         try:
-            check_names(new)
-            check_names((*self.variables, *new, *self.parameters, *self.symbols, "eps"))
+            check_names(new_names)
+            check_names((*self.variables, *new_names, *self.parameters, *self.symbols, "eps"))
         except InputError as error:
             hint = "" if "new" in section else ': give new = ["..."], names for the coordinates of the new point'
-            return self._refused("bilinear.new", f"{error}{hint}")
+            return self._refuse("bilinear.new", f"{error}{hint}")
 
         def equation(path: str, value: Any) -> fmpq_mpoly | None:
-            sides = (self._text(path, value) or "").split("=")
+            sides = (self._read_text(path, value) or "").split("=")
             if len(sides) != 2:
-                return self._refused(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
-            old_side, new_side = (self._polynomial(path, side, 1, new) for side in sides)
+                return self._refuse(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
+            old_side, new_side = (self._read_polynomial(path, side, 1, new_names) for side in sides)
             return None if old_side is None or new_side is None else old_side - new_side
 
-        polynomials = self._each("bilinear.equations", formulas, equation)
+        polynomials = self._read_each("bilinear.equations", formulas, equation)
         if polynomials is None or self.has_bad_parameter:
             return None
-        return self._checked_map(bilinear_map, "bilinear", self.variables, polynomials)
+        return self._make_checked_map(bilinear_map, "bilinear", self.variables, polynomials)
 
     def _read_map(self, section: Mapping[str, Any]) -> MapFamily | None:
-        self._required("map", section, "image")
-        image, inverse = (
-            self._each(f"map.{key}", self._list("map", key, section.get(key), "function"), self._claim) or None
-            for key in ("image", "inverse")
-        )
-        if (
-            image is None
-            or self.variables is None
-            or self.has_bad_parameter
-            or ("inverse" in section and inverse is None)
-        ):
+        self._require("map", section, "image")
+        texts = {key: self._read_list("map", key, section.get(key), "function") for key in ("image", "inverse")}
+        image, inverse = (self._read_each(f"map.{key}", texts[key], self._read_claim) or None for key in texts)
+        if image is None or self.variables is None or self.has_bad_parameter:
             return None
-        return self._checked_map(explicit_map, "map", self.variables, image, inverse)
+        if "inverse" in section and inverse is None:
+            return None
+        return self._make_checked_map(explicit_map, "map", self.variables, image, inverse)
 
-    def _checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
+    def _make_checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
         """Return the map if it is defined and dominant and a given inverse is correct; if not, note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None
         if reason := why_no_map(map_, None if self.root is None else self.root[1]):
-            return self._refused(path, reason)
+            return self._refuse(path, reason)
         return map_
 
     def _read_hamiltonian(self, section: Mapping[str, Any]) -> CubicHamiltonian | None:
-        value = self._required("hamiltonian", section, "H")
-        H = self._polynomial("hamiltonian.H", value, 3, of_map=False) if value is not None else None
-        matrix = self._required("hamiltonian", section, "J")
+        value = self._require("hamiltonian", section, "H")
+        H = self._read_polynomial("hamiltonian.H", value, 3, of_map=False) if value is not None else None
+        matrix = self._require("hamiltonian", section, "J")
         if matrix is None:
             return None
         n = len(self.variables) if self.variables is not None else None
@@ -354,21 +349,21 @@ class DocumentReader(PartReader):
         if matrix == "standard":
             J = None if n is None else self._try_make("hamiltonian.J", standard_structure, n)
         elif isinstance(matrix, str):
-            self._mistake("hamiltonian.J", f'found {show(matrix)}, expected "standard" or a skew matrix')
+            self._report("hamiltonian.J", f'found {show(matrix)}, expected "standard" or a skew matrix')
         else:
-            J = self._matrix("hamiltonian.J", matrix, n)
+            J = self._read_matrix("hamiltonian.J", matrix, n)
         if J is None or self.variables is None or self.has_bad_parameter:
             return None
         zero = parse_polynomial("0", self.variables)
         hamiltonian = self._try_make("hamiltonian.J", CubicHamiltonian, zero if H is None else H, J)
         return None if H is None else hamiltonian
 
-    def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
+    def _read_symbolic_field(self, section: Mapping[str, Any]) -> MapFamily | None:
         """Return the Kahan map of J grad H, where J and H may contain symbols."""
-        H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
+        H, n = self._read_polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [
-            [self._polynomial(f"hamiltonian.J[{i + 1}][{j + 1}]", str(e), 0) for j, e in enumerate(row)]
+            [self._read_polynomial(f"hamiltonian.J[{i + 1}][{j + 1}]", str(e), 0) for j, e in enumerate(row)]
             for i, row in enumerate(matrix)
         ]
         if H is None or self.mistakes:
@@ -380,90 +375,90 @@ class DocumentReader(PartReader):
         return _kahan(rhs, 2)
 
     def _read_member(self, section: Mapping[str, Any]) -> FamilyMember | None:
-        matrix, value = self._required("family", section, "A"), self._required("family", section, "H")
+        matrix, value = self._require("family", section, "A"), self._require("family", section, "H")
         size = len(self.variables) if self.variables is not None else None
-        A = self._matrix("family.A", matrix, size) if matrix is not None else None
-        H = self._polynomial("family.H", value, 3, of_map=False) if value is not None else None
+        A = self._read_matrix("family.A", matrix, size) if matrix is not None else None
+        H = self._read_polynomial("family.H", value, 3, of_map=False) if value is not None else None
         signs = section.get("signs", [])
-        signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
-        if not signs_are_good:
-            self._mistake("family.signs", f"found {show(signs)}, expected a list of 1 and -1")
+        has_valid_signs = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
+        if not has_valid_signs:
+            self._report("family.signs", f"found {show(signs)}, expected a list of 1 and -1")
         if A is None or H is None or self.has_bad_parameter:
             return None
         try:
             from kahanmaps.family.associated import FamilyMember
 
-            return FamilyMember(A, H, tuple(signs) if signs_are_good else ())
+            return FamilyMember(A, H, tuple(signs) if has_valid_signs else ())
         except InputError as error:
             message = str(error)
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
-            return self._refused(f"family.{key}", message)
+            return self._refuse(f"family.{key}", message)
 
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 
     def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
         """Read a composition; parts given by name are replaced by their content: the document is self-contained."""
-        entries = self._required("composition", section, "of")
+        entries = self._require("composition", section, "of")
         if not isinstance(entries, list) or not entries:
             if entries is not None:
-                self._mistake("composition.of", f"found {show(entries)}, expected {EXPECTED['composition', 'of']}")
+                self._report("composition.of", f"found {show(entries)}, expected {EXPECTED['composition', 'of']}")
             return None
-        factors = self._each("composition.of", entries, self._part)
+        factors = self._read_each("composition.of", entries, self._read_part)
         if factors is None or self.has_bad_parameter:
             return None
-        if sum(abs(part.power) for part in factors) > _MAX_FACTORS:
-            return self._refused(
+        if sum(abs(factor.power) for factor in factors) > _MAX_FACTORS:
+            return self._refuse(
                 "composition.of", f"found more than {_MAX_FACTORS} steps, expected at most {_MAX_FACTORS}"
             )
-        self.document = {**self.document, "composition": {"of": [part.plain for part in factors]}}
-        values = [part.values for part in factors]
-        make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
-        return self._try_make("composition.of", make, *((part.map, part.power) for part in factors))
+        self.document = {**self.document, "composition": {"of": [factor.table for factor in factors]}}
+        values = [factor.values for factor in factors]
+        make_map = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
+        return self._try_make("composition.of", make_map, *((factor.map, factor.power) for factor in factors))
 
-    def _part(self, path: str, entry: Any) -> _Part | None:
+    def _read_part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):
-            return self._refused(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
+            return self._refuse(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
         mistakes_before = len(self.mistakes)
         for key in entry:
             if key not in KEYS["composition.of"]:
                 expected = ", ".join(sorted(KEYS["composition.of"]))
-                self._mistake(f"{path}.{key}", f"unknown key, expected one of {expected}")
-        named = [key for key in ("file", "system", "map") if key in entry]
-        if len(named) != 1:
-            return self._refused(
-                path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one"
+                self._report(f"{path}.{key}", f"unknown key, expected one of {expected}")
+        sources = [key for key in ("file", "system", "map") if key in entry]
+        if len(sources) != 1:
+            return self._refuse(
+                path, f"found {' and '.join(sources) or 'none'} of file, system and map, expected exactly one"
             )
-        (key,) = named
+        (key,) = sources
         power, inverse = entry.get("power", 1), entry.get("inverse", False)
         if type(power) is not int or power == 0:
-            self._mistake(f"{path}.power", f"found {show(power)}, expected an integer other than 0")
+            self._report(f"{path}.power", f"found {show(power)}, expected an integer other than 0")
         for name in ("inverse", "involution"):
             if not isinstance(entry.get(name, False), bool):
-                self._mistake(f"{path}.{name}", f"found {show(entry[name])}, expected true or false")
-        numbers, values = self._part_parameters(path, entry)
+                self._report(f"{path}.{name}", f"found {show(entry[name])}, expected true or false")
+        numbers, values = self._read_part_parameters(path, entry)
         if len(self.mistakes) > mistakes_before:
             return None
         try:
-            reader = self._part_reader(key, entry[key], numbers, values)
+            reader = self._make_part_reader(key, entry[key], numbers, values)
             if values:
                 map_ = reader.read_map(next(kind for kind in KINDS if kind in reader.document), list(values))
             else:
                 map_ = reader.read()["map"]
         except InputError as error:
-            return self._refused(f"{path}.{key}", str(error))
+            return self._refuse(f"{path}.{key}", str(error))
         if entry.get("involution") and not is_involution(map_):
-            return self._refused(
+            return self._refuse(
                 f"{path}.involution", "found a map whose square is not the identity, expected an involution"
             )
-        plain = {name: value for name, value in entry.items() if name not in named}
+        other_entries = {name: value for name, value in entry.items() if name not in sources}
         document = dict(reader.document)
         if key != "map":
             document.setdefault("parameters", {})  # an inline table has only its own parameters
         elif "parameters" not in entry[key]:
             del document["parameters"]
-        return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
+        return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **other_entries})
 
-    def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
+    def _read_part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
         """Return the values that a composition assigns to the parameters of one of its maps.
 
         The first dict contains the values that are rational numbers, the second one the functions of symbols.
@@ -472,7 +467,7 @@ class DocumentReader(PartReader):
         values: Values = {}
         parameters = entry.get("parameters", {})
         if not isinstance(parameters, dict):
-            self._mistake(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
+            self._report(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
         if isinstance(table, dict) and "parameters" not in table:  # the map can use the parameters of this file
@@ -480,7 +475,7 @@ class DocumentReader(PartReader):
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
         for name, value in parameters.items():
-            text = self._text(f"{path}.parameters.{name}", value)
+            text = self._read_text(f"{path}.parameters.{name}", value)
             if text is None:
                 continue
             entry_path = f"{path}.parameters.{name}"
@@ -497,18 +492,18 @@ class DocumentReader(PartReader):
                 values[name] = function
         return numbers, values
 
-    def _part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
+    def _make_part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
         """Return the reader for a part of a composition."""
-        self.parts[0] += 1
-        if self.parts[0] > _MAX_FACTORS:
+        self.part_count[0] += 1
+        if self.part_count[0] > _MAX_FACTORS:
             raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most {_MAX_FACTORS}")
         name, name_or_path, look_up = "map", "", self.look_up
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
             # A table without its own parameters has the parameters of the file that contains it.
-            outer = {name: format_number(number) for name, number in self.parameters.items()}
-            document = {"parameters": {**outer, **dict.fromkeys(self.symbols, 1)}, **value}
+            outer_parameters = {name: format_number(number) for name, number in self.parameters.items()}
+            document = {"parameters": {**outer_parameters, **dict.fromkeys(self.symbols, 1)}, **value}
         elif not isinstance(value, str):
             raise InputError(f"found {show(value)}, expected a name in quotes")
         elif self.look_up is None:
@@ -516,9 +511,9 @@ class DocumentReader(PartReader):
         else:
             name = value
             document, name_or_path, look_up = self.look_up(key, value)
-            if key == "file" and name_or_path in self.inside:
+            if key == "file" and name_or_path in self.enclosing:
                 raise InputError(f"found {quoted(name)} as a part of itself")
         document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
         reader = type(self)(document, name, numbers, look_up)
-        reader.inside, reader.parts = (*self.inside, name_or_path), self.parts
+        reader.enclosing, reader.part_count = (*self.enclosing, name_or_path), self.part_count
         return reader

@@ -29,7 +29,7 @@ _MAX_TOKENS = 16  # maximal number of tokens of a derivative written without pri
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
 # Patterns of derivatives (with blanks only between two words) and the order. They are compiled when they are needed.
-_WRITTEN = (
+_DERIVATIVE_PATTERNS = (
     (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
     (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
     (rf"d ?{_NAME}{_ARGUMENT}/d ?t", 1),
@@ -40,7 +40,7 @@ _WRITTEN = (
     (rf"{_NAME}dot", 1),
     (rf"d{_NAME}dt", 1),
 )
-_LATEX = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", "dt")
+_LATEX_COMMANDS = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", "dt")
 _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
 
@@ -65,23 +65,24 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     texts = [right_sides] if isinstance(right_sides, str) else right_sides
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         return dict(document), []
-    marks = "=;,[{" if len(texts) == 1 else "=;"  # [x*y, -x] is a list of formulas in one text
-    if isinstance(right_sides, list) and not any(mark in text for text in texts for mark in marks):
+    separators = "=;,[{" if len(texts) == 1 else "=;"  # [x*y, -x] is a list of formulas in one text
+    if isinstance(right_sides, list) and not any(separator in text for text in texts for separator in separators):
         return dict(document), []
     pieces = pieces_of("\n".join(texts))
     notes: list[str] = []
     if any(token in piece for piece in pieces for token in _EQUALS):
         names, parameters = document.get("variables"), document.get("parameters")
         given_names = [str(name) for name in names] if isinstance(names, list) else []
-        sides, velocities, notes = read_equations(
+        formulas, velocities, notes = read_equations(
             pieces, given_names, parameters if isinstance(parameters, dict) else ()
         )
-        variables = list(sides) if names is None else [*given_names, *(v for v in velocities if v not in given_names)]
-        if set(variables) != set(sides):
-            raise InputError(f"found equations for {', '.join(sides)}, expected one for each of the variables")
+        new_velocities = [velocity for velocity in velocities if velocity not in given_names]
+        variables = list(formulas) if names is None else [*given_names, *new_velocities]
+        if set(variables) != set(formulas):
+            raise InputError(f"found equations for {', '.join(formulas)}, expected one for each of the variables")
         document = {"variables": variables, **document}
         document["variables"] = variables
-        rhs = [sides[name] for name in variables]
+        rhs = [formulas[name] for name in variables]
     else:
         rhs = ["".join(piece).strip() for piece in pieces]
     return {**document, "system": {**document["system"], "rhs": rhs}}, notes
@@ -97,7 +98,15 @@ def tokens_of(text: str) -> list[str]:
 
 def pieces_of(text: str) -> list[list[str]]:
     """Return the tokens of each equation or formula in a list. Raises InputError for unbalanced brackets."""
-    tokens = _without_outer_brackets(_list_in(tokens_of(text)))
+    tokens = tokens_of(text)
+    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
+    # Omit the name and the terminator of a list, as in eqs := [x' = y, y' = -x];
+    while positions and tokens[positions[-1]] in (";", ":", ","):
+        positions.pop()
+    first_three = [tokens[k] for k in positions[:3]]
+    if len(first_three) == 3 and is_name(first_three[0]) and first_three[1] in ("=", ":=") and first_three[2] in "[{":
+        positions = positions[2:]
+    tokens = _without_outer_brackets(tokens[positions[0] : positions[-1] + 1]) if positions else []
     pieces: list[list[str]] = [[]]
     depth = 0
     for token in tokens:
@@ -113,21 +122,6 @@ def pieces_of(text: str) -> list[list[str]]:
     if depth:
         raise InputError(f"found {quoted(_text(pieces[-1]))}, where a bracket is opened that is not closed")
     return [piece for piece in pieces if _text(piece)]
-
-
-def _list_in(tokens: list[str]) -> list[str]:
-    """Return the tokens of a list without its name and terminator, as in eqs := [x' = y, y' = -x]."""
-    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
-    while positions and tokens[positions[-1]] in (";", ":", ","):
-        positions.pop()
-    if (
-        len(positions) > 2
-        and is_name(tokens[positions[0]])
-        and tokens[positions[1]] in ("=", ":=")
-        and tokens[positions[2]] in "[{"
-    ):
-        positions = positions[2:]
-    return tokens[positions[0] : positions[-1] + 1] if positions else []
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
@@ -160,7 +154,7 @@ def read_equations(
     Raises:
         InputError: for a text that is not an equation, with what to write instead, and for two equations of a variable.
     """
-    pieces, notes = _with_plain_names(pieces, parameters)
+    pieces, notes = _replace_indexed_names(pieces, parameters)
     orders, formulas = dict[str, int](), dict[str, list[str]]()
     for piece in pieces:
         equals_at = [k for k, token in enumerate(piece) if token in _EQUALS]
@@ -179,119 +173,114 @@ def read_equations(
         if derivative.name in orders:
             raise InputError(f"found two equations for {derivative.name}, expected one")
         orders[derivative.name], formulas[derivative.name] = derivative.order, piece[equals_at[0] + 1 :]
-    velocities = _velocities(orders, variables, {*parameters, *(t for piece in pieces for t in piece)})
+    # The velocity of a variable with an equation of second order has a given name, or is vx for x.
+    second_order = [name for name, order in orders.items() if order == 2]
+    extra_names = [name for name in variables if name not in orders]
+    if len(extra_names) == len(second_order):
+        velocities = dict(zip(second_order, extra_names, strict=True))
+    else:
+        velocities = {}
+        used_names = {*parameters, *(token for piece in pieces for token in piece)}
+        for name in second_order:
+            velocity = f"v{name}"
+            while velocity in used_names or velocity in velocities.values():
+                velocity += "_"
+            velocities[name] = velocity
     notes += [f"{name}'' is read with a velocity, the variable {v}: {name}' = {v}" for name, v in velocities.items()]
     sides = dict[str, str]()
     for name, formula in formulas.items():
-        sides[name] = velocities.get(name, "") or _formula(name, formula, orders, velocities)
+        sides[name] = velocities.get(name, "") or _formula_text(name, formula, orders, velocities)
     for name, velocity in velocities.items():
-        sides[velocity] = _formula(name, formulas[name], orders, velocities)
+        sides[velocity] = _formula_text(name, formulas[name], orders, velocities)
     return sides, list(velocities.values()), notes
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     """Return the derivative (x', dx/dt, x_dot, diff(x(t), t)) that begins at a token; None if there is none."""
-    first = tokens[start] if start < len(tokens) else ""
-    if not is_name(first):
+    name = tokens[start] if start < len(tokens) else ""
+    if not is_name(name):
         return None
-    end = _argument(tokens, start + 1)
+    end = _skip_argument(tokens, start + 1)
     order = 0
     while end < len(tokens) and tokens[end] in _PRIMES:
         order, end = order + _PRIMES[tokens[end]], end + 1
     if order:
-        return _Derivative(first, order, _argument(tokens, end))
-    text, last, ends = "", "", dict[int, int]()  # length of the text up to a token -> index of the next token
+        return _Derivative(name, order, _skip_argument(tokens, end))
+    text, last_token, ends = "", "", dict[int, int]()  # length of the text up to a token -> index of the next token
     for position, token in enumerate(tokens[start : start + _MAX_TOKENS], start + 1):
-        is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
-        text, last = f"{text}{' ' * is_apart}{token}", token
+        needs_blank = (last_token[-1:].isalnum() or last_token[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
+        text, last_token = f"{text}{' ' * needs_blank}{token}", token
         ends[len(text)] = position
-    for pattern, order in _WRITTEN:
+    for pattern, order in _DERIVATIVE_PATTERNS:
         match = re.match(pattern + _ARGUMENT, text)
         if match is not None and match.end() in ends:
             return _Derivative(match[1], order, ends[match.end()])
     return None
 
 
-def _argument(tokens: Sequence[str], position: int) -> int:
+def _skip_argument(tokens: Sequence[str], position: int) -> int:
     """Return the position after (t) or [t]; without such an argument, return `position`."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
-def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
+def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
     """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
-    tokens_kept = [token for token in tokens if not token.isspace()]
-    gaps, blank = list[str](), ""  # keep the blank before a word: "x y" must not become "xy"
+    words = [token for token in tokens if not token.isspace()]
+    blanks, blank = list[str](), ""  # keep the blank before a word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
             blank = " "
         else:
-            gaps.append(blank)
+            blanks.append(blank)
             blank = ""
     formula: list[str] = []
     k = 0
-    while k < len(tokens_kept):
-        derivative = derivative_at(tokens_kept, k)
+    while k < len(words):
+        derivative = derivative_at(words, k)
         # x_dot is the derivative of x unless a variable is called x_dot.
-        if (
-            derivative
-            and derivative.name in orders
-            and (tokens_kept[k] not in orders or tokens_kept[k] == derivative.name)
-        ):
+        if derivative and derivative.name in orders and (words[k] not in orders or words[k] == derivative.name):
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
                     f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
                     "formula in the variables: replace it by the right-hand side of its equation"
                 )
-            formula.append(gaps[k] + velocities[derivative.name])
+            formula.append(blanks[k] + velocities[derivative.name])
             k = derivative.end
         else:
-            formula.append(gaps[k] + tokens_kept[k])
-            k = _argument(tokens_kept, k + 1) if tokens_kept[k] in orders else k + 1
+            formula.append(blanks[k] + words[k])
+            k = _skip_argument(words, k + 1) if words[k] in orders else k + 1
     return "".join(formula).strip()
 
 
-def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
-    """Return the name of the velocity of each variable with an equation of second order: a given name, or vx for x."""
-    second_order = [name for name, order in orders.items() if order == 2]
-    extra_names = [name for name in variables if name not in orders]
-    if len(extra_names) == len(second_order):
-        return dict(zip(second_order, extra_names, strict=True))
-    velocities = dict[str, str]()
-    for name in second_order:
-        velocity = f"v{name}"
-        while velocity in taken or velocity in velocities.values():
-            velocity += "_"
-        velocities[name] = velocity
-    return velocities
-
-
-def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tuple[list[list[str]], list[str]]:
+def _replace_indexed_names(
+    pieces: Sequence[list[str]], parameters: Collection[str]
+) -> tuple[list[list[str]], list[str]]:
     """Replace x[0] by x0 (or x_0 if x0 is taken); return the pieces and notes."""
-    used_names = {*taken, *(token for piece in pieces for token in piece)}
+    used_names = {*parameters, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
-    renamed: list[list[str]] = []
+    new_pieces: list[list[str]] = []
     for piece in pieces:
-        renamed.append([])
+        new_pieces.append([])
         k = 0
         while k < len(piece):
-            word = piece[k : k + 4]
-            is_indexed = len(word) == 4 and is_name(word[0]) and word[1] == "[" and word[3] == "]"
-            is_indexed = is_indexed and word[2].isdigit() and len(word[2]) < 5
+            window = piece[k : k + 4]
+            is_indexed = len(window) == 4 and is_name(window[0]) and window[1] == "[" and window[3] == "]"
+            is_indexed = is_indexed and window[2].isdigit() and len(window[2]) < 5
             if is_indexed:
-                name = f"{word[0]}{word[2]}"
+                name = f"{window[0]}{window[2]}"
                 while name in used_names:
-                    name = f"{word[0]}_{word[2]}" if "_" not in name else f"{name}_"
-                renamed[-1].append(names.setdefault((word[0], word[2]), name))
+                    name = f"{window[0]}_{window[2]}" if "_" not in name else f"{name}_"
+                new_pieces[-1].append(names.setdefault((window[0], window[2]), name))
             else:
-                renamed[-1].append(piece[k])
+                new_pieces[-1].append(piece[k])
             k += 4 if is_indexed else 1
-    return renamed, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
+    return new_pieces, [f"{name}[{index}] is called {new_name}" for (name, index), new_name in names.items()]
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
     """Return a hint that says what to type instead of an unsupported statement."""
     if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
-        name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
+        name = next((token for token in left_side if is_name(token) and token not in _LATEX_COMMANDS), "x")
         name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"
         return f"; LaTeX is not read: write {name}{primes} = ..., and products with *"
     if left_side and left_side[0].isalpha() and not left_side[0].isascii():

@@ -25,12 +25,12 @@ def formula_text(value: Any) -> str:
         return str(rational(value))
     if not _is_sympy(value):
         return str(value)
-    for part in _irrational(value):
-        if part.is_Float:
-            rational(float(part))  # raises the error for floats
+    for irrational in _irrational_numbers(value):
+        if irrational.is_Float:
+            rational(float(irrational))  # raises the error for floats
         raise InputError(
-            f"found {part} in {value}, expected rational numbers and names: "
-            f"an algebraic number is the value of a parameter, System(..., a={part})"
+            f"found {irrational} in {value}, expected rational numbers and names: "
+            f"an algebraic number is the value of a parameter, System(..., a={irrational})"
         )
     return str(value)
 
@@ -38,16 +38,16 @@ def formula_text(value: Any) -> str:
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
     """Replace the irrational number in SymPy expressions by a name, if there is exactly one; also return its value."""
     from_sympy = [side for side in sides if _is_sympy(side)]
-    irrational_numbers = {part for side in from_sympy for part in _irrational(side)}
-    if len(irrational_numbers) != 1 or any(part.is_Float for part in irrational_numbers):
+    irrational_numbers = {irrational for side in from_sympy for irrational in _irrational_numbers(side)}
+    if len(irrational_numbers) != 1 or any(irrational.is_Float for irrational in irrational_numbers):
         return list(sides), {}
     from sympy import Symbol
 
     [value] = irrational_numbers
     taken_names = {str(symbol) for side in from_sympy for symbol in side.free_symbols}.union(taken)
     name = next(name for k in count() if (name := f"r{k or ''}") not in taken_names)
-    named = {value: Symbol(name)}
-    return [side.xreplace(named) if _is_sympy(side) else side for side in sides], {name: value}
+    replacement = {value: Symbol(name)}
+    return [side.xreplace(replacement) if _is_sympy(side) else side for side in sides], {name: value}
 
 
 def number(value: Any) -> Any:
@@ -61,8 +61,8 @@ def number(value: Any) -> Any:
         raise InputError(f"found {value}, expected a rational or an algebraic number")
     from sympy import Symbol, minimal_polynomial
 
-    near = f" near {value.evalf(20)}" if value.is_real else ""
-    return f"root of {minimal_polynomial(value, Symbol('t'))}{near}".replace("**", "^")
+    position = f" near {value.evalf(20)}" if value.is_real else ""
+    return f"root of {minimal_polynomial(value, Symbol('t'))}{position}".replace("**", "^")
 
 
 def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
@@ -81,7 +81,7 @@ def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
     return {str(names[equation.lhs.expr]): equation.rhs.subs(names) for equation in equations}
 
 
-def _irrational(value: Any) -> Iterator[Any]:
+def _irrational_numbers(value: Any) -> Iterator[Any]:
     """Yield the irrational numbers that occur in a SymPy expression."""
     from sympy import preorder_traversal
 

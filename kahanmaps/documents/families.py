@@ -65,17 +65,17 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
     if not (2 <= n <= LARGEST and 0 <= k and 2 * k + 1 <= n):
         raise InputError(f"found lv({n},{k}), expected lv(n,k) with 2 <= n <= {LARGEST}, 0 <= k and 2k + 1 <= n")
     x = [f"x{i + 1}" for i in range(n)]
-    middle = x[k : n - k]
-    m = " + ".join(middle)
+    middle_species = x[k : n - k]
+    middle_sum = " + ".join(middle_species)
     integrals = {"I1": " + ".join(x)}
-    for a in range(2, len(middle)):
-        denominator = f"({' + '.join(middle[:a])})*({' + '.join(middle[a - 1 :])})"
-        integrals[f"I{len(integrals) + 1}"] = f"{middle[a - 1]}*({m})/({denominator})"
+    for a in range(2, len(middle_species)):
+        denominator = f"({' + '.join(middle_species[:a])})*({' + '.join(middle_species[a - 1 :])})"
+        integrals[f"I{len(integrals) + 1}"] = f"{middle_species[a - 1]}*({middle_sum})/({denominator})"
     if k == 1:
         first, last = x[0], x[-1]
-        minus = f"2*{first}*({m}) - 2*({m})*{last} - 2*{first}*{last}"
-        det = f"1 - eps^2*({first}^2 + ({m})^2 + {last}^2 - {minus})"
-        integrals[f"I{len(integrals) + 1}"] = f"{first}*({m})*{last}/({det})"
+        mixed_terms = f"2*{first}*({middle_sum}) - 2*({middle_sum})*{last} - 2*{first}*{last}"
+        det = f"1 - eps^2*({first}^2 + ({middle_sum})^2 + {last}^2 - {mixed_terms})"
+        integrals[f"I{len(integrals) + 1}"] = f"{first}*({middle_sum})*{last}/({det})"
     rows = []
     for i in range(n):  # sum_j a_ij x_j, positive terms first
         signs = {j: (1 if abs(j - i) < n - k else -1) * (1 if j > i else -1) for j in range(n) if j != i}
@@ -114,7 +114,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
             "sources": ["itoh-1987", "bogoyavlenskij-1988", "damianou-2017", "kouloukas-quispel-vanhaecke-2016"],
             "convention": "the sources treat the flow, the last one with a Kahan map of time step 2 eps",
             "facts": facts,
-            "degrees": [degree(n, k, m) for m in range(1, _SHOWN_DEGREES + 1)],
+            "degrees": [degree(n, k, middle_sum) for middle_sum in range(1, _SHOWN_DEGREES + 1)],
             "growth": "quadratic" if k else "linear",
         },
         "system": {"rhs": [f"{x[i]}*({row})" for i, row in enumerate(rows)]},

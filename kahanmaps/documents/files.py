@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import import_module, resources
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 16_000_000
 _TOML = TomlKind("system file", MAX_FILE_BYTES, SystemFileError)
-_LONGEST_LABEL = 120
+_MAX_LABEL = 120
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
@@ -76,7 +76,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
         equations = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
-        return equations if len(equations) <= _LONGEST_LABEL else self.name
+        return equations if len(equations) <= _MAX_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
         """Return the name or the equations of the system, with a letter: f = euler_top, or f: (x' = y, y' = -x)."""
@@ -178,8 +178,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         """
         if not isinstance(self.map, AlgebraicMap):
             return self
-        value = {self.map.given.symbols[0]: self.map.root.real_approximation()}
-        return SystemFile(**DocumentReader(dict(self.document), self.name, value).read())
+        overrides = {self.map.given.symbols[0]: self.map.root.real_approximation()}
+        return SystemFile(**DocumentReader(dict(self.document), self.name, overrides).read())
 
     @property
     def normal_form(self) -> SystemNormalForm | NoNormalForm:
@@ -214,7 +214,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
         """Return the file of a Hamiltonian system."""
-        structure: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
+        structure: Any = "standard" if hamiltonian.is_standard else _matrix_rows(hamiltonian.J)
         section = {"H": format_polynomial(hamiltonian.H), "J": structure}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
         return cls(name, "hamiltonian", {}, KahanFamily(hamiltonian.system), hamiltonian, None, {}, None, document)
@@ -224,14 +224,14 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         """Return the file of a member of the family, or of the associated system given by its signs."""
         from kahanmaps.family.cubics import default_variables
 
-        section: dict[str, Any] = {"A": _rows(member.A), "H": format_polynomial(member.H)}
+        section: dict[str, Any] = {"A": _matrix_rows(member.A), "H": format_polynomial(member.H)}
         if any(sign < 0 for sign in member.signs):
             section["signs"] = list(member.signs)
         document: dict[str, Any] = {"name": name, "family": section}
         if member.variables != default_variables(member.dim):
             document["variables"] = list(member.variables)
-        chosen = member.chosen
-        return cls(name, "family", {}, KahanFamily(chosen.system), chosen.hamiltonian, member, {}, None, document)
+        associate = member.chosen
+        return cls(name, "family", {}, KahanFamily(associate.system), associate.hamiltonian, member, {}, None, document)
 
     @classmethod
     def from_conjugate(cls, associate: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
@@ -303,50 +303,50 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     kahanmaps.errors.SystemFileError: example: 1 mistake
       system.rhs: found 2 right-hand sides, expected 1, one for each variable
     """
-    document, notes = _document(text, where)
-    reader = DocumentReader(document, where, parameters or {}, partial(_named, Path(where).parent))
-    reader.inside = (os.path.abspath(where),)
+    document, notes = _parse_document(text, where)
+    reader = DocumentReader(document, where, parameters or {}, partial(_look_up_part, Path(where).parent))
+    reader.enclosing = (os.path.abspath(where),)
     contents = reader.read()
     return SystemFile(**{**contents, "notes": (*notes, *contents["notes"])})
 
 
-def _document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
+def _parse_document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
     """Return the plain data of a text in TOML or with one equation in each line, and notes on its interpretation."""
     is_of_xpp = where.endswith(ENDING)
     try:
         if not is_of_xpp:
             return _TOML.document(text, where), []
     except SystemFileError:
-        is_of_xpp = not where.endswith(".toml") and is_ode(_decoded(text))
+        is_of_xpp = not where.endswith(".toml") and is_ode(_decode(text))
         if not is_of_xpp:
             raise
-    return read_ode(_decoded(text), where)
+    return read_ode(_decode(text), where)
 
 
-def _decoded(text: str | bytes) -> str:
+def _decode(text: str | bytes) -> str:
     return text if isinstance(text, str) else text.decode("utf-8-sig", "replace")
 
 
-def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
+def _look_up_part(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
     """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`."""
     if key == "system":
         generated = family_member(name)
         if generated is not None:
             return generated[1], generated[0], None
-        folder = resources.files("kahanmaps.documents").joinpath("catalog")
+        folder = Path(__file__).parent / "catalog"
         for candidate in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and candidate.is_file():
                 return _TOML.document(candidate.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
-    return _document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_named, path.parent)
+    return _parse_document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_look_up_part, path.parent)
 
 
-def _rows(matrix: fmpq_mat) -> list[list[str]]:
+def _matrix_rows(matrix: fmpq_mat) -> list[list[str]]:
     return [[format_number(entry) for entry in row] for row in matrix.tolist()]
 
 
-def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
+def match_variables(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
     """Return the second of two maps in the variables of the first, and a note if they differ.
 
     Variables are matched by name if both maps have the same names, otherwise by position. Raises InputError if the
@@ -359,7 +359,7 @@ def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
         raise InputError(f"found a {f.root} and a {g.root}, expected the same algebraic number in both systems")
     if f.variables == g.variables:
         return g, ""
-    pair = f"{', '.join(f.variables)} with {', '.join(g.variables)}"
+    pairing = f"{', '.join(f.variables)} with {', '.join(g.variables)}"
     if set(f.variables) == set(g.variables):
-        return KahanFamily(other.system.reordered(f.variables)), f"variables are matched by name: {pair}"
-    return g, f"variables are matched by position: {pair}"
+        return KahanFamily(other.system.reordered(f.variables)), f"variables are matched by name: {pairing}"
+    return g, f"variables are matched by position: {pairing}"

@@ -111,13 +111,11 @@ def System(
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-def _from_hamiltonian(H: Any, variables: Any = None, **parameters: Any) -> SystemFile:
-    return System(None, variables, hamiltonian=H, **parameters)
-
-
 # An alias in the style of other libraries: System.from_sympy([y, x**2], (x, y)).
 vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
-vars(System)["from_hamiltonian"] = _from_hamiltonian
+vars(System)["from_hamiltonian"] = lambda H, variables=None, **parameters: System(
+    None, variables, hamiltonian=H, **parameters
+)
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:

@@ -71,16 +71,16 @@ def parse_with_iterates(
     formula, *definition_texts = pieces
     definitions = {}
     for piece in definition_texts:
-        name, equals, value = (part.strip() for part in piece.partition("="))
+        name, equals, value = (polynomial.strip() for polynomial in piece.partition("="))
         if not equals or not is_name(name):
             expected = "expected what a letter stands for: F0 = x*y~"
             raise InputError(f"found {quoted(piece.strip())} behind a comma, {expected}")
         definitions[name] = value
-    outer, inner = iterates_in(formula), iterates_in(*definitions.values())
-    count = outer + (inner if definitions else 0)
-    if count > MAX_ITERATES:
-        raise InputError(f"found a function of {count} iterates of a point, expected at most {MAX_ITERATES}")
-    names = with_iterates(variables, count, others)
+    shift, inner_shift = iterates_in(formula), iterates_in(*definitions.values())
+    max_shift = shift + (inner_shift if definitions else 0)
+    if max_shift > MAX_ITERATES:
+        raise InputError(f"found a function of {max_shift} iterates of a point, expected at most {MAX_ITERATES}")
+    names = with_iterates(variables, max_shift, others)
     if not definitions:
         return parse_rational_function(formula, names, constants)
     if len(definitions) < len(definition_texts) or {*definitions} & {*variables, *others, *constants}:
@@ -90,20 +90,20 @@ def parse_with_iterates(
         )
     context, n = ring(names), len(variables)
     functions = [parse_polynomial(definition, names, constants) for definition in definitions.values()]
-    letters = with_iterates(tuple(definitions), outer)
+    letters = with_iterates(tuple(definitions), shift)
     function = parse_rational_function(formula, (*letters, *names), constants)
-    parts = (function.numerator, function.denominator)
-    sizes = [len(P) for P in functions] * (outer + 1)
-    monomials = [monomial for part in parts for monomial in part.monoms()]
+    fraction = (function.numerator, function.denominator)
+    sizes = [len(P) for P in functions] * (shift + 1)
+    monomials = [monomial for polynomial in fraction for monomial in polynomial.monoms()]
     if sum(prod(size ** int(e) for size, e in zip(sizes, m, strict=False)) for m in monomials) > _MAX_PRODUCTS:
         raise InputError("found a formula with too many terms after its letters are replaced")
-    gens, coordinates = context.gens(), (count + 1) * n
+    gens, coordinates = context.gens(), (max_shift + 1) * n
 
-    def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
+    def shift_iterates(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
         # Variables of the last iterate have no image in the ring, and do not occur in P.
-        moved = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
-        return P.compose(*moved, *gens[coordinates:], ctx=context)
+        images = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
+        return P.compose(*images, *gens[coordinates:], ctx=context)
 
-    values = [later(P, steps) for steps in range(outer + 1) for P in functions]
-    numerator, denominator = (part.compose(*values, *gens, ctx=context) for part in parts)
+    values = [shift_iterates(P, steps) for steps in range(shift + 1) for P in functions]
+    numerator, denominator = (polynomial.compose(*values, *gens, ctx=context) for polynomial in fraction)
     return RationalFunction(numerator, denominator)

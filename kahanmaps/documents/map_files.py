@@ -18,7 +18,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.composed import ComposedMap, MapFactor, composed_map
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import ElementaryMap, ImplicitMap, Map, MapFamily
+from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily
 from kahanmaps.maps.inverse import Rows
 from kahanmaps.maps.kahan import KahanFamily
 
@@ -50,18 +50,17 @@ def without_eps(map_: Map) -> MapFamily:
     """Convert a map over Q at one eps, or a composition of maps at several, to a map that does not depend on eps."""
     if map_.field is not QQ:
         raise InputError(f"found {map_!r}, expected a map over the rational numbers")
-    variables = map_.variables or tuple(f"x{k + 1}" for k in range(map_.dim))
-    factors = [_factor(factor, variables) for factor in map_.factors]
+    variables = tuple(map_.variables or (f"x{k + 1}" for k in range(map_.dim)))
+    factors = []
+    for factor in map_.factors:
+        is_linear = factor.equation.degree == 1
+        backward = None if is_linear else _equation_rows(factor.inverse.equation, variables)
+        rows = _equation_rows(factor.equation, variables)
+        factors.append(ImplicitMap(variables, rows, "map at one eps", backward=backward))
     return factors[0] if len(factors) == 1 else ComposedMap(variables, [MapFactor(f, False) for f in factors], ())
 
 
-def _factor(factor: ElementaryMap, variables: Sequence[str]) -> ImplicitMap:
-    is_linear = factor.equation.degree == 1
-    backward = None if is_linear else _rows(factor.inverse.equation, variables)
-    return ImplicitMap(tuple(variables), _rows(factor.equation, variables), "map at one eps", backward=backward)
-
-
-def _rows(equation: Equation, variables: Sequence[str]) -> Rows:
+def _equation_rows(equation: Equation, variables: Sequence[str]) -> Rows:
     context = ring((*variables, "eps"))
     monomials = [(*map(int, exponent[:-1]), 0) for exponent in equation.exponents]
     return tuple(tuple(context.from_dict({monomials[k]: c for k, c in form}) for form in row) for row in equation.terms)
@@ -73,8 +72,8 @@ def _document(map_: MapFamily) -> dict[str, Any]:
     if isinstance(map_, KahanFamily):
         return {"variables": variables, "system": {"rhs": [format_polynomial(f) for f in map_.system.rhs]}}
     if isinstance(map_, ComposedMap):
-        parts = [{"map": _document(part.map), "inverse": part.is_inverse} for part in map_.parts]
-        return {"variables": variables, "composition": {"of": parts}}
+        factors = [{"map": _document(factor.map), "inverse": factor.is_inverse} for factor in map_.parts]
+        return {"variables": variables, "composition": {"of": factors}}
     if map_.image is None and all(sum(m[:n]) <= 1 for row in map_.rows for entry in row for m in entry.monoms()):
         equations: Sequence[fmpq_mpoly] = map_.equations  # type: ignore[attr-defined]  # an ImplicitMap
         section = {

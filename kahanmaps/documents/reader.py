@@ -64,8 +64,8 @@ class PartReader:
         self.where = where
         self.overrides = overrides
         self.look_up = look_up
-        self.inside: tuple[str, ...] = ()  # files whose compositions contain this document
-        self.parts = [0]  # number of parts read so far; a list, which the readers of all parts share
+        self.enclosing: tuple[str, ...] = ()  # files whose compositions contain this document
+        self.part_count = [0]  # number of parts read so far; a list, which the readers of all parts share
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
         self.has_bad_parameter = False  # a parameter is invalid: checks that need its value are omitted
@@ -73,13 +73,13 @@ class PartReader:
         self.symbols: tuple[str, ...] = ()  # parameters that stay symbols in the map
         self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number; it is one of the symbols
 
-    def _mistake(self, key: str, sentence: str) -> None:
+    def _report(self, key: str, sentence: str) -> None:
         # Keys come from the file: no escape sequences in them may reach a terminal.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
-    def _refused(self, key: str, sentence: str) -> T | None:
+    def _refuse(self, key: str, sentence: str) -> T | None:
         """Note a mistake and return None."""
-        self._mistake(key, sentence)
+        self._report(key, sentence)
         return None
 
     def _try_make(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
@@ -87,113 +87,113 @@ class PartReader:
         try:
             return make(*arguments)
         except InputError as error:
-            return self._refused(path, str(error))
+            return self._refuse(path, str(error))
 
-    def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
+    def _report_unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
         known_keys = KEYS[section]
         for key in table:
             if key not in known_keys:
                 path = f"{section}.{key}" if section else key
                 hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
-                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known_keys))}{hint}")
+                self._report(path, f"unknown key, expected one of {', '.join(sorted(known_keys))}{hint}")
 
-    def _table(self, key: str) -> dict[str, Any] | None:
+    def _read_table(self, key: str) -> dict[str, Any] | None:
         value = self.document.get(key, {})
         if isinstance(value, dict):
             return value
-        return self._refused(key, f"found {show(value)}, expected a table [{key}]")
+        return self._refuse(key, f"found {show(value)}, expected a table [{key}]")
 
-    def _text(self, path: str, value: Any) -> str | None:
+    def _read_text(self, path: str, value: Any) -> str | None:
         if isinstance(value, int | str) and not isinstance(value, bool):
             return value if isinstance(value, str) else self._try_make(path, format_number, fmpq(value))
-        return self._refused(path, f"found {show(value)}, expected an expression in quotes")
+        return self._refuse(path, f"found {show(value)}, expected an expression in quotes")
 
-    def _polynomial(
-        self, path: str, value: Any, at_most: int, extra_names: Sequence[str] = (), *, of_map: bool = True
+    def _read_polynomial(
+        self, path: str, value: Any, max_degree: int, extra_names: Sequence[str] = (), *, of_map: bool = True
     ) -> fmpq_mpoly | None:
         """Return a polynomial in the variables, `extra_names` and, for a map, the symbols and eps.
 
-        If the text is invalid, or the degree in the variables exceeds `at_most`, note a mistake and return None.
+        If the text is invalid, or the degree in the variables exceeds `max_degree`, note a mistake and return None.
         """
-        text = self._text(path, value)
+        text = self._read_text(path, value)
         if text is None or self.variables is None:
             return None
         try:
-            further_names = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *further_names), self.parameters)
+            map_names = (*self.symbols, "eps") if of_map else ()
+            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *map_names), self.parameters)
         except UnknownName as error:
-            where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
-            return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
+            places = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
+            return self._refuse(path, f"{error}\nif it is a parameter, give its value: {places}")
         except InputError as error:
-            return self._refused(path, str(error))
+            return self._refuse(path, str(error))
         actual_degree = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
-        if actual_degree > at_most and not self.has_bad_parameter:
+        if actual_degree > max_degree and not self.has_bad_parameter:
             degree = "" if actual_degree == 3 else f" and degree = {actual_degree}"
             keys = f'discretization = "polarised"{degree}'
             advice = f"\nfor a field of degree {actual_degree} write {keys} into [system] of a file"
             hint = advice if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
-            return self._refused(
-                path, f"found a polynomial of degree {actual_degree}, expected at most {at_most}{hint}"
+            return self._refuse(
+                path, f"found a polynomial of degree {actual_degree}, expected at most {max_degree}{hint}"
             )
         return polynomial
 
-    def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
+    def _read_matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
         if not isinstance(value, list) or not value or not all(isinstance(row, list) for row in value):
-            return self._refused(path, f'found {show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
+            return self._refuse(path, f'found {show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
         expected = size or len(value)
         if expected > MAX_DIMENSION:
-            return self._refused(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
-        bad = False
+            return self._refuse(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
+        is_invalid = False
         if len(value) != expected:
-            self._mistake(path, f"found {counted(len(value), 'row')}, expected {expected}")
-            bad = True
+            self._report(path, f"found {counted(len(value), 'row')}, expected {expected}")
+            is_invalid = True
         entries: list[fmpq] = []
         for i, row in enumerate(value):
             if len(row) != expected:
-                self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
-                bad = True
+                self._report(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
+                is_invalid = True
             for j, entry in enumerate(row):
                 entry_path = f"{path}[{i + 1}][{j + 1}]"
-                text = self._text(entry_path, entry)
+                text = self._read_text(entry_path, entry)
                 number = None if text is None else self._try_make(entry_path, parse_constant, text, self.parameters)
                 entries.append(fmpq(0) if number is None else number)
-                bad = bad or number is None
-        return None if bad else fmpq_mat(expected, expected, entries)
+                is_invalid = is_invalid or number is None
+        return None if is_invalid else fmpq_mat(expected, expected, entries)
 
-    def _required(self, section: str, table: Mapping[str, Any], key: str) -> Any:
+    def _require(self, section: str, table: Mapping[str, Any], key: str) -> Any:
         if key not in table:
-            self._mistake(f"{section}.{key}", f"missing, expected {EXPECTED[section, key]}")
+            self._report(f"{section}.{key}", f"missing, expected {EXPECTED[section, key]}")
         return table.get(key)
 
-    def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
+    def _read_list(self, section: str, key: str, value: Any, noun: str) -> list[Any] | None:
         """Return a list with one entry for each variable; for other values note a mistake and return None."""
         path = f"{section}.{key}"
         if value is None:
             return None
         if not isinstance(value, list):
-            return self._refused(path, f"found {show(value)}, expected {EXPECTED.get((section, key), 'a list')}")
+            return self._refuse(path, f"found {show(value)}, expected {EXPECTED.get((section, key), 'a list')}")
         if self.variables is None:
             return None
         if len(value) != len(self.variables):
             count = len(self.variables)
-            return self._refused(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
+            return self._refuse(path, f"found {counted(len(value), noun)}, expected {count}, one for each variable")
         return value
 
-    def _each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
+    def _read_each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
         """Read every entry of a list and note all mistakes; return None if an entry cannot be read."""
         entries = value if isinstance(value, list) else []
         results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
         valid = [result for result in results if result is not None]
         return valid if len(valid) == len(results) else None
 
-    def _claim(self, path: str, value: Any) -> RationalFunction | None:
-        text = self._text(path, value)
+    def _read_claim(self, path: str, value: Any) -> RationalFunction | None:
+        text = self._read_text(path, value)
         if text is None or self.variables is None:
             return None
-        others = (*self.symbols, "eps")
+        constant_names = (*self.symbols, "eps")
         if path.startswith("integrals."):
-            return self._try_make(path, parse_with_iterates, text, self.variables, others, self.parameters)
-        return self._try_make(path, parse_rational_function, text, (*self.variables, *others), self.parameters)
+            return self._try_make(path, parse_with_iterates, text, self.variables, constant_names, self.parameters)
+        return self._try_make(path, parse_rational_function, text, (*self.variables, *constant_names), self.parameters)
 
 
 def json_like(value: Any) -> Any:

@@ -33,7 +33,7 @@ GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
 FACT_KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
 MAX_MONOMIALS = 100_000
-_UP_TO = re.compile(r"degree <= ([0-9]{1,3})")
+_DEGREE_BOUND = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")
 
 
@@ -60,8 +60,8 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
     """
     return tuple(
         ClaimedRelations(
-            given if isinstance(given := table["monomials"], str) else ", ".join(given),
-            relation_functions(given, variables),
+            texts if isinstance(texts := table["monomials"], str) else ", ".join(texts),
+            relation_functions(texts, variables),
             table["dimension"],
         )
         for table in section.get("relations", [])
@@ -77,27 +77,27 @@ def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
     (x^2 + y^2, 1)
     """
-    match = _UP_TO.fullmatch(texts) if isinstance(texts, str) else None
+    match = _DEGREE_BOUND.fullmatch(texts) if isinstance(texts, str) else None
     if match is None and not (_are_texts(texts) and texts):
         raise InputError(f'found {show(texts)}, expected "degree <= d" or a list of polynomials')
     if match is not None:
-        top = int(match[1])
-        count = comb(top + len(variables), top)
+        max_degree = int(match[1])
+        count = comb(max_degree + len(variables), max_degree)
         if count > MAX_MONOMIALS:
             raise InputError(f"found {show(texts)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
         context = ring(variables)
-        exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
+        exponents = chain.from_iterable(monomials(len(variables), d) for d in range(max_degree + 1))
         return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
     if len(texts) > MAX_MONOMIALS:
         raise InputError(f"found {len(texts)} functions, expected at most {MAX_MONOMIALS}")
     functions = tuple(parse_polynomial(text, variables) for text in texts)
-    seen = set()
+    earlier_texts = set()
     for k, function in enumerate(functions):
         if function.is_zero():
             raise InputError(f"found 0 as function {k + 1}, expected functions that are not zero")
-        if str(function) in seen:
+        if str(function) in earlier_texts:
             raise InputError(f"found function {k + 1} twice, expected different ones")
-        seen.add(str(function))
+        earlier_texts.add(str(function))
     return functions
 
 
@@ -105,8 +105,10 @@ def read_structured_facts(
     section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
     """Validate a [catalog] section whose keys are known to be valid; call `mistake(key, sentence)` for each mistake."""
-    at_most = 10**9 if variables is None else len(variables)
-    bound = "an integer, 0 or more" if variables is None else f"an integer from 0 to {at_most}, the dimension"
+    max_codimension = 10**9 if variables is None else len(variables)
+    codimension_text = "an integer, 0 or more"
+    if variables is not None:
+        codimension_text = f"an integer from 0 to {max_codimension}, the dimension"
     rules: dict[str, tuple[Callable[[Any], bool], str]] = {
         **dict.fromkeys(("title", "convention"), (lambda value: isinstance(value, str), "text")),
         "sources": (lambda value: _are_texts(value) and set(value) <= set(SOURCES), "a list of keys of sources.py"),
@@ -119,12 +121,12 @@ def read_structured_facts(
         ),
         "growth": (GROWTHS.__contains__, f"one of {', '.join(GROWTHS)}"),
         "verdict": (VERDICTS.__contains__, f"one of {', '.join(VERDICTS)}"),
-        "dynamical_degree": (_is_minimal, "an irreducible polynomial in x with leading coefficient 1"),
-        "codimension": (lambda value: type(value) is int and 0 <= value <= at_most, bound),
+        "dynamical_degree": (_is_minimal_polynomial, "an irreducible polynomial in x with leading coefficient 1"),
+        "codimension": (lambda value: type(value) is int and 0 <= value <= max_codimension, codimension_text),
         "relations": (_are_tables, "tables [[catalog.relations]]"),
     }
-    for key, (is_good, expected) in rules.items():
-        if key in section and not is_good(section[key]):
+    for key, (is_valid, expected) in rules.items():
+        if key in section and not is_valid(section[key]):
             mistake(f"catalog.{key}", f"found {show(section[key])}, expected {expected}")
     tables = section.get("relations", [])
     for k, table in enumerate(tables if _are_tables(tables) else ()):
@@ -154,7 +156,7 @@ def _are_tables(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(item, dict) for item in value)
 
 
-def _is_minimal(text: Any) -> bool:
+def _is_minimal_polynomial(text: Any) -> bool:
     try:
         polynomial = parse_polynomial(text, ["x"])
     except InputError:

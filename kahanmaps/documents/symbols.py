@@ -33,7 +33,7 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily
     """
     if file.map.unsupported_reason:
         raise InputError(file.map.unsupported_reason)
-    symbols = _parameters(file, symbols)
+    symbols = _require_parameters(file, symbols)
     if not symbols:
         return file.map
     return DocumentReader(dict(file.document), file.name, {}).read_map(file.kind, symbols)
@@ -48,7 +48,7 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
     x~ = y
     y~ = (y + 1/3)/x
     """
-    _parameters(file, list(values))
+    _require_parameters(file, list(values))
     document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}
     numbers = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
     title = f"{file.name} at {', '.join(f'{name} = {numbers[name]}' for name in values)}"
@@ -79,7 +79,7 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     return map_.system
 
 
-def _parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
+def _require_parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
     """Return the names without repetition. Raises InputError for a name that is not a parameter."""
     for name in symbols:
         if name not in file.parameters:

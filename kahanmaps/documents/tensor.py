@@ -30,18 +30,18 @@ def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     """
     file = as_file(system)
     symbols = [GENERATOR] if GENERATOR in file.parameters else []
-    lifted = over_algebra(with_symbols(file, symbols), chi)
+    system_over_Q = over_algebra(with_symbols(file, symbols), chi)
     document: dict[str, Any] = {
         "name": f"{file.name} over Q[t]/({format_univariate(chi)})",
-        "variables": list(lifted.variables),
-        "system": {"rhs": [format_polynomial(polynomial) for polynomial in lifted.rhs]},
+        "variables": list(system_over_Q.variables),
+        "system": {"rhs": [format_polynomial(polynomial) for polynomial in system_over_Q.rhs]},
     }
     if not symbols:
         try:
             integrals = {
-                f"{name}_{k}": format_rational_function(part)
+                f"{name}_{k}": format_rational_function(component)
                 for name, function in file.integrals.items()
-                for k, part in enumerate(inherited_integrals(function, chi))
+                for k, component in enumerate(inherited_integrals(function, chi))
             }
             if integrals:
                 document["integrals"] = integrals

@@ -23,7 +23,7 @@ class TomlKind(NamedTuple):
     """A kind of TOML file: its name, the largest size, and the class of errors that report its mistakes."""
 
     name: str
-    most: int
+    max_bytes: int
     error: type[SystemFileError]
 
     def read(self, path: str | Path) -> bytes:
@@ -35,7 +35,7 @@ class TomlKind(NamedTuple):
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
                 raise InputError(f"cannot read the {self.name} {path}: it is a pipe or a device, expected a file")
             with open(path, "rb") as stream:
-                return stream.read(self.most + 1)
+                return stream.read(self.max_bytes + 1)
         except InputError:  # InputError is also a ValueError
             raise
         except OSError as error:
@@ -45,8 +45,8 @@ class TomlKind(NamedTuple):
 
     def document(self, text: str | bytes, where: str) -> dict[str, Any]:
         """Parse TOML to plain data, with decimals as text; `where` names it in messages. Raises `error`, InputError."""
-        if len(text) > self.most:
-            raise InputError(f"{where} is larger than {self.most} bytes, the limit for a {self.name}")
+        if len(text) > self.max_bytes:
+            raise InputError(f"{where} is larger than {self.max_bytes} bytes, the limit for a {self.name}")
         try:
             # Some editors put a byte order mark first.
             decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
@@ -77,14 +77,14 @@ def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[
             lines.append(f"{key} = {_toml_value(document[key])}")
     for section in sections:
         if section in document and document[section] is not None:
-            plain = {
+            entries = {
                 key: value
                 for key, value in document[section].items()
                 if not (isinstance(value, list) and value and all(isinstance(item, dict) for item in value))
             }
-            lines += ["", f"[{section}]", *_lines(plain)]
+            lines += ["", f"[{section}]", *_lines(entries)]
             for key, tables in document[section].items():
-                if key not in plain:
+                if key not in entries:
                     for table in tables:
                         lines += ["", f"[[{section}.{_toml_key(key)}]]", *_lines(table)]
     return "\n".join(lines) + "\n"
@@ -95,8 +95,8 @@ def _lines(table: Mapping[str, Any]) -> list[str]:
 
 
 def _toml_key(key: str) -> str:
-    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if bare else _toml_string(key)
+    is_bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if is_bare else _toml_string(key)
 
 
 def _toml_value(value: Any) -> str:
@@ -111,11 +111,11 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, int):
         # TOML readers written in Python refuse long decimals without quotes.
         return str(value) if value.bit_length() <= 10_000 else _toml_string(str(fmpz(value)))
-    parts = [_toml_value(item) for item in value]
-    line = f"[{', '.join(parts)}]"
+    items = [_toml_value(item) for item in value]
+    line = f"[{', '.join(items)}]"
     if len(line) <= 100 and not any(isinstance(item, list) for item in value):
         return line
-    return "[\n" + "".join(f"  {part},\n" for part in parts) + "]"
+    return "[\n" + "".join(f"  {text},\n" for text in items) + "]"
 
 
 def _toml_string(text: str) -> str:

@@ -16,10 +16,10 @@ from kahanmaps.documents.equations import derivative_at, is_name, tokens_of
 from kahanmaps.errors import InputError, SystemFileError, quoted
 
 ENDING = ".ode"
-_VALUES = ("p", "par", "param", "params", "parameter", "parameters", "n", "num", "number", "numbers")
-_INITIAL = ("i", "init", "ic", "initial")
-_LEFT_OUT = ("a", "aux", "b", "bdry", "bndry", "set", "options", "only", "export", "command")
-_READ = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
+_PARAMETER_KEYWORDS = ("p", "par", "param", "params", "parameter", "parameters", "n", "num", "number", "numbers")
+_INITIAL_KEYWORDS = ("i", "init", "ic", "initial")
+_SKIPPED_KEYWORDS = ("a", "aux", "b", "bdry", "bndry", "set", "options", "only", "export", "command")
+_EXPECTED = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
 
 
 def is_ode(text: str) -> bool:
@@ -46,7 +46,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
     >>> read_ode("# decay\\npar a=.5 b=2\\ninit x=1\\nx'=-a*X+b\\n@ total=9\\ndone", "decay.ode")[0]
     {'parameters': {'a': '.5', 'b': '2'}, 'system': {'rhs': ["x'=-a*x+b"]}}
     """
-    reader = _Lines()
+    reader = _OdeReader()
     mistakes: list[tuple[str, str]] = []
     lines = text.replace("\\\r\n", "").replace("\\\n", "").split("\n")
     for number, line in enumerate(lines, 1):
@@ -57,11 +57,11 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
         except InputError as error:
             mistakes.append((f"line {number}", str(error)))
     if not reader.equations and not mistakes:
-        mistakes.append(("file", f"found no equations, expected a system file in TOML, or one of XPP: {_READ}"))
+        mistakes.append(("file", f"found no equations, expected a system file in TOML, or one of XPP: {_EXPECTED}"))
     if mistakes:
         raise SystemFileError(where, mistakes)
     try:
-        equations = [left_side + reader.expanded(right_side) for left_side, right_side in reader.equations]
+        equations = [left_side + reader.expand(right_side) for left_side, right_side in reader.equations]
     except InputError as error:
         raise SystemFileError(where, [("file", str(error))]) from error
     document = {"parameters": reader.parameters, "system": {"rhs": equations}}
@@ -71,19 +71,19 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
     if reader.initial:
         start = ", ".join(f"{name} = {value}" for name, value in reader.initial.items())
         notes.append(f"the initial values {start} are left out: --start gives them, in the order of the variables")
-    if reader.left_out:
-        notes.append(f"left out, being about the integration: {', '.join(reader.left_out)}")
+    if reader.skipped:
+        notes.append(f"left out, being about the integration: {', '.join(reader.skipped)}")
     return document, notes
 
 
-class _Lines:
+class _OdeReader:
     """The content of the lines read so far."""
 
     def __init__(self) -> None:
         self.equations: list[tuple[str, list[str]]] = []  # the left side as text, the right side as tokens
         self.parameters: dict[str, str] = {}
         self.initial: dict[str, str] = {}
-        self.left_out: dict[str, None] = {}
+        self.skipped: dict[str, None] = {}
         self.notes: list[str] = []
         self.definitions: dict[str, str] = {}
         self.has_capitals = False  # whether names in the file contain capital letters
@@ -93,56 +93,54 @@ class _Lines:
         if not line or line[0] in '#"':
             return
         if line[0] == "@":
-            self.left_out["@"] = None
+            self.skipped["@"] = None
             return
         self.has_capitals |= line != line.lower()
-        word, arguments = [*line.lower().split(None, 1), ""][:2]
+        keyword, arguments = [*line.lower().split(None, 1), ""][:2]
         tokens = tokens_of(line.lower().lstrip("!"))
-        tokens_kept = [token for token in tokens if not token.isspace()]
-        is_keyword = is_name(word) and is_name(arguments[:1])
-        if is_keyword and word in _LEFT_OUT:
-            self.left_out[word] = None
-        elif is_keyword and word in (*_VALUES, *_INITIAL):
-            self._values(tokens_kept[1:], self.parameters if word in _VALUES else self.initial)
-        elif (equals_at := next((k for k, token in enumerate(tokens_kept) if token == "="), None)) is None:
-            raise InputError(f"found {quoted(line)}, expected {_READ}")
-        elif len(tokens_kept) > 5 and tokens_kept[1:5] == ["(", "0", ")", "="]:
-            self.initial[tokens_kept[0]] = "".join(tokens_kept[5:])
+        words = [token for token in tokens if not token.isspace()]
+        is_keyword = is_name(keyword) and is_name(arguments[:1])
+        if is_keyword and keyword in _SKIPPED_KEYWORDS:
+            self.skipped[keyword] = None
+        elif is_keyword and keyword in (*_PARAMETER_KEYWORDS, *_INITIAL_KEYWORDS):
+            # Pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; in init a name alone means 0, as in XPP.
+            is_parameter, k = keyword in _PARAMETER_KEYWORDS, 1
+            while k < len(words):
+                name = words[k]
+                if not is_name(name):
+                    raise InputError(f"found {quoted(name)}, expected NAME=NUMBER, as in par a=1, b=2.5")
+                value, k = "0", k + 1
+                if words[k : k + 1] == ["="]:
+                    end = k + 1 + (words[k + 1 : k + 2] in (["-"], ["+"]))
+                    if words[end + 1 : end + 2] == ["/"]:  # XPP ignores the rest of the line, without a message
+                        end += 2
+                        fraction = "".join(words[k + 1 : end + 1])
+                        self.notes.append(f"{name} = {fraction} is read literally, unlike in XPP")
+                    value, k = "".join(words[k + 1 : end + 1]), end + 1
+                elif is_parameter:  # XPP would use 0, which is rarely intended
+                    raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
+                (self.parameters if is_parameter else self.initial)[name] = value
+                k += words[k : k + 1] == [","]
+        elif (equals_at := next((k for k, token in enumerate(words) if token == "="), None)) is None:
+            raise InputError(f"found {quoted(line)}, expected {_EXPECTED}")
+        elif len(words) > 5 and words[1:5] == ["(", "0", ")", "="]:
+            self.initial[words[0]] = "".join(words[5:])
         else:
-            derivative = derivative_at(tokens_kept[:equals_at], 0)
+            derivative = derivative_at(words[:equals_at], 0)
             is_equation = derivative is not None and derivative.end == equals_at
-            if not is_equation and (equals_at != 1 or not is_name(tokens_kept[0])):
-                raise InputError(f"found {quoted(line)}, expected {_READ}: write functions, arrays and maps out")
-            split = tokens.index("=") + 1
+            if not is_equation and (equals_at != 1 or not is_name(words[0])):
+                raise InputError(f"found {quoted(line)}, expected {_EXPECTED}: write functions, arrays and maps out")
+            formula_start = tokens.index("=") + 1
             if is_equation:
-                self.equations.append(("".join(tokens[:split]), tokens[split:]))
+                self.equations.append(("".join(tokens[:formula_start]), tokens[formula_start:]))
             else:  # a definition NAME = formula, which may contain earlier definitions
-                self.definitions[tokens_kept[0]] = f"({self.expanded(tokens[split:])})"
+                self.definitions[words[0]] = f"({self.expand(tokens[formula_start:])})"
 
-    def _values(self, tokens: list[str], values: dict[str, str]) -> None:
-        """Read pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; in init a name alone means 0, as in XPP."""
-        k = 0
-        while k < len(tokens):
-            name = tokens[k]
-            if not is_name(name):
-                raise InputError(f"found {quoted(name)}, expected NAME=NUMBER, as in par a=1, b=2.5")
-            value, k = "0", k + 1
-            if tokens[k : k + 1] == ["="]:
-                end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
-                if tokens[end + 1 : end + 2] == ["/"]:  # XPP ignores the rest of the line, without a message
-                    end += 2
-                    self.notes.append(f"{name} = {''.join(tokens[k + 1 : end + 1])} is read literally, unlike in XPP")
-                value, k = "".join(tokens[k + 1 : end + 1]), end + 1
-            elif values is self.parameters:  # XPP would use 0, which is rarely intended
-                raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
-            values[name] = value
-            k += tokens[k : k + 1] == [","]
-
-    def expanded(self, tokens: list[str]) -> str:
+    def expand(self, tokens: list[str]) -> str:
         """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
-        parts = [self.definitions.get(token, token) for token in tokens]
-        if sum(map(len, parts)) > LIMITS.characters:
+        pieces = [self.definitions.get(token, token) for token in tokens]
+        if sum(map(len, pieces)) > LIMITS.characters:
             raise InputError(
                 f"found a formula of more than {LIMITS.characters} characters after its definitions are inserted"
             )
-        return "".join(parts).strip()
+        return "".join(pieces).strip()

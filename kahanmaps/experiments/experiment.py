@@ -35,7 +35,7 @@ PARAMETERS = "parameters."  # prefix of option names that set a parameter of the
 DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
-_FAMILY_WORD = "family"
+_FAMILY = "family"
 _MAX_FILES = 10_000
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
@@ -79,7 +79,7 @@ _EXPERIMENT = (
 _EXPERIMENTS = (dict, "at least one table [experiments.NAME]", _EXPERIMENT)
 _SPEC = {"name": (str, "text"), "on_error": _ON_ERROR, "limits": _LIMITS, "experiments": _EXPERIMENTS}
 _REQUIRED = ("experiments", "task")
-_OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
+_SYSTEM_FILE_KEYS = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]]:
@@ -88,11 +88,11 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
     """
-    mistakes = _mistakes(document, (dict, "a table", _SPEC), ())
+    mistakes = _find_mistakes(document, (dict, "a table", _SPEC), ())
     return [(path, key_of(path), sentence) for path, sentence in mistakes]
 
 
-def _mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
+def _find_mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     """Yield the path of each part of `value` that does not have the expected shape, and a sentence that says why."""
     if callable(shape):
         try:
@@ -104,26 +104,26 @@ def _mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, 
     if not isinstance(value, kind) or (shape is _EXPERIMENTS and not value):
         yield path, f"found {show(value)}, expected {expected}"
         return
-    (parts,) = inner or [None]
-    if isinstance(parts, tuple):
+    (shapes,) = inner or [None]
+    if isinstance(shapes, tuple):
         for name, item in enumerate(value) if kind is list else value.items():
-            yield from _mistakes(item, parts, (*path, name))
-    elif parts is not None:
-        for name, part in parts.items():
+            yield from _find_mistakes(item, shapes, (*path, name))
+    elif shapes is not None:
+        for name, inner_shape in shapes.items():
             if name in value:
-                yield from _mistakes(value[name], part, (*path, name))
+                yield from _find_mistakes(value[name], inner_shape, (*path, name))
             elif name in _REQUIRED:
-                yield (*path, name), f"missing, expected {part[1]}"
-        for name in (name for name in value if name not in parts):
-            unknown = (*path, name)
-            is_of_system = unknown in _OF_SYSTEM_FILES
-            hint = " (a system file is for the other commands)" if is_of_system else suggestion(name, list(parts))
-            yield unknown, f"unknown key, expected one of {', '.join(parts)}{hint}"
+                yield (*path, name), f"missing, expected {inner_shape[1]}"
+        for name in (name for name in value if name not in shapes):
+            unknown_path = (*path, name)
+            is_of_system = unknown_path in _SYSTEM_FILE_KEYS
+            hint = " (a system file is for the other commands)" if is_of_system else suggestion(name, list(shapes))
+            yield unknown_path, f"unknown key, expected one of {', '.join(shapes)}{hint}"
 
 
 def key_of(path: KeyPath) -> str:
     """Return a path as text; positions in lists are counted from 1, as in experiments.a.zip[1]."""
-    return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
 
 
 class SpecDocument:
@@ -152,7 +152,7 @@ class SpecDocument:
 
     def valid_value(self, *path: str | int) -> Any:
         """Return the value at a path; None if it is missing or has a wrong shape."""
-        if any(bad == path[: len(bad)] for bad in self._misshapen):
+        if any(misshapen == path[: len(misshapen)] for misshapen in self._misshapen):
             return None
         value: Any = self.document
         for key in path:
@@ -195,14 +195,14 @@ class Experiment:
             if not isinstance(values, AxisValues):
                 axes[name] = list(values)
                 continue
-            read, axes[name] = values.option.read, []
+            read_value, axes[name] = values.option.read, []
             for piece in values.pieces:
                 if isinstance(piece, RationalRange):  # a range is represented by its end points
-                    axes[name].append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
+                    axes[name].append({"from": read_value(piece[0]), "to": read_value(piece[-1]), "count": len(piece)})
                 else:
                     axes[name].append(list(piece))
-        order = [list(group) for group in self.grid.groups]
-        return canonical({"first": self[0].text, "axes": axes, "order": order})
+        groups = [list(group) for group in self.grid.groups]
+        return canonical({"first": self[0].text, "axes": axes, "order": groups})
 
     def __getitem__(self, index: int) -> Task:
         values = {**self.fixed, **self.grid[index]}
@@ -244,7 +244,7 @@ class ExperimentReader:
             self.mistake("on_error", f'found {show(on_error)}, expected "refuse" or "skip"')
         self._skips = self.spec.skip_bad or on_error == "skip"
         if (name := self.valid_value("task")) is not None:
-            with self._at("task"):
+            with self._report_errors_at("task"):
                 self.kind = task_kind(name)
         system_specs = self._read_systems()
         kind = self.kind
@@ -252,27 +252,46 @@ class ExperimentReader:
             return None  # the meaning of options depends on the task
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
         keys: dict[str, str] = {}
-        for option, option_key, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
+        for option, option_key, _ in [entry for table in ("options", "axes") for entry in self.entries(table)]:
             if option in keys:
-                both = {option_key.rpartition(".")[2], keys[option].rpartition(".")[2]}
-                hint = " (the time step is 2 eps)" if TIME_STEP in both and len(both) > 1 else ""
+                option_names = {option_key.rpartition(".")[2], keys[option].rpartition(".")[2]}
+                hint = " (the time step is 2 eps)" if TIME_STEP in option_names and len(option_names) > 1 else ""
                 self.mistake(option_key, f"found {keys[option]} as well, expected one of the two{hint}")
             keys.setdefault(option, option_key)
         zips = self._read_zips(axes)
-        limits = self._read_limits(kind, fixed)
+        own_limits = self.valid_value("limits") or {}
+        time, memory, digits = (
+            self.valid_value("limits", name) or self.spec.valid_value("limits", name)
+            for name in ("time", "memory", "digits")
+        )
+        if "digits" in own_limits and self.valid_value("limits", "digits") is None:
+            pass  # reported as a wrong shape
+        elif "max_digits" not in kind.options:
+            if "digits" in own_limits:
+                self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
+        elif (max_digits_key := self.given().get("max_digits")) is not None:
+            if "digits" in own_limits:
+                self.mistake("limits.digits", f"found {max_digits_key} as well, expected one of the two")
+        elif digits is not None:
+            fixed["max_digits"] = AxisValues(VOCABULARY["max_digits"], [(digits,)])
+        limits = TaskLimits(
+            DEFAULT_LIMITS.time if time is None else read_time(time),
+            DEFAULT_LIMITS.memory if memory is None else read_memory(memory),
+        )
         self._require_options(kind)
         if len(self.spec.mistakes) > reported_before:
             return None
-        constant = {key: values[0] for key, values in fixed.items()}
+        shared_values = {key: values[0] for key, values in fixed.items()}
         grid_axes: dict[str, Sequence[Any]] = dict(axes)
         if len(system_specs) == 1:
-            constant["system"] = system_specs[0]
+            shared_values["system"] = system_specs[0]
         elif system_specs:
             grid_axes = {"system": system_specs, **axes}
-        return Experiment(self.name, kind, system_specs, constant, Grid(grid_axes, zips), limits, tuple(self.skipped))
+        grid = Grid(grid_axes, zips)
+        return Experiment(self.name, kind, system_specs, shared_values, grid, limits, tuple(self.skipped))
 
     @contextmanager
-    def _at(self, key: str) -> Iterator[None]:
+    def _report_errors_at(self, key: str) -> Iterator[None]:
         """Report an InputError that the block raises as a mistake at this key."""
         try:
             yield
@@ -287,45 +306,45 @@ class ExperimentReader:
         """Return the value at a path in this table; None if it is missing or has a wrong shape."""
         return self.spec.valid_value("experiments", self.name, *path)
 
-    def entries(self, part: str) -> list[tuple[str, str, Any]]:
-        """Return a canonical name, a key and a value for each entry of the table `part` (options or axes)."""
+    def entries(self, table: str) -> list[tuple[str, str, Any]]:
+        """Return a canonical name, a key and a value for each entry of the table `table` (options or axes)."""
         entries: list[tuple[str, str, Any]] = []
-        for key, raw in (self.valid_value(part) or {}).items():
+        for key, raw in (self.valid_value(table) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
-                entries += [(f"{PARAMETERS}{name}", f"{part}.{key}.{name}", value) for name, value in raw.items()]
+                entries += [(f"{PARAMETERS}{name}", f"{table}.{key}.{name}", value) for name, value in raw.items()]
             else:
-                entries.append(("eps" if key == TIME_STEP else key, f"{part}.{key}", raw))
+                entries.append(("eps" if key == TIME_STEP else key, f"{table}.{key}", raw))
         return entries
 
     def given(self) -> dict[str, str]:
         """Map the canonical name of each option in the spec, valid or not, to its key."""
-        return {name: key for part in ("axes", "options") for name, key, _ in self.entries(part)}
+        return {name: key for table in ("axes", "options") for name, key, _ in self.entries(table)}
 
-    def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
-        """Map the canonical name of each option in the table `part` to its valid values, and report invalid ones."""
+    def _read_values(self, kind: TaskKind, table: str) -> dict[str, AxisValues]:
+        """Map the canonical name of each option in the table `table` to its valid values, and report invalid ones."""
         valid: dict[str, AxisValues] = {}
-        for name, key, raw in self.entries(part):
-            with self._at(key):
+        for name, key, raw in self.entries(table):
+            with self._report_errors_at(key):
                 if name == "parameters" and self.has_parameters:
                     raise InputError(f"found {show(raw)}, expected a table of parameters")
-                option = self._find_option(kind, name, key.removeprefix(f"{part}."))
-                if part == "options" and isinstance(raw, list):
+                option = self._find_option(kind, name, key.removeprefix(f"{table}."))
+                if table == "options" and isinstance(raw, list):
                     raise InputError("found a list, expected one value; lists and ranges go to axes")
                 values = self._read_axis(key, option, raw)
-                if values is not None and part == "options" and len(values) > 1:
+                if values is not None and table == "options" and len(values) > 1:
                     raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
                 if values is not None:
                     valid[name] = values
         return valid
 
-    def _find_option(self, kind: TaskKind, name: str, written: str) -> Option:
+    def _find_option(self, kind: TaskKind, name: str, written_name: str) -> Option:
         """Return the option or parameter of this name. Raises InputError if there is no such option."""
         if name.startswith(PARAMETERS) and self.has_parameters:
-            key = name.removeprefix(PARAMETERS)
+            parameter = name.removeprefix(PARAMETERS)
             for file in self.files:
-                if key not in file.parameters:
+                if parameter not in file.parameters:
                     parameter_names = ", ".join(file.parameters) or "none"
-                    hint = suggestion(key, list(file.parameters))
+                    hint = suggestion(parameter, list(file.parameters))
                     raise InputError(f"{file.name} has no such parameter, its parameters are: {parameter_names}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
@@ -340,7 +359,7 @@ class ExperimentReader:
             raise InputError(f"{kind.name} no longer has this option, expected {replacement}")
         names = [*options, *([TIME_STEP] if "eps" in options else [])]
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
-        raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
+        raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written_name, names)}")
 
     def _read_axis(self, key: str, option: Option, raw: Any) -> AxisValues | None:
         """Return the values of one option; None after reporting a mistake."""
@@ -353,98 +372,76 @@ class ExperimentReader:
         if key.endswith(f".{TIME_STEP}"):
             read_eps = option.read  # reads half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
-        zipped = {name for names in self._written_zips() for name in names or []}
-        values, mistakes = read_values(option, raw, repeats=option.name in zipped)
+        zipped_names = {name for names in self._canonical_zips() for name in names or []}
+        values, mistakes = read_values(option, raw, repeats=option.name in zipped_names)
         for position, sentence in mistakes:
             self.mistake(key + "".join(f"[{k}]" for k in position), sentence)
         return values
 
-    def _written_zips(self) -> list[list[str] | None]:
+    def _canonical_zips(self) -> list[list[str] | None]:
         """Return the canonical names of the axes of each zip; None for a zip of wrong shape, already reported."""
         zips: list[list[str] | None] = []
-        for number, written in enumerate(self.valid_value("zip") or []):
-            is_valid = self.valid_value("zip", number) is not None
-            is_valid = is_valid and all(self.valid_value("zip", number, k) is not None for k in range(len(written)))
-            zips.append(["eps" if name == TIME_STEP else name for name in written] if is_valid else None)
+        for index, names in enumerate(self.valid_value("zip") or []):
+            is_valid = self.valid_value("zip", index) is not None
+            is_valid = is_valid and all(self.valid_value("zip", index, k) is not None for k in range(len(names)))
+            zips.append(["eps" if name == TIME_STEP else name for name in names] if is_valid else None)
         return zips
 
     def _read_zips(self, axes: Mapping[str, AxisValues]) -> list[tuple[str, ...]]:
         zips: list[tuple[str, ...]] = []
-        used: set[str] = set()
+        used_names: set[str] = set()
         given_axes = {name for name, _, _ in self.entries("axes")}
-        for number, names in enumerate(self._written_zips(), start=1):
+        for number, names in enumerate(self._canonical_zips(), start=1):
             key = f"zip[{number}]"
             if names is None:
                 continue
-            unknown = [name for name in names if name not in axes]
-            for name in unknown:
+            unknown_names = [name for name in names if name not in axes]
+            for name in unknown_names:
                 if name not in given_axes:  # the values of an axis in the spec are invalid, and were reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
-            repeated = [name for k, name in enumerate(names) if name in names[:k] or name in used]
+            repeated_names = [name for k, name in enumerate(names) if name in names[:k] or name in used_names]
             if len(names) < 2:
                 self.mistake(key, f"found {show(names)}, expected at least two axes that run together")
                 continue
-            used |= set(names)
-            for name in repeated:
+            used_names |= set(names)
+            for name in repeated_names:
                 self.mistake(key, f"found {name} twice, expected every axis in one zip at most")
-            if not unknown and not repeated:
+            if not unknown_names and not repeated_names:
                 zips.append(tuple(names))
                 lengths = {name: len(axes[name]) for name in names}
                 if len(set(lengths.values())) > 1:
                     counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
                     self.mistake(key, f"{counts} values, expected equal numbers: the axes of a zip run together")
                 elif any(has_repeats(axes[name]) for name in names):
-                    rows: dict[tuple[str, ...], int] = {}
+                    positions: dict[tuple[str, ...], int] = {}
                     for k in range(1, 1 + lengths[names[0]]):
                         row = tuple(repr(axes[name][k - 1]) for name in names)
-                        if rows.setdefault(row, k) != k:
+                        if positions.setdefault(row, k) != k:
                             self.mistake(
-                                key, f"found equal values at positions {rows[row]} and {k}, expected them once"
+                                key, f"found equal values at positions {positions[row]} and {k}, expected them once"
                             )
                             break
         return zips
 
-    def _read_limits(self, kind: TaskKind, fixed: dict[str, AxisValues]) -> TaskLimits:
-        own_limits = self.valid_value("limits") or {}
-        time, memory, digits = (
-            self.valid_value("limits", name) or self.spec.valid_value("limits", name)
-            for name in ("time", "memory", "digits")
-        )
-        key = self.given().get("max_digits")
-        if "digits" in own_limits and self.valid_value("limits", "digits") is None:
-            pass  # reported as a wrong shape
-        elif "max_digits" not in kind.options:
-            if "digits" in own_limits:
-                self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
-        elif key is not None:
-            if "digits" in own_limits:
-                self.mistake("limits.digits", f"found {key} as well, expected one of the two")
-        elif digits is not None:
-            fixed["max_digits"] = AxisValues(VOCABULARY["max_digits"], [(digits,)])
-        return TaskLimits(
-            DEFAULT_LIMITS.time if time is None else read_time(time),
-            DEFAULT_LIMITS.memory if memory is None else read_memory(memory),
-        )
-
     def _require_options(self, kind: TaskKind) -> None:
-        if any(self.valid_value(part) is None and part in self.raw for part in ("options", "axes")):
+        if any(self.valid_value(table) is None and table in self.raw for table in ("options", "axes")):
             return  # an option that seems to be missing may be in a table of wrong shape
-        given = self.given()
+        keys = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)
         for name in kind.required:
-            if name not in given and (name != "eps" or needs_eps):
+            if name not in keys and (name != "eps" or needs_eps):
                 self.mistake(f"axes.{name}", f"missing, expected {kind.options[name].help} (in axes or options)")
-        if _EPS2 in given and kind.needs == MEMBER_OR_OTHER:
+        if _EPS2 in keys and kind.needs == MEMBER_OR_OTHER:
             for name, reason in ((OTHER, "it is the eps of a second system"), ("eps", "without it every eps is meant")):
-                if name not in given:
-                    self.mistake(given[_EPS2], f"found no {name}, expected one with eps2: {reason}")
+                if name not in keys:
+                    self.mistake(keys[_EPS2], f"found no {name}, expected one with eps2: {reason}")
         if not self.is_family:
             return
-        if not {"m", "eigenvalues", "chi"} & given.keys():
+        if not {"m", "eigenvalues", "chi"} & keys.keys():
             self.mistake("axes.m", "missing, expected m (half the dimension), eigenvalues or chi in axes or options")
         for first, second in _CONTRADICTIONS:
-            if first in given and second in given:
-                self.mistake(given[second], f"found {given[first]} as well, expected one of {first} and {second}")
+            if first in keys and second in keys:
+                self.mistake(keys[second], f"found {keys[first]} as well, expected one of {first} and {second}")
 
     # Systems
 
@@ -468,7 +465,7 @@ class ExperimentReader:
         references = raw if isinstance(raw, list) else [raw]
         if not references:
             self.mistake("system", "found an empty list, expected at least one system")
-        if _FAMILY_WORD in references:
+        if _FAMILY in references:
             self.is_family = True
             if len(references) > 1:
                 self.mistake("system", 'found "family" among others, expected it alone: add another experiment')
@@ -481,7 +478,7 @@ class ExperimentReader:
         names: dict[str, str] = {}  # digest of a document -> name of its file
         for number, reference in enumerate(references, start=1):
             item_key = f"{key}[{number}]" if len(references) > 1 else key
-            with self._at(item_key):
+            with self._report_errors_at(item_key):
                 for name in self._match_files(reference):
                     try:
                         file = find_file(name, self.spec.folder)
@@ -492,7 +489,7 @@ class ExperimentReader:
                         if self._skips and key == "system":
                             self.skipped.append((name, str(error)))
                         else:
-                            self.mistake(item_key, f"{error}{suggestion(name, [_FAMILY_WORD])}")
+                            self.mistake(item_key, f"{error}{suggestion(name, [_FAMILY])}")
                         continue
                     if system_spec["document"] in system_specs:
                         same_document = f"{name} says the same as {names[system_spec['document']]}"
@@ -504,7 +501,7 @@ class ExperimentReader:
                     system_specs[system_spec["document"]], names[system_spec["document"]] = system_spec, name
                     if key == "system":
                         self.files.append(file)
-                        with self._at(item_key):
+                        with self._report_errors_at(item_key):
                             self._require_kind(file)
         if self.skipped and not system_specs:
             name, reason = self.skipped[0]
@@ -513,7 +510,7 @@ class ExperimentReader:
 
     def _match_files(self, reference: str) -> list[str]:
         """Return the reference itself, or the files that match a pattern such as members/*.toml."""
-        if not any(mark in reference for mark in "*?["):
+        if not any(wildcard in reference for wildcard in "*?["):
             return [reference]
         if Path(reference).is_absolute() or not reference.endswith(ENDINGS):
             raise InputError(

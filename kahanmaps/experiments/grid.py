@@ -45,17 +45,17 @@ class RationalRange(Sequence[fmpq]):
         if count >= _MAX_VALUES:
             raise InputError(f"found a range from {show(first)} to {show(last)} in steps of {show(step)}: {_TOO_MANY}")
         self._scale = lcm(int(first.q), int(last.q), int(step.q))
-        start, stop, scaled = (int((self._scale * part).p) for part in (first, last, step))
-        self.numerators = range(start, stop + (1 if scaled > 0 else -1), scaled)
+        start, stop, scaled_step = (int((self._scale * number).p) for number in (first, last, step))
+        self.numerators = range(start, stop + (1 if scaled_step > 0 else -1), scaled_step)
 
     @classmethod
     def from_text(cls, text: str) -> RationalRange:
         """Read a range such as "2..5". Raises InputError for any other text."""
-        first, dots, bounds = text.partition("..")
-        parts = bounds.split()
-        if not dots or not first.strip() or not (len(parts) == 1 or (len(parts) == 3 and parts[1] == "step")):
+        first, separator, last_and_step = text.partition("..")
+        words = last_and_step.split()
+        if not separator or not first.strip() or not (len(words) == 1 or (len(words) == 3 and words[1] == "step")):
             raise InputError(f"found {show(text)}, {_RANGE_FORM}")
-        return cls(parse_number(first), parse_number(parts[0]), parse_number(parts[2]) if len(parts) > 1 else fmpq(1))
+        return cls(parse_number(first), parse_number(words[0]), parse_number(words[2]) if len(words) > 1 else fmpq(1))
 
     def __len__(self) -> int:
         return len(self.numerators)
@@ -98,7 +98,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
     """
     pieces: list[Sequence[Any]] = []
     mistakes: list[Mistake] = []
-    seen: dict[Any, int] = {}
+    positions: dict[Any, int] = {}
     items = raw if isinstance(raw, list) else [raw]
     if not items:
         mistakes.append(((), "found an empty list, expected at least one value"))
@@ -109,15 +109,15 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
                 values_range = RationalRange.from_text(item)
                 # If both end points are valid, so are all values between them, except eps = 0 and fractions.
                 values = AxisValues(option, [values_range])
-                zero = values_range.numerators.index(0) if 0 in values_range.numerators else 0
-                for k in {0, min(1, len(values_range) - 1), len(values_range) - 1, zero}:
+                zero_index = values_range.numerators.index(0) if 0 in values_range.numerators else 0
+                for k in {0, min(1, len(values_range) - 1), len(values_range) - 1, zero_index}:
                     values[k]
                 pieces.append(values_range)
                 continue
             value = option.read(item)
-            if value in seen and not repeats:
-                raise InputError(f"found {show(item)}, the same value as in place {seen[value]}: expected it once")
-            seen[value] = number
+            if value in positions and not repeats:
+                raise InputError(f"found {show(item)}, the same value as in place {positions[value]}: expected it once")
+            positions[value] = number
             pieces.append((value,))
         except InputError as error:
             mistakes.append((position, str(error)))
@@ -128,8 +128,8 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
 
 def has_repeats(values: AxisValues) -> bool:
     """Whether a single value occurs several times, not counting values in ranges."""
-    single = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
-    return len(set(single)) < len(single)
+    single_values = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
+    return len(set(single_values)) < len(single_values)
 
 
 class Grid:

@@ -43,7 +43,7 @@ def degrees(growth: DegreeGrowth) -> Result:
     """Compute degrees of the iterates: growth, dynamical degree, recurrence."""
     return {
         "status": growth.ended,
-        **_growth(growth),
+        **_growth_entries(growth),
         "estimate": growth.estimate,
         "degrees": list(growth.degrees),
         "reached": len(growth.degrees) - 1,
@@ -95,7 +95,7 @@ def scan_parameters(
 def integrals(search: IntegralSearch) -> Result:
     """Search for rational integrals, and find their number by theorems and by orbits."""
     return {
-        "verdict": _weakest(verdict for _, verdict in search.formulas),
+        "verdict": _weakest_verdict(verdict for _, verdict in search.formulas),
         "status": _state_of_integrals(search),
         "integrals": search.formula_count,
         "codimension": search.codimension if search.profile.nullities else search.by_theorems or None,
@@ -112,7 +112,7 @@ def integrals(search: IntegralSearch) -> Result:
 def density(search: DensitySearch) -> Result:
     """Search for invariant volume forms dx/phi with phi of least degree or a product of powers."""
     return {
-        "verdict": _weakest(density.verdict for density in search.densities),
+        "verdict": _weakest_verdict(density.verdict for density in search.densities),
         "status": _state_of_densities(search),
         "densities": len(search.densities),
         "degree_tried": None if search.degree < 0 else search.degree,
@@ -135,7 +135,7 @@ def density(search: DensitySearch) -> Result:
 def poisson(search: PoissonSearch) -> Result:
     """Search for Poisson tensors with polynomial entries: number, ranks, Casimirs among the integrals."""
     return {
-        "verdict": _weakest(tensor.verdict for tensor in search.tensors),
+        "verdict": _weakest_verdict(tensor.verdict for tensor in search.tensors),
         "status": "found" if search.tensors else "none" if search.reason.startswith("no tensor") else "open",
         "tensors": len(search.tensors),
         "degree_tried": None if search.degree < 0 else search.degree,
@@ -193,9 +193,9 @@ def all_analyses(result: Analysis) -> Result:
     """Run all analyses: integrability, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
-    final, confined = result.conclusion, {run.verdict for run in result.singularities}
+    conclusion, verdicts = result.conclusion, {run.verdict for run in result.singularities}
     # The analyses that were begun but not completed, since the work limit was reached or formulas were missing.
-    states = {
+    is_finished = {
         "degrees": result.degrees is None or result.degrees.recurrence is not None or result.degrees.ended in _ENDINGS,
         "integrals": result.integrals is None or _state_of_integrals(result.integrals) == "complete",
         "densities": result.densities is None or _state_of_densities(result.densities) != "open",
@@ -203,19 +203,19 @@ def all_analyses(result: Analysis) -> Result:
         "commuting systems": result.commuting is None or result.commuting.complete,
         "singularities": not any(run.stopped or run.verdict == "undecided" for run in result.singularities),
     }
-    unfinished = [name for name, is_done in states.items() if not is_done]
+    unfinished = [name for name, is_done in is_finished.items() if not is_done]
     return {
         "status": "partial" if result.skipped or unfinished else "complete",
-        "integrability": final.kind,
-        "integrals": final.integrals if result.integrals_were_counted else None,
-        **(_growth(result.degrees) if result.degrees is not None else {}),
-        "growth": final.growth,
+        "integrability": conclusion.kind,
+        "integrals": conclusion.integrals if result.integrals_were_counted else None,
+        **(_growth_entries(result.degrees) if result.degrees is not None else {}),
+        "growth": conclusion.growth,
         "densities": None if result.densities is None else len(result.densities.densities),
         "group_order": None if result.symmetries is None else result.symmetries.order,
         "commuting": None if result.commuting is None else len(result.commuting.nontrivial),
-        "confinement": None if not confined else confined.pop() if len(confined) == 1 else "undecided",
+        "confinement": None if not verdicts else verdicts.pop() if len(verdicts) == 1 else "undecided",
         "in_family": isinstance(result.normal_form, SystemNormalForm),
-        "sentence": final.sentence,
+        "sentence": conclusion.sentence,
         "unfinished": unfinished,
         "skipped": result.skipped,
     }
@@ -234,19 +234,19 @@ def confinement(
     from kahanmaps.laboratory.singular.outcomes import NOT_CONTRACTED, UNDECIDED
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 
-    values = default_eps(system.map, seed) if eps is None else (eps,)
-    runs = [singularities(system.map, value, steps=steps, seed=seed, effort=effort) for value in values]
-    agree = len({run.shape for run in runs}) == 1
+    eps_values = default_eps(system.map, seed) if eps is None else (eps,)
+    runs = [singularities(system.map, value, steps=steps, seed=seed, effort=effort) for value in eps_values]
+    is_consistent = len({run.shape for run in runs}) == 1
     first = runs[0]
     result: Result = {
-        "confinement": first.verdict if agree else UNDECIDED,
-        "status": "budget" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
+        "confinement": first.verdict if is_consistent else UNDECIDED,
+        "status": "budget" if any(run.stopped for run in runs) else "complete" if is_consistent else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
         "followed": first.followed,  # number of steps, if some singularity is not confined
         **fields(first, "map_degree", "critical_degree"),
         "exceptional_count": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
         "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),
-        "hypersurfaces": _hypersurfaces(first),
+        "hypersurfaces": _hypersurface_entries(first),
     }
     if report:
         result["report"] = [
@@ -254,7 +254,7 @@ def confinement(
                 "eps": format_number(run.eps),
                 **fields(run, "verdict", "denominator"),
                 "polynomials": [h.polynomial for h in run.hypersurfaces],
-                "hypersurfaces": _hypersurfaces(run),
+                "hypersurfaces": _hypersurface_entries(run),
             }
             for run in runs
         ]
@@ -276,9 +276,9 @@ def cycles(
 
     if steps is not None and samples is None:
         raise InputError(f"found steps = {steps} without samples, expected both: only samples have a last step")
-    values = (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,)
+    eps_values = (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,)
     limits: dict[str, Any] = {"samples": samples, "steps": steps or DEFAULT_STEPS, "seed": seed}
-    runs = [cycle_census(system.map, value, prime, **limits) for value in values]
+    runs = [cycle_census(system.map, value, prime, **limits) for value in eps_values]
     return {
         "status": "complete" if all(census.complete for census in runs) else "sampled",
         "points": str(runs[0].points),  # as text: it may exceed the integers of a database
@@ -318,14 +318,14 @@ def lyapunov(
         "status": "completed" if len(result.exponents) else "no orbit left",
         "ended": result.ended,
         "counted": result.steps,
-        "largest": _number(mean[0]),
-        "smallest": _number(mean[-1]),
-        "exponents": [_number(value) for value in mean],
-        "spread": [_number(value) for value in result.spread],
-        "change_from_half": [_number(value) for value in result.change],
-        "sum": _number(mean.sum()),
-        "log_volume": _number(volume.mean()) if len(volume) else None,
-        "residual": _number(result.residual) if len(volume) else None,
+        "largest": _json_number(mean[0]),
+        "smallest": _json_number(mean[-1]),
+        "exponents": [_json_number(value) for value in mean],
+        "spread": [_json_number(value) for value in result.spread],
+        "change_from_half": [_json_number(value) for value in result.change],
+        "sum": _json_number(mean.sum()),
+        "log_volume": _json_number(volume.mean()) if len(volume) else None,
+        "residual": _json_number(result.residual) if len(volume) else None,
     }
 
 
@@ -344,12 +344,12 @@ def _state_of_densities(search: DensitySearch) -> str:
     return "none" if search.reason.startswith("no polynomial") else "open"
 
 
-def _weakest(verdicts: Iterable[Certainty]) -> str | None:
-    given = list(verdicts)
-    return str(combined(given)) if given else None
+def _weakest_verdict(verdicts: Iterable[Certainty]) -> str | None:
+    verdict_list = list(verdicts)
+    return str(combined(verdict_list)) if verdict_list else None
 
 
-def _growth(growth: DegreeGrowth) -> Result:
+def _growth_entries(growth: DegreeGrowth) -> Result:
     """Return the entries on the growth of degrees."""
     recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
@@ -365,7 +365,7 @@ def _growth(growth: DegreeGrowth) -> Result:
     }
 
 
-def _hypersurfaces(run: SingularityRun) -> list[Result]:
+def _hypersurface_entries(run: SingularityRun) -> list[Result]:
     return [
         {
             **fields(h, "degree", "divides_denominator", "multiplicity", "status", "contracted_at", "confined_at"),
@@ -376,6 +376,6 @@ def _hypersurfaces(run: SingularityRun) -> list[Result]:
     ]
 
 
-def _number(value: Any) -> float | None:
+def _json_number(value: Any) -> float | None:
     """Return a number as a Python float, which JSON can represent."""
     return float(value) if isfinite(value) else None

@@ -59,11 +59,11 @@ def exact(name: str, help: str, *, zero: bool = True) -> Option:
     return Option(name, help, read, parse_number, numbers=True)
 
 
-def integer(name: str, help: str, least: int = 0, most: int = _MAX_INTEGER) -> Option:
-    """Return an option whose value is an integer from `least` to `most`."""
+def integer(name: str, help: str, minimum: int = 0, maximum: int = _MAX_INTEGER) -> Option:
+    """Return an option whose value is an integer from `minimum` to `maximum`."""
 
     def read(value: Any) -> int:
-        return _integer(value, f"an integer from {least} to {most}", range(least, most + 1))
+        return _read_integer(value, f"an integer from {minimum} to {maximum}", range(minimum, maximum + 1))
 
     return Option(name, help, read, int, numbers=True)
 
@@ -79,39 +79,39 @@ def flag(name: str, help: str) -> Option:
     return Option(name, help, read, bool)
 
 
-def choice(name: str, help: str, words: Sequence[str]) -> Option:
-    """Return an option whose value is one of `words`."""
+def choice(name: str, help: str, choices: Sequence[str]) -> Option:
+    """Return an option whose value is one of `choices`."""
 
     def read(value: Any) -> str:
-        if value not in words:
-            raise InputError(f"found {show(value)}, expected one of {', '.join(words)}{suggestion(value, words)}")
+        if value not in choices:
+            raise InputError(f"found {show(value)}, expected one of {', '.join(choices)}{suggestion(value, choices)}")
         return str(value)
 
     return Option(name, help, read, str)
 
 
-def point(name: str, help: str, most: int | None = None) -> Option:
+def point(name: str, help: str, max_count: int | None = None) -> Option:
     """Return an option whose value is a text of numbers separated by commas; a list would be several values."""
 
     def read(value: Any) -> str:
-        numbers = parse_point(_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
-        if most is not None and len(numbers) > most:
-            raise InputError(f"found {len(numbers)} numbers, expected at most {most}")
+        numbers = parse_point(_require_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
+        if max_count is not None and len(numbers) > max_count:
+            raise InputError(f"found {len(numbers)} numbers, expected at most {max_count}")
         return format_point(numbers)
 
     return Option(name, help, read, parse_point)
 
 
-def integers(name: str, help: str, expected: str, allowed: Sequence[int], ordered: bool = False) -> Option:
+def integers(name: str, help: str, expected: str, allowed: Sequence[int], is_ordered: bool = False) -> Option:
     """Return an option whose value is a text of integers separated by commas, or a single integer.
 
-    Unless `ordered`, the integers form a set: its canonical form is increasing, without repetitions.
+    Unless `is_ordered`, the integers form a set: its canonical form is increasing, without repetitions.
     """
 
     def read(value: Any) -> str:
-        given = parse_point(value) if isinstance(value, str) else (value,)
-        numbers = [_integer(number, f"{expected}, separated by commas in one text", allowed) for number in given]
-        return ",".join(map(str, numbers if ordered else sorted(set(numbers))))
+        items = parse_point(value) if isinstance(value, str) else (value,)
+        numbers = [_read_integer(number, f"{expected}, separated by commas in one text", allowed) for number in items]
+        return ",".join(map(str, numbers if is_ordered else sorted(set(numbers))))
 
     return Option(name, help, read, lambda value: tuple(int(number) for number in value.split(",")))
 
@@ -129,7 +129,7 @@ def _read_arithmetic(value: Any) -> str:
 
 def _read_prime(value: Any) -> str:
     expected = f"a prime of at most {_PRIME_BITS} bits"
-    number = _integer(value, expected, range(2, 1 << _PRIME_BITS))
+    number = _read_integer(value, expected, range(2, 1 << _PRIME_BITS))
     GF(number)
     return str(number)  # as text: JSON and databases may be unable to represent long integers
 
@@ -142,7 +142,7 @@ def _read_names(value: Any) -> str:
 
 def _read_names_or_eps(value: Any) -> str:
     expected = 'names of parameters in one text, e.g. "a1,a2"'
-    names = sorted({name.strip() for name in _text(value, expected).split(",")})
+    names = sorted({name.strip() for name in _require_text(value, expected).split(",")})
     for name in names:
         if not _NAME.fullmatch(name):
             raise InputError(f"found the name {show(name)}, expected {expected}")
@@ -150,19 +150,19 @@ def _read_names_or_eps(value: Any) -> str:
 
 
 def _read_chi(value: Any) -> str:
-    polynomial = parse_chi(_text(value, 'a polynomial in t, as text, e.g. "t^2 - 2"'))
+    polynomial = parse_chi(_require_text(value, 'a polynomial in t, as text, e.g. "t^2 - 2"'))
     if polynomial.degree() > MAX_M:
         raise InputError(f"found a polynomial of degree {polynomial.degree()}, expected at most {MAX_M}")
     return format_univariate(polynomial / polynomial.leading_coefficient())
 
 
-def _text(value: Any, expected: str) -> str:
+def _require_text(value: Any, expected: str) -> str:
     if not isinstance(value, str):
         raise InputError(f"found {show(value)}, expected {expected}")
     return value
 
 
-def _integer(value: Any, expected: str, allowed: Sequence[int]) -> int:
+def _read_integer(value: Any, expected: str, allowed: Sequence[int]) -> int:
     number = number_of(value)
     if number.q != 1 or int(number.p) not in allowed:
         raise InputError(f"found {show(number)}, expected {expected}")
@@ -183,7 +183,7 @@ def read_time(value: Any) -> float | None:
     (90.0, None)
     """
     expected = "seconds, or a text like 90 s, 5 min, 2 h, none"
-    seconds = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MAX_SECONDS)
+    seconds = _read_amount(value, _TIME_UNITS, expected, Fraction(1, 1000), _MAX_SECONDS)
     return None if seconds is None else float(seconds)
 
 
@@ -194,11 +194,11 @@ def read_memory(value: Any) -> int | None:
     1500000000
     """
     expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
-    size = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MAX_BYTES)
+    size = _read_amount(value, _MEMORY_UNITS, expected, Fraction(1), _MAX_BYTES)
     return None if size is None else int(size)
 
 
-def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fraction, most: int) -> Fraction | None:
+def _read_amount(value: Any, units: Mapping[str, int], expected: str, least: Fraction, maximum: int) -> Fraction | None:
     if value == _NONE:
         return None
     text = value if isinstance(value, str) else show(value)
@@ -206,9 +206,9 @@ def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fract
     if match is None or (match[2] and match[2] not in units):
         raise ValueError(f"found {show(value)}, expected {expected}")
     amount = Fraction(match[1]) * units.get(match[2], 1)
-    if not least <= amount <= most:
+    if not least <= amount <= maximum:
         unit = "s" if units is _TIME_UNITS else "bytes"
-        raise ValueError(f"found {show(value)}, expected {float(least):g} to {float(most):g} {unit}, or none")
+        raise ValueError(f"found {show(value)}, expected {float(least):g} to {float(maximum):g} {unit}, or none")
     return amount
 
 
@@ -222,14 +222,14 @@ VOCABULARY = {
         exact("eps2", "half the time step of the second map", zero=False),
         Option(OTHER, "a second system: a file or a name of the catalogue", str, str),
         point("start", "initial point of the orbit (default: random)"),
-        integer("steps", "number of steps of the orbit", most=10**9),
+        integer("steps", "number of steps of the orbit", maximum=10**9),
         integer("orbits", "number of orbits", 1, 10**6),
         exact("box", "bound R for the coordinates of random initial points, from -R to R"),
         integer("every", "use every N-th step only", 1, 10**9),
         integers("at", "iterates to compute directly", "integers from 0 to 10^18", range(10**18 + 1)),
         integer("seed", "random seed"),
         integer("error_bits", "test random points until the error probability is below 2^-BITS", 1, 10_000),
-        integer("max_digits", "digit budget of exact orbits", least=1),
+        integer("max_digits", "digit budget of exact orbits", minimum=1),
         choice("method", "method of exact orbits", ("generic", "normal-form", "doubling")),
         Option("arithmetic", "exact, float, mod:P or ball:BITS", _read_arithmetic, str),
         Option("prime", "prime of modular arithmetic", _read_prime, int),
@@ -246,7 +246,7 @@ VOCABULARY = {
         integer("m", "half the dimension", 1, 16),
         integer(EFFORT, "work limit of the search: each increment by 1 doubles it", LEAST_EFFORT, MOST_EFFORT),
         integer("terms", "compute this number of degrees (default: until a recurrence is certain)", 1, 10_000),
-        integer("max_degree", "largest degree to try", most=10**6),
+        integer("max_degree", "largest degree to try", maximum=10**6),
         Option(
             "symbolic",
             "parameters that stay symbolic in formulas, e.g. a1,a2",
@@ -260,7 +260,7 @@ VOCABULARY = {
         ),
         choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
         integer("samples", "follow this number of random points instead of all points", 1, 100_000),
-        integer("transient", "initial steps to discard (default: a tenth)", most=10**9),
+        integer("transient", "initial steps to discard (default: a tenth)", maximum=10**9),
     )
 }
 
@@ -279,7 +279,7 @@ FAMILY = {
             "signs of the associated system: 1 or -1 for each factor of chi",
             "1 or -1",
             (1, -1),
-            ordered=True,
+            is_ordered=True,
         ),
     )
 }

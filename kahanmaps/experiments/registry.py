@@ -61,7 +61,7 @@ class TaskKind:
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
         """Perform the task; `options` are canonical, except that the option `other` is a system."""
         options = dict(options)
-        is_full = self.reports and options.pop(REPORT, False)
+        is_report_requested = self.reports and options.pop(REPORT, False)
         arguments = {
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
@@ -70,8 +70,8 @@ class TaskKind:
             arguments["eps"] = self.options["eps"].make("1")
         result = self.function(**arguments) if self.needs is None else self.function(system, **arguments)
         if isinstance(result, tuple):
-            result, reported = result
-            result |= {REPORT: reported.to_json()} if is_full else {}
+            result, report = result
+            result |= {REPORT: report.to_json()} if is_report_requested else {}
         return result
 
 
@@ -106,15 +106,15 @@ def task(
         unknown = [key for key in names if key not in VOCABULARY]
         if unknown:
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
-        if (
-            name in _KINDS and _KINDS[name].function.__code__ != function.__code__
-        ):  # the same task, registered again when its module is imported twice
+        # Equal code is the same task, registered again when its module is imported twice.
+        if name in _KINDS and _KINDS[name].function.__code__ != function.__code__:
             raise TypeError(f"there are two tasks with the name {name}")
         if reports:
             names, defaults[REPORT] = [*names, REPORT], False
-        known = {key: VOCABULARY[key] for key in names}
+        task_options = {key: VOCABULARY[key] for key in names}
         summary = (inspect.getdoc(function) or "").partition("\n")[0]
-        _KINDS[name] = TaskKind(name, summary, function, known, defaults, needs if takes_system else None, reports)
+        needs_system = needs if takes_system else None
+        _KINDS[name] = TaskKind(name, summary, function, task_options, defaults, needs_system, reports)
         return function
 
     return register
@@ -133,8 +133,8 @@ def analysis(
         def perform(system: Any, **options: Any) -> FullResult:
             module, _, attribute = function.partition(":")
             argument = getattr(system, of) if of else system
-            given = {renamed.get(key, key): value for key, value in options.items() if value is not None}
-            result = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(argument, **given)
+            arguments = {renamed.get(key, key): value for key, value in options.items() if value is not None}
+            result = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(argument, **arguments)
             return summarize(result), result
 
         perform.__doc__, perform.__module__ = summarize.__doc__, summarize.__module__

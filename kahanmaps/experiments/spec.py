@@ -100,9 +100,9 @@ def parse_spec(
             experiments.append(experiment)
     spec = Spec(document.valid_value("name") or "", tuple(experiments), document.documents)
     if spec.size > max_tasks:
-        largest = sorted(experiments, key=lambda experiment: -experiment.size)
-        sizes = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest[:_MAX_LISTED])
-        more = f" and {len(largest) - _MAX_LISTED} more" if len(largest) > _MAX_LISTED else ""
+        largest_first = sorted(experiments, key=lambda experiment: -experiment.size)
+        sizes = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest_first[:_MAX_LISTED])
+        more = f" and {len(largest_first) - _MAX_LISTED} more" if len(largest_first) > _MAX_LISTED else ""
         sentence = f"found {spec.size:,} tasks, expected at most {max_tasks:,} (--max-tasks allows more): {sizes}{more}"
         document.mistake("experiments", sentence)
     if document.mistakes:

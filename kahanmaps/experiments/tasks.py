@@ -31,11 +31,11 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
-_MIN_COMPILED = 5_000_000  # orbits times steps
+_MIN_COMPILED_WORK = 5_000_000  # orbits times steps
 _MAX_POINT = 400  # maximal number of characters of a stored last point; a longer point is stored as its hash only
 
 
-_CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
+_OPTIONS = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
 def _register_check(check: Check) -> None:
@@ -47,7 +47,7 @@ def _register_check(check: Check) -> None:
         return _full_result(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
-    options = {"other": None, "eps": None, "eps2": None, **_CHECKED} if check.is_of_pair else _CHECKED
+    options = {"other": None, "eps": None, "eps2": None, **_OPTIONS} if check.is_of_pair else _OPTIONS
     task(check.command, needs=MEMBER_OR_OTHER if check.is_of_pair else SYSTEM, options=options, reports=True)(perform)
 
 
@@ -136,12 +136,12 @@ def orbit(
         max_digits=max_digits,
         normal_form=normal_form,
     )
-    reached = deque(trajectory, 1)
-    if not reached:  # the orbit may end before the first requested iterate
+    points = deque(trajectory, 1)
+    if not points:  # the orbit may end before the first requested iterate
         first = trajectory.orbit.start
         exact = parsed_arithmetic.kind == "exact"
-        reached.append(OrbitPoint(0, parsed_arithmetic.field, IntegerPoint.from_rationals(first) if exact else first))
-    last = reached[0]
+        points.append(OrbitPoint(0, parsed_arithmetic.field, IntegerPoint.from_rationals(first) if exact else first))
+    last = points[0]
     end = trajectory.end
     result: Result = {
         "start": format_point(point),
@@ -178,19 +178,19 @@ def ensemble(
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     normal_form = float_normal_form(system, method)
-    chosen = choose_method(method, "float", normal_form, None)
-    form = normal_form.form if chosen.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
+    choice = choose_method(method, "float", normal_form, None)
+    form = normal_form.form if choice.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
     # Both kernels give the same numbers, but compiling takes longer than a short task.
-    kernel = "numpy" if orbits * steps < _MIN_COMPILED else None
+    kernel = "numpy" if orbits * steps < _MIN_COMPILED_WORK else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
     statuses, counts = run.status.tolist(), Counter(run.status.tolist())
-    alive = [k for k, word in enumerate(statuses) if word == "completed"]
+    completed = [k for k, status in enumerate(statuses) if status == "completed"]
     return {
-        "method": chosen.name,
-        **{word: counts[word] for word in ("completed", "overflow", "singular")},
+        "method": choice.name,
+        **{status: counts[status] for status in ("completed", "overflow", "singular")},
         "near_singular": int((run.near_singular > 0).sum()),
-        "largest_drift": max((float(drift.largest[alive].max()) for drift in run.drift if alive), default=None),
+        "largest_drift": max((float(drift.largest[completed].max()) for drift in run.drift if completed), default=None),
     }
 
 
@@ -243,13 +243,14 @@ def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
 
 def _full_result(report: Report) -> FullResult:
     """Return the verdict, the counts of verdicts, and the refuted or undecided claims with their witnesses."""
-    counted = [finding for finding in report.findings if finding.applies and not finding.control]
-    counts = Counter(finding.verdict for finding in counted)
+    findings = [finding for finding in report.findings if finding.applies and not finding.control]
+    counts = Counter(finding.verdict for finding in findings)
     controls = [finding for finding in report.findings if finding.control]
-    doubtful = [finding.to_json() for finding in counted if finding.verdict in (Certainty.REFUTED, Certainty.UNDECIDED)]
+    problems = (Certainty.REFUTED, Certainty.UNDECIDED)
+    doubtful = [finding.to_json() for finding in findings if finding.verdict in problems]
     return {
         "verdict": str(report.verdict),
-        "claims": len(counted),
+        "claims": len(findings),
         **{str(verdict): counts[verdict] for verdict in Certainty},
         "controls": len(controls),
         "controls_refuted": sum(finding.verdict is Certainty.REFUTED for finding in controls),

@@ -83,11 +83,11 @@ class ConjugateAssociate:
             for monomial, number in H.terms():
                 terms[monomial] = terms.get(monomial, 0 * coefficient) + coefficient * number
         context = self.chain[0].context()
-        ordered = context.from_dict({monomial: 1 for monomial, c in terms.items() if c != 0}).monoms()
+        monomials = context.from_dict({monomial: 1 for monomial, c in terms.items() if c != 0}).monoms()
         term_texts = (
             f"({format_univariate(terms[monomial].polynomial, self.name)})*"
             f"{format_polynomial(context.from_dict({monomial: 1}))}"
-            for monomial in ordered
+            for monomial in monomials
         )
         return " + ".join(term_texts) or "0"
 
@@ -117,10 +117,10 @@ class FamilyMember(HtmlDisplay, ResultPart):
         if not self.signs:
             object.__setattr__(self, "signs", (1,) * count)
         if len(self.signs) != count or any(sign not in (1, -1) for sign in self.signs):
-            named = ", ".join(f"({factor})" for factor in self.factors)
+            factors_text = ", ".join(f"({factor})" for factor in self.factors)
             raise HypothesisError(
                 f"found the signs {list(self.signs)}, expected {count} numbers 1 or -1: "
-                f"one for each irreducible factor of chi, here {named}"
+                f"one for each irreducible factor of chi, here {factors_text}"
             )
 
     @property
@@ -175,8 +175,8 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
     def associated(self) -> Iterator[AssociatedSystem]:
         """Yield the rational associated systems, one of each pair f, -f: 2^(r-1) for r factors; f_0 is the first."""
-        for other_signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
-            yield self.associate((1, *other_signs))
+        for remaining_signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
+            yield self.associate((1, *remaining_signs))
 
     @cached_property
     def roots(self) -> dict[int, Root]:
@@ -201,20 +201,20 @@ class FamilyMember(HtmlDisplay, ResultPart):
             quotient = [root.number_field.one]  # chi/(x - t), leading coefficient first
             for c in chi(self.A).coeffs()[-2:0:-1]:
                 quotient.append(quotient[-1] * root.number_field.generator + c)
-            at_root = sum(
+            value_at_root = sum(
                 (c * root.number_field.generator**j for j, c in enumerate(reversed(quotient))), 0 * quotient[0]
             )
-            flipped = [2 * c / at_root for c in reversed(quotient)]
+            twice_idempotent = [2 * c / value_at_root for c in reversed(quotient)]
             for signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
                 associate = self.associate((*signs[:k], 1, *signs[k:]))
-                coefficients = tuple(a - b for a, b in zip(associate.coefficients, flipped, strict=True))
+                coefficients = tuple(a - b for a, b in zip(associate.coefficients, twice_idempotent, strict=True))
                 yield ConjugateAssociate(root, associate.signs, coefficients, self.chain)
 
     @property
     def text(self) -> str:
         """The factors of chi and the signs, as a phrase."""
-        factors = "".join(f"({factor})" for factor in self.factors)
-        return f"m = {self.m}, roots of {factors}, signs {self.chosen.label}"
+        chi_text = "".join(f"({factor})" for factor in self.factors)
+        return f"m = {self.m}, roots of {chi_text}, signs {self.chosen.label}"
 
     @property
     def system(self) -> QuadraticSystem:
@@ -252,8 +252,8 @@ def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_pol
         modulus *= factor.polynomial**factor.multiplicity
     total = fmpq_poly([0])
     for factor, sign in zip(factors, signs, strict=True):
-        part = factor.polynomial**factor.multiplicity
-        cofactor = modulus // part
-        _, inverse, _ = cofactor.xgcd(part)
-        total += sign * cofactor * (inverse % part)
+        factor_power = factor.polynomial**factor.multiplicity
+        cofactor = modulus // factor_power
+        _, inverse, _ = cofactor.xgcd(factor_power)
+        total += sign * cofactor * (inverse % factor_power)
     return total % modulus

@@ -53,29 +53,26 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     names = variables or default_variables(n)
     context = ring(names)
     exponents = list(monomials(n, 3))
-    position = {_indices(exponent): k for k, exponent in enumerate(exponents)}
-    weight = {key: _symmetry(key) for key in position}
-    entries = [(i, k, A[i, k]) for i in range(n) for k in range(n) if A[i, k] != 0]
-    by_row: list[list[tuple[int, fmpq]]] = [[] for _ in range(n)]
-    for i, k, value in entries:
-        by_row[i].append((k, value))
+    column = {_indices(exponent): k for k, exponent in enumerate(exponents)}
+    weights = {indices: _third_derivative_of_monomial(indices) for indices in column}
+    row_entries = [[(k, A[i, k]) for k in range(n) if A[i, k] != 0] for i in range(n)]
     zero = fmpq(0)
-    flat: list[fmpq] = []
-    equations = 0
+    coefficients: list[fmpq] = []
+    equation_count = 0
     # The matrix A Hess - Hess A^T is skew and linear in x: it gives one equation for each i < j and each variable x_l.
     for i in range(n):
         for j in range(i + 1, n):
             for l in range(n):
                 row = [zero] * len(exponents)
-                for k, value in by_row[i]:
-                    key = tuple(sorted((k, j, l)))
-                    row[position[key]] += value * weight[key]
-                for k, value in by_row[j]:
-                    key = tuple(sorted((i, k, l)))
-                    row[position[key]] -= value * weight[key]
-                flat += row
-                equations += 1
-    solutions = nullspace(QQ, fmpq_mat(equations, len(exponents), flat))
+                for k, value in row_entries[i]:
+                    indices = tuple(sorted((k, j, l)))
+                    row[column[indices]] += value * weights[indices]
+                for k, value in row_entries[j]:
+                    indices = tuple(sorted((i, k, l)))
+                    row[column[indices]] -= value * weights[indices]
+                coefficients += row
+                equation_count += 1
+    solutions = nullspace(QQ, fmpq_mat(equation_count, len(exponents), coefficients))
     basis = tuple(
         context.from_dict({exponents[k]: fmpq(c) for k, c in enumerate(primitive_integers(vector)) if c != 0})
         for vector in solutions
@@ -95,9 +92,9 @@ def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
             f"A is {A.nrows()} x {A.ncols()} and H has {len(names_of(H))} variables, expected as many as A has rows"
         )
     if not is_homogeneous(H, 3):
-        other = next(exponent for exponent in H.monoms() if sum(exponent) != 3)
-        term = H.context().from_dict({tuple(other): fmpq(1)})
-        raise HypothesisError(f"H has the term {term} of degree {sum(other)}, expected a homogeneous cubic")
+        monomial = next(exponent for exponent in H.monoms() if sum(exponent) != 3)
+        term = H.context().from_dict({tuple(monomial): fmpq(1)})
+        raise HypothesisError(f"H has the term {term} of degree {sum(monomial)}, expected a homogeneous cubic")
     failure = next(_failures(A, H), None)
     if failure is not None:
         i, j, l, left, right = failure
@@ -138,8 +135,8 @@ def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
 def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq, fmpq]]:
     """Yield entries (i, j, variable l) in which A T_l and T_l A^T differ, where T_l is d(Hess H)/dx_l."""
     n = A.nrows()
-    for l, third in enumerate(third_derivatives(H)):
-        left = A * third
+    for l, T in enumerate(third_derivatives(H)):
+        left = A * T
         for i in range(n):
             for j in range(i + 1, n):
                 if left[i, j] != left[j, i]:
@@ -149,13 +146,13 @@ def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq,
 def third_derivatives(H: fmpq_mpoly) -> list[fmpq_mat]:
     """Return the constant matrices T_l = d(Hess H)/dx_l of a homogeneous cubic."""
     n = len(names_of(H))
-    tensors = [[fmpq(0)] * (n * n) for _ in range(n)]
+    matrices = [[fmpq(0)] * (n * n) for _ in range(n)]
     for exponent, coefficient in H.terms():
-        key = _indices(tuple(exponent))
-        value = coefficient * _symmetry(key)
-        for a, b, c in {(key[i], key[j], key[3 - i - j]) for i in range(3) for j in range(3) if i != j}:
-            tensors[a][b * n + c] = value
-    return [fmpq_mat(n, n, tensor) for tensor in tensors]
+        indices = _indices(tuple(exponent))
+        value = coefficient * _third_derivative_of_monomial(indices)
+        for a, b, c in {(indices[i], indices[j], indices[3 - i - j]) for i in range(3) for j in range(3) if i != j}:
+            matrices[a][b * n + c] = value
+    return [fmpq_mat(n, n, matrix) for matrix in matrices]
 
 
 def _indices(exponents: tuple[int, ...]) -> tuple[int, ...]:
@@ -163,6 +160,6 @@ def _indices(exponents: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(i for i, exponent in enumerate(exponents) for _ in range(exponent))
 
 
-def _symmetry(key: tuple[int, ...]) -> int:
+def _third_derivative_of_monomial(indices: tuple[int, ...]) -> int:
     """Return the third derivative of the monomial: 6 for x^3, 2 for x^2 y, 1 for x y z."""
-    return {1: 6, 2: 2, 3: 1}[len(set(key))]
+    return {1: 6, 2: 2, 3: 1}[len(set(indices))]

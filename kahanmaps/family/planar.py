@@ -36,8 +36,8 @@ from kahanmaps.family.skew_hamiltonian import bits_of, companion_matrix, format_
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
-_CUBIC = ("X^3", "X^2*Y", "X*Y^2", "Y^3")
-_QUADRATIC = ("X^2", "X*Y", "Y^2")
+_CUBIC_MONOMIALS = ("X^3", "X^2*Y", "X*Y^2", "Y^3")
+_QUADRATIC_MONOMIALS = ("X^2", "X*Y", "Y^2")
 
 Quadruple = tuple[fmpq_poly, fmpq_poly, fmpq_poly, fmpq_poly]
 
@@ -67,8 +67,8 @@ class PlanarPart:
     def D(self) -> fmpq_mpoly:
         """h_uu h_vv - h_uv^2; the Kahan map of this planar system conserves h/(1 + eps^2 D)."""
         derivative = self.h.derivative
-        mixed = derivative(0).derivative(1)
-        return derivative(0).derivative(0) * derivative(1).derivative(1) - mixed * mixed
+        h_uv = derivative(0).derivative(1)
+        return derivative(0).derivative(0) * derivative(1).derivative(1) - h_uv * h_uv
 
     @property
     def D_text(self) -> str:
@@ -130,7 +130,7 @@ class NormalForm(HtmlDisplay, ResultPart):
     def D_coefficients(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
         """The elements p, q, r of K with D = p X^2 + q X Y + r Y^2."""
         a, b, c, d = self.coefficients
-        p, q, r = self._reduced(12 * a * c - 4 * b * b, 36 * a * d - 4 * b * c, 12 * b * d - 4 * c * c)
+        p, q, r = self._reduce(12 * a * c - 4 * b * b, 36 * a * d - 4 * b * c, 12 * b * d - 4 * c * c)
         return p, q, r
 
     def coordinates(self, x: Sequence[Any]) -> tuple[fmpq_poly, fmpq_poly]:
@@ -142,47 +142,47 @@ class NormalForm(HtmlDisplay, ResultPart):
 
     def point(self, X: Any, Y: Any) -> tuple[fmpq, ...]:
         """Return the rational point x for X and Y in K (polynomials in t, or numbers)."""
-        X, Y = self._elements(X, Y)
+        X, Y = self._as_elements(X, Y)
         z = [element[k] for element in (X, Y) for k in range(self.m)]
         return tuple((self.S * fmpq_mat(self.dim, 1, z)).entries())
 
     def h(self, X: Any, Y: Any) -> fmpq_poly:
         """Return h(X, Y), an element of K."""
-        X, Y = self._elements(X, Y)
+        X, Y = self._as_elements(X, Y)
         a, b, c, d = self.coefficients
-        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
-        return self._reduced((a * X + b * Y) % self.chi * XX + (c * XY + d * YY) % self.chi * Y)[0]
+        XX, XY, YY = self._reduce(X * X, X * Y, Y * Y)
+        return self._reduce((a * X + b * Y) % self.chi * XX + (c * XY + d * YY) % self.chi * Y)[0]
 
     def D(self, X: Any, Y: Any) -> fmpq_poly:
         """Return the determinant of the planar f' at (X, Y), i.e. the Hessian determinant of h, an element of K."""
-        X, Y = self._elements(X, Y)
+        X, Y = self._as_elements(X, Y)
         p, q, r = self.D_coefficients
-        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
-        return self._reduced(p * XX + q * XY + r * YY)[0]
+        XX, XY, YY = self._reduce(X * X, X * Y, Y * Y)
+        return self._reduce(p * XX + q * XY + r * YY)[0]
 
     def vector_field(self, X: Any, Y: Any) -> tuple[fmpq_poly, fmpq_poly]:
         """Return dh/dY and -dh/dX at (X, Y)."""
-        X, Y = self._elements(X, Y)
+        X, Y = self._as_elements(X, Y)
         a, b, c, d = self.coefficients
-        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
-        first, second = self._reduced(b * XX + 2 * c * XY + 3 * d * YY, -(3 * a * XX + 2 * b * XY + c * YY))
-        return first, second
+        XX, XY, YY = self._reduce(X * X, X * Y, Y * Y)
+        dX, dY = self._reduce(b * XX + 2 * c * XY + 3 * d * YY, -(3 * a * XX + 2 * b * XY + c * YY))
+        return dX, dY
 
     def step(self, X: Any, Y: Any, eps: Any) -> tuple[fmpq_poly, fmpq_poly]:
         """Return the image of (X, Y) under the Kahan map. Raises SingularStep if 1 + eps^2 D is not a unit of K."""
-        X, Y = self._elements(X, Y)
+        X, Y = self._as_elements(X, Y)
         epsilon = rational(eps)
         denominator = 1 + epsilon * epsilon * self.D(X, Y)
-        common, inverse, _ = denominator.xgcd(self.chi)
-        if not common.is_one():
+        common_factor, inverse, _ = denominator.xgcd(self.chi)
+        if not common_factor.is_one():
             raise SingularStep(
-                f"1 + eps^2 D and chi have the factor {format_univariate(common)} in common at this point for "
+                f"1 + eps^2 D and chi have the factor {format_univariate(common_factor)} in common at this point for "
                 f"eps = {format_number(epsilon)}: the Kahan map is not defined there",
                 (X, Y),
                 epsilon,
             )
         F, G = self.vector_field(X, Y)
-        image_X, image_Y = self._reduced((X + 2 * epsilon * F) * inverse, (Y + 2 * epsilon * G) * inverse)
+        image_X, image_Y = self._reduce((X + 2 * epsilon * F) * inverse, (Y + 2 * epsilon * G) * inverse)
         return image_X, image_Y
 
     @cached_property
@@ -204,12 +204,12 @@ class NormalForm(HtmlDisplay, ResultPart):
     @property
     def h_text(self) -> str:
         """The cubic h as text, such as `X^3 + (t - 1)*X*Y^2`."""
-        return _format_form(self.coefficients, _CUBIC)
+        return _format_form(self.coefficients, _CUBIC_MONOMIALS)
 
     @property
     def D_text(self) -> str:
         """D as text, a quadratic form in X and Y over K."""
-        return _format_form(self.D_coefficients, _QUADRATIC)
+        return _format_form(self.D_coefficients, _QUADRATIC_MONOMIALS)
 
     def verify(self) -> None:
         """Verify the normal form exactly. Raises AssertionError if it is wrong, which means an error in kahanmaps.
@@ -227,20 +227,22 @@ class NormalForm(HtmlDisplay, ResultPart):
         times_t = two_blocks(companion, companion)
         if self.A.transpose() * self.S != self.S * times_t:
             raise AssertionError("normal form: t does not act as A^T")
-        values = self._functional_of_powers(fmpq_poly([1]), 2 * m - 1)
-        gram = [[((i < m) - (j < m)) * values[i % m + j % m] for j in range(n)] for i in range(n)]
+        functional_values = self._functional_of_powers(fmpq_poly([1]), 2 * m - 1)
+        gram = [[((i < m) - (j < m)) * functional_values[i % m + j % m] for j in range(n)] for i in range(n)]
         if self.S.transpose() * standard_structure(n) * self.S != fmpq_mat(gram):
             raise AssertionError("normal form: S^T J S is not the Gram matrix of l")
         a, b, c, d = self.coefficients
-        table = [self._functional_of_powers(third, 3 * m - 2) for third in (6 * a, 2 * b, 2 * c, 6 * d)]
+        expected_values = [self._functional_of_powers(element, 3 * m - 2) for element in (6 * a, 2 * b, 2 * c, 6 * d)]
         # The trilinear form of H in the coordinates z: one matrix for each column of S.
-        transposed, tensors = self.S.transpose(), third_derivatives(self.H)
-        for i, column in enumerate(transposed.tolist()):
-            third = transposed * combination_of(column, tensors) * self.S
-            expected = [
-                table[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m] for j in range(n) for k in range(n)
+        S_transposed, tensors = self.S.transpose(), third_derivatives(self.H)
+        for i, column in enumerate(S_transposed.tolist()):
+            bilinear_form = S_transposed * combination_of(column, tensors) * self.S
+            expected_form = [
+                expected_values[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m]
+                for j in range(n)
+                for k in range(n)
             ]
-            if third != fmpq_mat(n, n, expected):
+            if bilinear_form != fmpq_mat(n, n, expected_form):
                 raise AssertionError("normal form: H(S z) is not l(h)")
 
     def _functional_of_powers(self, element: fmpq_poly, count: int) -> list[fmpq]:
@@ -251,10 +253,10 @@ class NormalForm(HtmlDisplay, ResultPart):
             element = element * t % self.chi
         return values
 
-    def _elements(self, *values: Any) -> tuple[fmpq_poly, ...]:
-        return self._reduced(*(v if isinstance(v, fmpq_poly) else fmpq_poly([rational(v)]) for v in values))
+    def _as_elements(self, *values: Any) -> tuple[fmpq_poly, ...]:
+        return self._reduce(*(v if isinstance(v, fmpq_poly) else fmpq_poly([rational(v)]) for v in values))
 
-    def _reduced(self, *polynomials: fmpq_poly) -> tuple[fmpq_poly, ...]:
+    def _reduce(self, *polynomials: fmpq_poly) -> tuple[fmpq_poly, ...]:
         return tuple(polynomial % self.chi for polynomial in polynomials)
 
 
@@ -268,20 +270,33 @@ def normal_form(member: FamilyMember) -> NormalForm:
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
     if not member.is_generic:
-        repeated = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
+        repeated_text = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
         raise HypothesisError(
-            f"chi has the repeated factor {repeated}, expected a member whose chi has no repeated roots: "
+            f"chi has the repeated factor {repeated_text}, expected a member whose chi has no repeated roots: "
             "the normal form over K = Q[t]/chi is for generic A"
         )
     H = member.H if all(sign > 0 for sign in member.signs) else member.chosen.K
-    modulus, tensors = chi_of(member.A), third_derivatives(H)
-    planes: list[tuple[int, fmpq_mat, Quadruple]] = []
+    n, m, chi, tensors = member.dim, member.m, chi_of(member.A), third_derivatives(H)
+    # The basis dual to 1, t, ..., t^(m-1) under the form (a, b) -> l(a b).
+    dual_basis = [fmpq_poly([chi[j] for j in range(k + 1, m + 1)]) for k in range(m)]
+    candidates: list[tuple[int, fmpq_mat, Quadruple]] = []
     for e1 in _cyclic_vectors(member.A.transpose()):
         S = _symplectic_basis(member.A.transpose(), e1)
-        coefficients = _coefficients(modulus, S, tensors)
-        size = sum(map(bits_of, S.entries())) + sum(bits_of(entry) for c in coefficients for entry in c.coeffs())
-        planes.append((size, S, coefficients))
-    _, S, coefficients = min(planes, key=lambda choice: choice[0])
+        columns = S.transpose().tolist()
+        krylov_rows = [fmpq_mat(columns[:m]), fmpq_mat(columns[m:])]
+        vectors = [fmpq_mat(n, 1, columns[0]), fmpq_mat(n, 1, columns[m])]
+        hessians = [combination_of(columns[0], tensors), combination_of(columns[m], tensors)]
+        elements = []
+        # From l(t^k 6a) = H'''(t^k e1, e1, e1), l(t^k 2b) = H'''(t^k e1, e1, e2), and so on.
+        for divisor, i, j, k in ((6, 0, 0, 0), (2, 0, 0, 1), (2, 0, 1, 1), (6, 1, 1, 1)):
+            values = (krylov_rows[i] * (hessians[j] * vectors[k])).entries()
+            products = (value * element for value, element in zip(values, dual_basis, strict=True))
+            elements.append(sum(products, fmpq_poly([0])) / divisor)
+        a, b, c, d = elements
+        coefficients = (a, b, c, d)
+        bits = sum(map(bits_of, S.entries())) + sum(bits_of(entry) for c in coefficients for entry in c.coeffs())
+        candidates.append((bits, S, coefficients))
+    _, S, coefficients = min(candidates, key=lambda candidate: candidate[0])
     return NormalForm(member.A, H, S, coefficients)
 
 
@@ -294,16 +309,16 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
     n = t.nrows()
     m = n // 2
     multiples = [(k + 2) // 2 * (-1) ** k for k in range(m + 1)]
-    for start in range(n):
-        v, rank = _unit(n, start), _krylov(t, _unit(n, start)).rank()
-        for j in range(start + 1, start + n):
+    for i in range(n):
+        v, rank = _unit_vector(n, i), _krylov_matrix(t, _unit_vector(n, i)).rank()
+        for j in range(i + 1, i + n):
             if rank == m:
                 break
-            sums = [v + c * _unit(n, j % n) for c in multiples]
-            ranks = [_krylov(t, w).rank() for w in sums]
+            candidates = [v + c * _unit_vector(n, j % n) for c in multiples]
+            ranks = [_krylov_matrix(t, w).rank() for w in candidates]
             if max(ranks) > rank:
                 rank = max(ranks)
-                v = sums[ranks.index(rank)]
+                v = candidates[ranks.index(rank)]
         yield v
 
 
@@ -316,42 +331,25 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """
     n = t.nrows()
     m = n // 2
-    powers = _krylov(t, e1)
+    powers = _krylov_matrix(t, e1)
     equations = [
         primitive_integers((*row, fmpq(-(k == m - 1))))
         for k, row in enumerate((powers.transpose() * standard_structure(n)).tolist())
     ]
     bound = sum(max(abs(entry) for entry in row).bit_length() + n.bit_length() for row in equations) + n + 1
-    heavy, heaviest = fmpz(1) << bound, fmpz(1) << 2 * bound
-    lattice = [
-        [int(i == j) for i in range(n)] + [heavy * (j == n)] + [heaviest * row[j] for row in equations]
+    weight, constraint_weight = fmpz(1) << bound, fmpz(1) << 2 * bound
+    generators = [
+        [int(i == j) for i in range(n)] + [weight * (j == n)] + [constraint_weight * row[j] for row in equations]
         for j in range(n + 1)
     ]
-    reduced = fmpz_mat(lattice).lll()
-    s = reduced[m, n] // heavy
-    e2 = fmpq_mat(n, 1, [fmpq(reduced[m, i], s) for i in range(n)])
-    columns = zip(powers.tolist(), _krylov(t, e2).tolist(), strict=True)
+    reduced_basis = fmpz_mat(generators).lll()
+    s = reduced_basis[m, n] // weight
+    e2 = fmpq_mat(n, 1, [fmpq(reduced_basis[m, i], s) for i in range(n)])
+    columns = zip(powers.tolist(), _krylov_matrix(t, e2).tolist(), strict=True)
     return fmpq_mat([[*left, *right] for left, right in columns])
 
 
-def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadruple:
-    """Return h from the third derivatives of H along the columns of S: l(t^k 6a) = H'''(t^k e1, e1, e1) etc."""
-    n, m = S.nrows(), chi.degree()
-    rows = S.transpose().tolist()
-    module = [fmpq_mat(rows[:m]), fmpq_mat(rows[m:])]
-    vectors = [fmpq_mat(n, 1, rows[0]), fmpq_mat(n, 1, rows[m])]
-    hessians = [combination_of(rows[0], tensors), combination_of(rows[m], tensors)]
-    # The basis dual to 1, t, ..., t^(m-1) under the form (a, b) -> l(a b).
-    dual = [fmpq_poly([chi[j] for j in range(k + 1, m + 1)]) for k in range(m)]
-
-    def third(i: int, j: int, k: int) -> fmpq_poly:
-        values = (module[i] * (hessians[j] * vectors[k])).entries()
-        return sum((value * element for value, element in zip(values, dual, strict=True)), fmpq_poly([0]))
-
-    return third(0, 0, 0) / 6, third(0, 0, 1) / 2, third(0, 1, 1) / 2, third(1, 1, 1) / 6
-
-
-def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
+def _krylov_matrix(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
     """Return the matrix with the columns v, t v, ..., t^{m-1} v."""
     columns = [vector]
     for _ in range(t.nrows() // 2 - 1):
@@ -359,7 +357,7 @@ def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
     return fmpq_mat([column.entries() for column in columns]).transpose()
 
 
-def _unit(n: int, i: int) -> fmpq_mat:
+def _unit_vector(n: int, i: int) -> fmpq_mat:
     return fmpq_mat(n, 1, [int(i == j) for j in range(n)])
 
 
@@ -371,9 +369,9 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
             continue
         # A coefficient with one term, or with negative terms only, is printed with its sign before the brackets.
         terms = [c for c in coefficient.coeffs() if c != 0]
-        negative = all(c < 0 for c in terms)
-        element = format_univariate(-coefficient if negative else coefficient)
+        is_negative = all(c < 0 for c in terms)
+        element = format_univariate(-coefficient if is_negative else coefficient)
         factor = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
-        sign = "-" if negative else "+"
-        text += f" {sign} {factor}{monomial}" if text else f"{'-' if negative else ''}{factor}{monomial}"
+        sign = "-" if is_negative else "+"
+        text += f" {sign} {factor}{monomial}" if text else f"{'-' if is_negative else ''}{factor}{monomial}"
     return text or "0"

@@ -40,11 +40,11 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
     m = _require_m(len(values))
     _require_size(size)
     rng = random.Random(integer(seed, "the seed"))
-    normal = fmpq_mat(2 * m, 2 * m)
+    A_z = fmpq_mat(2 * m, 2 * m)
     for i, value in enumerate(values):
-        normal[i, i] = normal[m + i, m + i] = value
+        A_z[i, i] = A_z[m + i, m + i] = value
     S = random_symplectic(m, rng)
-    forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
+    forms = _linear_forms(symplectic_inverse(S), default_variables(2 * m))
     H = forms[0].context().constant(0)
     for i in range(m):
         u, v = forms[i], forms[m + i]
@@ -52,7 +52,7 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
         while _discriminant(a, b, c, d) == 0:  # a cubic with a double root is not generic
             a, b, c, d = (rng.randint(-size, size) for _ in range(4))
         H += a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3
-    return FamilyMember(_in_original_coordinates(normal, S), H)
+    return FamilyMember(_in_original_coordinates(A_z, S), H)
 
 
 def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
@@ -69,9 +69,9 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
     chi = chi / chi.leading_coefficient()
     rng = random.Random(integer(seed, "the seed"))
     companion = companion_matrix(chi)
-    normal = two_blocks(companion.transpose(), companion)
+    A_z = two_blocks(companion.transpose(), companion)
     S = random_symplectic(m, rng)
-    forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
+    forms = _linear_forms(symplectic_inverse(S), default_variables(2 * m))
     zero = forms[0].context().constant(0)
     # Y is in the basis dual to 1, t, ..., t^(m-1) under (a, b) -> coefficient of t^(m-1) in a b, so J is standard.
     Y = [zero] * m
@@ -79,20 +79,19 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
         for k in range(j, m):
             coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
             Y[k - j] = Y[k - j] + coefficient * forms[m + j]
-    drawn: list[list[int]] = []
+    coefficient_lists: list[list[int]] = []
     # The discriminant must be invertible: then the cubic has no double root, for any root of chi.
-    while not drawn or _discriminant(*map(fmpq_poly, drawn)).gcd(chi).degree() != 0:
-        drawn = []
-        while len(drawn) < 4:
-            element = [rng.randint(-size, size) for _ in range(m)]
-            if any(element):
-                drawn.append(element)
+    while not coefficient_lists or _discriminant(*map(fmpq_poly, coefficient_lists)).gcd(chi).degree() != 0:
+        coefficient_lists = []
+        while len(coefficient_lists) < 4:
+            numbers = [rng.randint(-size, size) for _ in range(m)]
+            if any(numbers):
+                coefficient_lists.append(numbers)
     X_, Y_, t = ring(["X", "Y", GENERATOR]).gens()
-    elements = [sum((t**k * c for k, c in enumerate(coefficients)), 0 * t) for coefficients in drawn]
-    a, b, c, d = elements
+    a, b, c, d = (sum((t**k * c for k, c in enumerate(numbers)), 0 * t) for numbers in coefficient_lists)
     h = a * X_**3 + b * X_**2 * Y_ + c * X_ * Y_**2 + d * Y_**3
     H = components(h, split_names(["X", "Y"], m), chi)[m - 1].compose(*forms[:m], *Y, ctx=zero.context())
-    return FamilyMember(_in_original_coordinates(normal, S), H)
+    return FamilyMember(_in_original_coordinates(A_z, S), H)
 
 
 def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
@@ -117,10 +116,10 @@ def parse_chi(text: str) -> fmpq_poly:
     """
     polynomial = parse_polynomial(text, ["t"])
     coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
-    top = max(coefficients, default=0)
-    if top < 1:
+    degree = max(coefficients, default=0)
+    if degree < 1:
         raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
-    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])
+    return fmpq_poly([coefficients.get(k, 0) for k in range(degree + 1)])
 
 
 def random_eigenvalues(m: int, seed: int) -> list[int]:
@@ -134,12 +133,12 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
     return random.Random(f"eigenvalues {seed}").sample(values, m)
 
 
-def _in_original_coordinates(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
+def _in_original_coordinates(A_z: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
     """Return A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
-    return symplectic_inverse(S).transpose() * normal * S.transpose()
+    return symplectic_inverse(S).transpose() * A_z * S.transpose()
 
 
-def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> tuple[fmpq_mpoly, ...]:
+def _linear_forms(matrix: fmpq_mat, variables: tuple[str, ...]) -> tuple[fmpq_mpoly, ...]:
     """Return the rows of `matrix` as linear forms in the variables."""
     return linear_combinations(matrix, ring(variables).gens())
 

@@ -57,7 +57,7 @@ class FamilyStructure(ResultPart):
             raise HypothesisError("J is not T [[0, I], [-I, 0]] T^T")
         if any(sign < 0 for sign in self.member.signs):
             raise HypothesisError("found a member with a sign -1, expected f_0 itself")
-        if _pulled_back(self.hamiltonian.H, self.T, self.member.variables) != self.member.H:
+        if _pull_back(self.hamiltonian.H, self.T, self.member.variables) != self.member.H:
             raise HypothesisError("the cubic of the member is not H(T y)")
 
     @cached_property
@@ -79,17 +79,21 @@ class FamilyStructure(ResultPart):
     def text(self) -> str:
         """A sentence that describes the structure."""
         factors = self.member.factors
-        chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
+        chi_text = " ".join(
+            f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors
+        )
         if self.member.m == 1:
-            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
+            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi_text}"
         else:
             beginning = "H splits: A"
             if len(factors) == 1:
-                splits = factors[0].degree > 1
+                is_nonlinear = factors[0].degree > 1
                 beginning = (
-                    "H splits over the splitting field of chi: A" if splits else "H does not split: A, not scalar,"
+                    "H splits over the splitting field of chi: A"
+                    if is_nonlinear
+                    else "H does not split: A, not scalar,"
                 )
-            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi_text}"
         return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 
@@ -116,19 +120,35 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     reason = _unsupported_reason(CubicHamiltonian(H, J))
     if reason:
         raise InputError(reason)
-    _require_size(J.nrows())
+    _require_dimension(J.nrows())
     n = J.nrows()
     inverse = J.inv()
-    conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
+    conditions: list[fmpz_mat] = [(T * J).numer_denom()[0] for T in third_derivatives(H)]
     # A few random combinations of the conditions are almost always equivalent to all conditions.
     rng = random.Random(n)
     combinations = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
-    for chosen in (combinations, conditions):
-        solutions = _skew_solutions(chosen, n)
-        products = (S * condition for S in solutions for condition in conditions)
+    column = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
+    for condition_set in (combinations, conditions):
+        # The linear equations for the skew matrices S for which S F is symmetric for each F in the set.
+        rows = []
+        for F, (i, j) in itertools.product(condition_set, column):
+            row = [fmpz(0)] * len(column)
+            for k in range(n):  # the entry i, j of S F - (S F)^T contains S[i, k] F[k, j] - S[j, k] F[k, i]
+                if k != i:
+                    row[column[min(i, k), max(i, k)]] += F[k, j] if i < k else -F[k, j]
+                if k != j:
+                    row[column[min(j, k), max(j, k)]] -= F[k, i] if j < k else -F[k, i]
+            rows.append(row)
+        solutions = []
+        for vector in nullspace(QQ, fmpq_mat(fmpz_mat(rows))):
+            S = fmpz_mat(n, n)
+            for (i, j), value in zip(column, primitive_integers(vector), strict=True):
+                S[i, j], S[j, i] = value, -value
+            solutions.append(S)
+        products = (S * F for S in solutions for F in conditions)
         if all(product == product.transpose() for product in products):
             break
-    return _reduced([inverse * fmpq_mat(S) for S in solutions])
+    return _reduced_basis([inverse * fmpq_mat(S) for S in solutions])
 
 
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
@@ -154,18 +174,34 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     """
     if _unsupported_reason(hamiltonian):
         return None
-    _require_size(hamiltonian.dim)
+    _require_dimension(hamiltonian.dim)
     T = QQ.identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
-    names, letters = hamiltonian.variables, "y"
+    names, prefix = hamiltonian.variables, "y"
     if not hamiltonian.is_standard:  # new variables y1, y2, ..., or yy1, ... if the system uses these names
-        while any(name.startswith(letters) for name in names):
-            letters += "y"
-        names = tuple(f"{letters}{i + 1}" for i in range(len(names)))
-    H = _pulled_back(hamiltonian.H, T, names)
+        while any(name.startswith(prefix) for name in names):
+            prefix += "y"
+        names = tuple(f"{prefix}{i + 1}" for i in range(len(names)))
+    H = _pull_back(hamiltonian.H, T, names)
     space = structure_space(H)
     if len(space) == 1 and hamiltonian.dim > 2:
         return None
-    return FamilyStructure(hamiltonian, FamilyMember(_with_most_eigenvalues(space), H), T, len(space))
+    # A gets as many distinct eigenvalues as possible, and small entries.
+    blocks = list(_split_idempotent(space, QQ.identity(hamiltonian.dim)))
+    A = fmpq_mat(hamiltonian.dim, hamiltonian.dim)
+    # The idempotent of largest rank gets the eigenvalue 1: then A = I + ... without a term for this idempotent.
+    linear_blocks = sorted(
+        (block for block in blocks if block.factor.degree() == 1), key=lambda block: -_total_bits(block.E)
+    )
+    for value, block in enumerate(linear_blocks, start=1):
+        A = A + block.E * value + block.X
+    used_factors: list[fmpq_poly] = []
+    for block in blocks:
+        if block.factor.degree() > 1:
+            shifts = (k // 2 if k % 2 else -(k // 2) for k in itertools.count(1))  # 0, -1, 1, -2, ...
+            shift = next(c for c in shifts if block.factor(fmpq_poly([-c, 1])) not in used_factors)
+            used_factors.append(block.factor(fmpq_poly([-shift, 1])))
+            A = A + block.X + block.E * shift
+    return FamilyStructure(hamiltonian, FamilyMember(A, H), T, len(space))
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
@@ -186,9 +222,9 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     H = context.constant(0)
     for i, component in enumerate(field):
         for exponent, coefficient in component.terms():
-            raised = tuple(power + (i == j) for j, power in enumerate(exponent))
+            integrated_monomial = tuple(power + (i == j) for j, power in enumerate(exponent))
             # Euler's formula for homogeneous functions, for each degree separately.
-            H = H + context.from_dict({raised: coefficient / sum(raised)})
+            H = H + context.from_dict({integrated_monomial: coefficient / sum(integrated_monomial)})
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
 
@@ -222,22 +258,22 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
     n = J.nrows()
     if n != J.ncols() or n % 2 or J.transpose() != -J:
         raise InputError("J is not a skew matrix of even size")
-    form, first, second = J, [], []
+    remaining_form, q_columns, p_columns = J, [], []
     for _ in range(n // 2):
-        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if form[i, j] != 0]
-        if not entries:
+        positions = [(i, j) for i in range(n) for j in range(i + 1, n) if remaining_form[i, j] != 0]
+        if not positions:
             raise InputError("J is singular, expected an invertible matrix")
-        i, j = min(entries, key=lambda entry: bits_of(form[entry]))
-        pivot = form[i, j]
-        a, b = (fmpq_mat([[form[k, column]] for k in range(n)]) for column in (i, j))
-        first.append(b.entries())
-        second.append((a / -pivot).entries())
-        form = form - (a * b.transpose() - b * a.transpose()) / pivot
-    return fmpq_mat([*first, *second]).transpose()
+        i, j = min(positions, key=lambda position: bits_of(remaining_form[position]))
+        pivot = remaining_form[i, j]
+        a, b = (fmpq_mat([[remaining_form[k, column]] for k in range(n)]) for column in (i, j))
+        q_columns.append(b.entries())
+        p_columns.append((a / -pivot).entries())
+        remaining_form = remaining_form - (a * b.transpose() - b * a.transpose()) / pivot
+    return fmpq_mat([*q_columns, *p_columns]).transpose()
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Block:
     """An idempotent E of the space, not split further, and X = E X E, which is zero, nilpotent, or generates a field.
 
     The distinct roots of X on the image of E are the roots of `factor`, which is t if X is zero or nilpotent.
@@ -248,83 +284,63 @@ class _Part:
     factor: fmpq_poly
 
 
-def _with_most_eigenvalues(space: Sequence[fmpq_mat]) -> fmpq_mat:
-    """Return an element of the space with as many distinct eigenvalues as possible and small entries."""
-    parts = list(_parts(space, QQ.identity(space[0].nrows())))
-    A = fmpq_mat(space[0].nrows(), space[0].nrows())
-    # The idempotent of largest rank gets the eigenvalue 1: then A = I + ... without a term for this idempotent.
-    simple = sorted((part for part in parts if part.factor.degree() == 1), key=lambda part: -_size(part.E))
-    for value, part in enumerate(simple, start=1):
-        A = A + part.E * value + part.X
-    used_factors: list[fmpq_poly] = []
-    for part in parts:
-        if part.factor.degree() > 1:
-            shifts = (k // 2 if k % 2 else -(k // 2) for k in itertools.count(1))  # 0, -1, 1, -2, ...
-            shift, shifted = next(
-                (c, moved) for c in shifts if (moved := part.factor(fmpq_poly([-c, 1]))) not in used_factors
-            )
-            used_factors.append(shifted)
-            A = A + part.X + part.E * shift
-    return A
-
-
-def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
+def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block]:
     """Split the idempotent E of the space by elements E X E as far as possible; yield each part with its best X."""
     if trace(E) == 2:  # a self-adjoint matrix in a symplectic plane is scalar
-        yield _Part(E, E * 0, _T)
+        yield _Block(E, E * 0, _T)
         return
     for X in space:
-        if len(pieces := _projections(E * X * E, E)) > 1:
-            for piece in pieces:
-                yield from _parts(space, piece)
+        if len(idempotents := _split_by_factors(E * X * E, E)) > 1:
+            for idempotent in idempotents:
+                yield from _split_idempotent(space, idempotent)
             return
-    part_basis = _reduced([E * X * E for X in space])
-    if len(part_basis) == 1:
-        yield _Part(E, E * 0, _T)
+    block_basis = _reduced_basis([E * X * E for X in space])
+    if len(block_basis) == 1:
+        yield _Block(E, E * 0, _T)
         return
     # In a commutative algebra the trace form has the rank of the semisimple part, i.e. the number of roots to be found.
-    is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(part_basis, 2))
-    flat, transposed = (
-        fmpq_mat([M.entries() for M in matrices]) for matrices in (part_basis, [X.transpose() for X in part_basis])
+    is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(block_basis, 2))
+    rows, rows_of_transposes = (
+        fmpq_mat([M.entries() for M in matrices]) for matrices in (block_basis, [X.transpose() for X in block_basis])
     )
-    target = rank(QQ, flat * transposed.transpose()) if is_commutative else 0
-    parts: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
-    rng = random.Random(len(part_basis))
+    target_degree = rank(QQ, rows * rows_of_transposes.transpose()) if is_commutative else 0
+    candidates: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
+    rng = random.Random(len(block_basis))
     # First the basis, then combinations with coefficients that grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
-    combinations = (combination_of([rng.randint(-bound, bound) for _ in part_basis], part_basis) for bound in bounds)
-    for tried, X in enumerate(itertools.chain(part_basis, combinations)):
-        if len(pieces := _projections(X, E)) > 1:
-            for piece in pieces:
-                yield from _parts(space, piece)
+    combinations = (combination_of([rng.randint(-bound, bound) for _ in block_basis], block_basis) for bound in bounds)
+    for index, X in enumerate(itertools.chain(block_basis, combinations)):
+        if len(idempotents := _split_by_factors(X, E)) > 1:
+            for idempotent in idempotents:
+                yield from _split_idempotent(space, idempotent)
             return
-        polynomial = _factors_on(X, E)[0].polynomial
+        polynomial = _factors_on_image(X, E)[0].polynomial
         value, power, length = evaluate_at_matrix(polynomial, X) * E, E, 0
         while power != 0 * power:  # length = the degree times the least k with polynomial(X)^k E = 0
             power, length = power * value, length + polynomial.degree()
-        for Y, minimal in _variants(X, E, polynomial):
-            height = sum(map(bits_of, minimal.coeffs()))
-            parts.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
-        if tried >= len(part_basis) + _DRAWS and max(key[0] for key, _, _ in parts) >= target:
+        for Y, minimal_polynomial in _equivalent_generators(X, E, polynomial):
+            height = sum(map(bits_of, minimal_polynomial.coeffs()))
+            candidates.append(((minimal_polynomial.degree(), length, -height, -_total_bits(Y)), Y, minimal_polynomial))
+        if index >= len(block_basis) + _DRAWS and max(key[0] for key, _, _ in candidates) >= target_degree:
             break
-    _, X, polynomial = max(parts, key=lambda choice: choice[0])
+    _, X, polynomial = max(candidates, key=lambda candidate: candidate[0])
     is_field = polynomial.degree() > 1
-    yield _Part(E, X, polynomial) if is_field else _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
+    yield _Block(E, X, polynomial) if is_field else _Block(E, _reduced_basis([X + E * polynomial[0]])[0], _T)
 
 
-def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
+def _split_by_factors(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
     """Return the idempotents into which X = E X E splits E, one for each irreducible factor; E if there is only one."""
-    factors = _factors_on(X, E)
+    factors = _factors_on_image(X, E)
     if len(factors) == 1:
         return [E]
-    projections = []
+    idempotents = []
     for index in range(len(factors)):
         signs = [2 * (i == index) - 1 for i in range(len(factors))]
-        projections.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
-    return projections
+        idempotents.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
+    return idempotents
 
 
-def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
+def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
     """Return the factors of chi of X = E X E, restricted to the image of E."""
     dim, factors = int(trace(E).p), []
     for factor in factors_of_chi(X):
@@ -334,7 +350,7 @@ def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
     return factors
 
 
-def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
+def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
     """Yield X with its irreducible polynomial, and (X - a E)/b for integers a, b that keep the polynomial integral."""
     yield X, polynomial
     d = polynomial.degree()
@@ -342,49 +358,26 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
         return
     a = fmpq(-polynomial[d - 1] / d + fmpq(1, 2)).floor()
     X, polynomial = X - E * a, polynomial(fmpq_poly([a, 1]))
-    common = fmpz(0)
+    gcd = fmpz(0)
     for k in range(d):
-        common = common.gcd(polynomial[k].p)
-    for b, _ in common.factor(trial_limit=_TRIAL_DIVISION):
+        gcd = gcd.gcd(polynomial[k].p)
+    for b, _ in gcd.factor(trial_limit=_TRIAL_DIVISION):
         while b > 1 and all(polynomial[d - k].p % b**k == 0 for k in range(1, d + 1)):
             X, polynomial = X / b, fmpq_poly([polynomial[d - k] / b**k for k in range(d, -1, -1)])
     yield X, polynomial
 
 
-def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
-    """Return a basis of the skew matrices S for which S F is symmetric for each F in `conditions`."""
-    position = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
-    rows = []
-    for condition in conditions:
-        columns = condition.transpose().tolist()
-        for i, j in position:
-            row = [fmpz(0)] * len(position)
-            for k in range(n):  # the entry i, j of S F - (S F)^T contains S[i, k] F[k, j] - S[j, k] F[k, i]
-                if k != i:
-                    row[position[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
-                if k != j:
-                    row[position[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
-            rows.append(row)
-    solutions = []
-    for vector in nullspace(QQ, fmpq_mat(fmpz_mat(rows))):
-        S = fmpz_mat(n, n)
-        for (i, j), value in zip(position, primitive_integers(vector), strict=True):
-            S[i, j], S[j, i] = value, -value
-        solutions.append(S)
-    return solutions
-
-
-def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
+def _reduced_basis(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     """Return a reduced basis of all integer matrices in the span of `matrices`; it is empty if all of them are 0."""
     lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
     rows = lattice.tolist()
     is_alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
     # If each row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
-    if not all(any(single and abs(entry) == 1 for entry, single in zip(row, is_alone, strict=True)) for row in rows):
-        reduced = lattice.lll()
+    if not all(any(alone and abs(entry) == 1 for entry, alone in zip(row, is_alone, strict=True)) for row in rows):
+        reduced_rows = lattice.lll()
         d = lattice.rank()
         lattice = fmpz_mat(
-            d, lattice.ncols(), [entry for row in reduced.tolist()[len(matrices) - d :] for entry in row]
+            d, lattice.ncols(), [entry for row in reduced_rows.tolist()[len(matrices) - d :] for entry in row]
         )
         if d == 0:
             return []
@@ -406,12 +399,12 @@ def _unsupported_reason(hamiltonian: CubicHamiltonian) -> str:
     return ""
 
 
-def _require_size(dim: int) -> None:
+def _require_dimension(dim: int) -> None:
     if dim > MAX_DIMENSION:
         raise InputError(f"A is searched for in dimensions up to {MAX_DIMENSION}, and the system has dimension {dim}")
 
 
-def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:
+def _pull_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:
     """Return H(T y) as a polynomial in the variables `names`."""
     context = ring(names)
     if T == QQ.identity(T.nrows()):
@@ -419,5 +412,5 @@ def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly
     return H.compose(*linear_combinations(T, context.gens()), ctx=context)
 
 
-def _size(matrix: fmpq_mat) -> int:
+def _total_bits(matrix: fmpq_mat) -> int:
     return sum(map(bits_of, matrix.entries()))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.algebra.printing import format_univariate as format_univariate
 from kahanmaps.errors import HypothesisError
@@ -48,21 +49,22 @@ def defects(A: fmpq_mat) -> list[str]:
     if n != A.ncols() or n % 2 or n == 0:
         return [f"A is {n} x {A.ncols()}, expected a square matrix of even size 2m"]
     m, J = n // 2, standard_structure(n)
-    expected = -(J * A.transpose() * J)  # equal to A if and only if A^T J = J A
-    skew = "block must be skew"
+    expected_matrix = -(J * A.transpose() * J)  # equal to A if and only if A^T J = J A
+    skew_rule = "block must be skew"
     messages = []
-    for rule, top, left in (
+    for rule, top_row, left_column in (
         ("lower right block must be the transpose of the upper left one", m, m),
-        (f"upper right {skew}", 0, m),
-        (f"lower left {skew}", m, 0),
+        (f"upper right {skew_rule}", 0, m),
+        (f"lower left {skew_rule}", m, 0),
     ):
         for i in range(m):
-            for j in range(0 if top == left else i, m):
-                row, column = top + j, left + i
-                entry = fmpq(0) if top != left and i == j else expected[row, column]
-                if A[row, column] != entry:
+            for j in range(0 if top_row == left_column else i, m):
+                row, column = top_row + j, left_column + i
+                expected_entry = fmpq(0) if top_row != left_column and i == j else expected_matrix[row, column]
+                if A[row, column] != expected_entry:
                     position = f"entry ({row + 1},{column + 1})"
-                    messages.append(f"{position} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
+                    texts = _short_text(A[row, column]), _short_text(expected_entry)
+                    messages.append(f"{position} is {texts[0]}, expected {texts[1]}: the {rule}")
     return messages
 
 
@@ -86,13 +88,13 @@ def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
     _, pairs = A.charpoly().factor()
     factors = []
     for polynomial, multiplicity in pairs:
-        monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
-        factors.append(Factor(monic, multiplicity // 2))
+        monic_polynomial = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
+        factors.append(Factor(monic_polynomial, multiplicity // 2))
 
-    def order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
+    def sort_key(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
         return factor.degree, (-factor.polynomial[0],) if factor.degree == 1 else tuple(factor.polynomial.coeffs())
 
-    return tuple(sorted(factors, key=order))
+    return tuple(sorted(factors, key=sort_key))
 
 
 def chi(A: fmpq_mat) -> fmpq_poly:
@@ -110,31 +112,32 @@ def chi(A: fmpq_mat) -> fmpq_poly:
 def diagnosis(A: fmpq_mat) -> str:
     """Describe how chi factors over Q, and what this means for A and its associated systems."""
     factors = factors_of_chi(A)
-    repeated = [factor for factor in factors if factor.multiplicity > 1]
-    product = " ".join(
+    repeated_factors = [factor for factor in factors if factor.multiplicity > 1]
+    chi_text = " ".join(
         f"({factor})" + (f"^{factor.multiplicity}" if factor.multiplicity > 1 else "") for factor in factors
     )
-    if not repeated:
+    if not repeated_factors:
         if all(factor.degree == 1 for factor in factors):
             splitting = "all roots rational"
         elif len(factors) == 1:
             splitting = "irreducible over Q"
         else:
             splitting = f"{len(factors)} irreducible factors over Q"
-        return f"A is generic: chi = {product}, without repeated roots, {splitting}"
-    names = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated)
-    head = f"A is not generic: chi = {product} has repeated roots, {names}"
+        return f"A is generic: chi = {chi_text}, without repeated roots, {splitting}"
+    repeated_text = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated_factors)
+    beginning = f"A is not generic: chi = {chi_text} has repeated roots, {repeated_text}"
     degree = minimal_degree(A)
     m = sum(factor.degree * factor.multiplicity for factor in factors)
     if degree == m:
         return (
-            f"{head}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has dimension "
-            "4m, and the invariant Poisson structure and m independent integrals are there as for distinct roots"
+            f"{beginning}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has "
+            "dimension 4m, and the invariant Poisson structure and m independent integrals are there as for distinct "
+            "roots"
         )
-    diagonalisable = degree == sum(factor.degree for factor in factors)
+    is_diagonalisable = degree == sum(factor.degree for factor in factors)
     return (
-        f"{head}; A is {'still diagonalisable' if diagonalisable else 'not diagonalisable'} and derogatory: its "
-        f"minimal polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the "
+        f"{beginning}; A is {'still' if is_diagonalisable else 'not'} diagonalisable and derogatory: its minimal "
+        f"polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the "
         "theorems on the invariant Poisson structure and m independent integrals do not apply; commutativity of "
         "associated maps does"
     )
@@ -152,7 +155,7 @@ def minimal_degree(A: fmpq_mat) -> int:
 def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
     """Return polynomial(A), by Horner's scheme."""
     n = A.nrows()
-    identity = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    identity: fmpq_mat = QQ.identity(n)
     value = fmpq_mat(n, n)
     for coefficient in reversed(polynomial.coeffs()):
         value = value * A + identity * coefficient
@@ -183,19 +186,19 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     Each factor has only a few nonzero off-diagonal entries, so that transformed systems keep small coefficients.
     """
     n = 2 * m
-    S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    S: fmpq_mat = QQ.identity(n)
 
     def add(to: int, source: int, times: int) -> None:
         """Add `times` times row `source` of S to row `to`."""
         nonlocal S
-        elementary = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+        elementary = QQ.identity(n)
         elementary[to, source] = elementary[to, source] + times
         S = elementary * S
 
     for _ in range(rounds):
-        order = list(range(m))
-        rng.shuffle(order)
-        for i, j in zip(order, order[1:] + order[:1], strict=True):
+        permutation = list(range(m))
+        rng.shuffle(permutation)
+        for i, j in zip(permutation, permutation[1:] + permutation[:1], strict=True):
             sign = rng.choice((-1, 1))
             if i != j:  # q_i += s q_j requires p_j -= s p_i
                 add(i, j, sign)
@@ -223,6 +226,6 @@ def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:
     return -(J * S.transpose() * J)
 
 
-def _show(number: fmpq) -> str:
+def _short_text(number: fmpq) -> str:
     text = format_number(number)
     return text if len(text) <= 40 else f"{text[:18]}...{text[-18:]}"

@@ -75,10 +75,10 @@ def system_normal_form(
             return NoNormalForm(why_not_member(hamiltonian))
         member = structure.member
         T = None if structure.is_standard else structure.T
-    factors = "*".join(
+    chi_text = "*".join(
         f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
     )
-    text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
+    text = f"{'a' if declared else 'a recognised'} member of the family, chi = {chi_text}"
     from kahanmaps.family.planar import normal_form  # imported for members only
 
     try:

@@ -51,8 +51,8 @@ def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:
             f"{MAX_DIMENSION} over Q"
         )
     variables = split_names(system.variables, chi.degree())
-    parts = [components(polynomial, variables, chi) for polynomial in system.rhs]
-    return QuadraticSystem(tuple(itertools.chain.from_iterable(parts)))
+    component_lists = [components(polynomial, variables, chi) for polynomial in system.rhs]
+    return QuadraticSystem(tuple(itertools.chain.from_iterable(component_lists)))
 
 
 def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
@@ -71,9 +71,9 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
     x_0^2 + 2*x_1^2
     2*x_0*x_1
     """
-    K, numerator, denominator = _quotient(function, chi)
+    K, numerator, denominator = _as_matrices(function, chi)
     solution = denominator.solve(K.matrix(numerator.nrows(), 1, [numerator[i, 0] for i in range(numerator.nrows())]))
-    return tuple(_rational(entry) for entry in solution.entries())
+    return tuple(_in_lowest_terms(entry) for entry in solution.entries())
 
 
 def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFunction:
@@ -83,8 +83,8 @@ def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFun
     >>> print(inherited_density(RationalFunction(x, x**0), fmpq_poly([-2, 0, 1])).numerator)
     x_0^2 - 2*x_1^2
     """
-    _, numerator, denominator = _quotient(function, chi)
-    return _rational(numerator.det() / denominator.det())
+    _, numerator, denominator = _as_matrices(function, chi)
+    return _in_lowest_terms(numerator.det() / denominator.det())
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +144,19 @@ def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
     system = as_system(system)
     if system.dim > _MAX_DIMENSION or system.symbols:
         return None
-    space = centroid(system)
-    if len(space) == 1 or any(B * C != C * B for B, C in itertools.combinations(space, 2)):
+    commuting_matrices = centroid(system)
+    if len(commuting_matrices) == 1 or any(B * C != C * B for B, C in itertools.combinations(commuting_matrices, 2)):
         return None
-    rng = random.Random(len(space))
-    draws = ([rng.randint(-2, 2) for _ in space] for _ in range(_DRAWS))
+    rng = random.Random(len(commuting_matrices))
+    draws = ([rng.randint(-2, 2) for _ in commuting_matrices] for _ in range(_DRAWS))
     candidates = []
-    for C in [*space, *(combination_of(weights, space) for weights in draws)]:
+    for C in [*commuting_matrices, *(combination_of(weights, commuting_matrices) for weights in draws)]:
         chi = C.minpoly()
-        if chi.degree() == len(space) and _is_free(C, chi):
+        if chi.degree() == len(commuting_matrices) and _is_free(C, chi):
             candidates.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
     if not candidates:
         return None
-    _, C, chi = min(candidates, key=lambda choice: choice[0])
+    _, C, chi = min(candidates, key=lambda candidate: candidate[0])
     return TensorStructure(system, C, chi)
 
 
@@ -188,9 +188,9 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
     """Return whether Q^n is free over Q[C]: tested by the dimension of the kernel of p(C) for each factor p of chi."""
-    copies, remainder = divmod(C.nrows(), int(chi.degree()))
+    rank, remainder = divmod(C.nrows(), int(chi.degree()))
     return remainder == 0 and all(
-        C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]
+        C.nrows() - evaluate_at_matrix(p, C).rank() == rank * p.degree() for p, _ in chi.factor()[1]
     )
 
 
@@ -207,20 +207,20 @@ def components(
     context = ring((*names, GENERATOR))
     gens = dict(zip(context.names(), context.gens(), strict=True))
     t, zero = gens[GENERATOR], context.constant(0)
-    old = names_of(polynomial)
-    count = len(variables) // m
-    images = [sum((gens[f"{name}_{k}"] * t**k for k in range(m)), zero) for name in old[:count]]
-    images += [gens[name] for name in old[count:]]
+    old_names = names_of(polynomial)
+    split_count = len(variables) // m
+    images = [sum((gens[f"{name}_{k}"] * t**k for k in range(m)), zero) for name in old_names[:split_count]]
+    images += [gens[name] for name in old_names[split_count:]]
     modulus = sum((t**k * chi[k] for k in range(m + 1)), zero)
-    _, reduced = divmod(polynomial.compose(*images, ctx=context), modulus)
-    parts: list[dict[tuple[int, ...], fmpq]] = [{} for _ in range(m)]
-    for exponent, coefficient in reduced.terms():
-        parts[exponent[-1]][tuple(exponent[:-1])] = coefficient
-    target = ring(names)
-    return [target.from_dict(part) for part in parts]
+    _, remainder = divmod(polynomial.compose(*images, ctx=context), modulus)
+    component_terms: list[dict[tuple[int, ...], fmpq]] = [{} for _ in range(m)]
+    for exponent, coefficient in remainder.terms():
+        component_terms[exponent[-1]][tuple(exponent[:-1])] = coefficient
+    target_ring = ring(names)
+    return [target_ring.from_dict(terms) for terms in component_terms]
 
 
-def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:
+def _as_matrices(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:
     """Return numerator and denominator as matrices (multiplication on K) over functions of the split variables, eps."""
     m = int(chi.degree())
     variables = split_names(function.names[:-1], m)
@@ -230,15 +230,15 @@ def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField
 
     def matrix(polynomial: fmpq_mpoly) -> FunctionMatrix:
         total, power = K.matrix(m, m, [K.zero] * (m * m)), QQ.identity(m)
-        for part in components(polynomial, variables, chi, names):
-            total = total + K.convert_matrix(power) * Function(K, part, K.context.constant(1))
+        for component in components(polynomial, variables, chi, names):
+            total = total + K.convert_matrix(power) * Function(K, component, K.context.constant(1))
             power = power * companion
         return total
 
     return K, matrix(function.numerator), matrix(function.denominator)
 
 
-def _rational(element: Function) -> RationalFunction:
+def _in_lowest_terms(element: Function) -> RationalFunction:
     """Return a quotient in lowest terms."""
-    common = element.numerator.gcd(element.denominator)
-    return RationalFunction(element.numerator / common, element.denominator / common)
+    common_factor = element.numerator.gcd(element.denominator)
+    return RationalFunction(element.numerator / common_factor, element.denominator / common_factor)

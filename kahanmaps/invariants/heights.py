@@ -62,7 +62,7 @@ _MIN_FOR_EXPONENTIAL = 6
 _MIN_FOR_LOGARITHMIC = 32
 _NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
 _MAX_SHOWN = 20
-_NOT_GIVEN = NoNormalForm("none was given")
+_NO_NORMAL_FORM = NoNormalForm("none was given")
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class HeightGrowth(ResultPart):
     def to_json(self) -> dict[str, Any]:
         """Return plain data: the heights at 0, 1, 2, 4, 8, ... times `every` and the last; rounded numbers as text."""
         last = len(self.heights) - 1
-        shown = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN:]
+        shown_indices = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN:]
         return {
             "steps": self.every * last,
             "every": self.every,
@@ -156,7 +156,7 @@ class HeightGrowth(ResultPart):
             "status": self.end.status,
             "message": self.end.message,
             "period": self.end.period,
-            "heights": [{"step": self.every * i, "bits": self.heights[i]} for i in shown],
+            "heights": [{"step": self.every * i, "bits": self.heights[i]} for i in shown_indices],
             "final_height": self.heights[-1],
             "kind": str(self.kind),
             "reason": self.reason,
@@ -244,17 +244,17 @@ def height_growth(
         # A single step could take minutes, and its numbers would usually exceed the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((start_height,), end, every)
-    normal_form = _NOT_GIVEN if normal_form is None else normal_form
+    normal_form = _NO_NORMAL_FORM if normal_form is None else normal_form
     method = choose_method(None, "exact", normal_form, None if every == 1 else requested_steps).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
         iterates = Orbit(kahan_map, start, at=requested_steps, normal_form=normal_form, max_digits=max_digits)
         # Since steps are omitted, a return to the initial point is found only at a multiple of the period.
         heights: list[int] = []
-        origin, return_step = None, None
-        for point, bits in _within(iterates, 1, budget):
-            if origin is None:
-                origin = point.value
-            elif return_step is None and point.value == origin:
+        start_value, return_step = None, None
+        for point, bits in _points_with_heights(iterates, 1, budget):
+            if start_value is None:
+                start_value = point.value
+            elif return_step is None and point.value == start_value:
                 return_step = point.step
             heights.append(bits)
         if not heights:  # the initial point exceeds the budget; step by step, its height would still be listed
@@ -266,7 +266,7 @@ def height_growth(
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
         orbit = Orbit(kahan_map, start, requested_steps[-1], normal_form=form, max_digits=max_digits)
-        heights = [bits for _, bits in _within(orbit, every, budget)]
+        heights = [bits for _, bits in _points_with_heights(orbit, every, budget)]
         assert orbit.end is not None
         end = orbit.end
     if end.status == "interrupted":
@@ -285,16 +285,16 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
-def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
+def _points_with_heights(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
     """Yield the points at multiples of `every` with their heights until the budget is spent, and count the work."""
-    bits = rise = 0
+    bits = increase = 0
     for point in orbit:
         if point.step % every == 0:
-            before, bits = bits, height_of(point)
-            rise = max(0, bits - before)
+            previous_bits, bits = bits, height_of(point)
+            increase = max(0, bits - previous_bits)
             yield point, bits
         # If steps multiply the heights, their gcds are of longer numbers than those of steps with slow growth.
-        count_work(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
+        count_work(20 + len(orbit.start) ** 2 * (bits / 100 + increase / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
 
@@ -302,36 +302,36 @@ def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[O
 def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     """Apply the rules stated in the docstring of HeightGrowth."""
     if len(heights) < _MIN_FOR_EXPONENTIAL:
-        return Growth.UNDECIDED, _too_few(heights)
+        return Growth.UNDECIDED, _too_few_heights(heights)
     width = (len(heights) - 1) // 4
-    begin = len(heights) - 1 - 4 * width
-    rises: list[Fraction] = [
-        width * _leading_coefficient(heights[begin + j * width : begin + (j + 1) * width + 1], 1) for j in range(4)
+    offset = len(heights) - 1 - 4 * width
+    increases: list[Fraction] = [
+        width * _leading_coefficient(heights[offset + j * width : offset + (j + 1) * width + 1], 1) for j in range(4)
     ]
-    increases = [after - before for before, after in pairwise(rises)]
-    rises_text = f"four quarters raise them by {', '.join(decimal_text(rise, 4) for rise in rises)} bits"
-    if min(increases) > 0 and sum(increases) >= 2 * _NOISE:
-        first, second, third = increases
-        if second >= 2 * first and 10 * first * third >= 9 * second * second:
-            return Growth.EXPONENTIAL, f"{rises_text}, and the increases multiply"
-        if 3 * max(increases) <= 5 * min(increases) and len(heights) >= MIN_HEIGHTS:
-            return Growth.QUADRATIC, f"{rises_text}, and the increases are about the same"
+    differences = [later - earlier for earlier, later in pairwise(increases)]
+    text = f"four quarters raise them by {', '.join(decimal_text(increase, 4) for increase in increases)} bits"
+    if min(differences) > 0 and sum(differences) >= 2 * _NOISE:
+        e1, e2, e3 = differences
+        if e2 >= 2 * e1 and 10 * e1 * e3 >= 9 * e2 * e2:
+            return Growth.EXPONENTIAL, f"{text}, and the increases multiply"
+        if 3 * max(differences) <= 5 * min(differences) and len(heights) >= MIN_HEIGHTS:
+            return Growth.QUADRATIC, f"{text}, and the increases are about the same"
     if len(heights) < MIN_HEIGHTS:
-        return Growth.UNDECIDED, _too_few(heights)
-    rises_at_all = max(heights[: width + 1]) < max(heights[-width - 1 :])
-    if rises_at_all and -3 * width < 8 * sum(rises[1:]) < 3 * width and len(heights) >= _MIN_FOR_LOGARITHMIC:
-        return Growth.LOGARITHMIC, f"{rises_text}: less than linear growth would"
-    half = len(heights) // 2
-    low, high = min(heights[:half]), max(heights[:half])
-    if low <= min(heights[half:]) and max(heights[half:]) <= high:
+        return Growth.UNDECIDED, _too_few_heights(heights)
+    has_increased = max(heights[: width + 1]) < max(heights[-width - 1 :])
+    if has_increased and -3 * width < 8 * sum(increases[1:]) < 3 * width and len(heights) >= _MIN_FOR_LOGARITHMIC:
+        return Growth.LOGARITHMIC, f"{text}: less than linear growth would"
+    middle = len(heights) // 2
+    low, high = min(heights[:middle]), max(heights[:middle])
+    if low <= min(heights[middle:]) and max(heights[middle:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
-    least_rise, spread = min(rises), max(rises) - min(rises)
-    if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
-        return Growth.LINEAR, f"{rises_text}, about the same each time"
-    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may decide"
+    least_increase, spread = min(increases), max(increases) - min(increases)
+    if least_increase > 0 and spread <= least_increase / 4 and (spread <= _NOISE or spread <= least_increase / 32):
+        return Growth.LINEAR, f"{text}, about the same each time"
+    return Growth.UNDECIDED, f"{text}, which fits no rule; more steps may decide"
 
 
-def _too_few(heights: Sequence[int]) -> str:
+def _too_few_heights(heights: Sequence[int]) -> str:
     return f"found {counted(len(heights), 'height')}, expected {MIN_HEIGHTS} or more"
 
 
@@ -345,6 +345,6 @@ def _leading_coefficient(values: Sequence[int], degree: int) -> Fraction:
         weights = [2 * i - n for i in range(n + 1)]
     else:
         weights = [6 * i * (i - n) + n * (n - 1) for i in range(n + 1)]
-    leading = 2 if degree == 1 else 6
+    leading_factor = 2 if degree == 1 else 6
     product = sum(weight * value for weight, value in zip(weights, values, strict=True))
-    return Fraction(leading * product, sum(weight * weight for weight in weights))
+    return Fraction(leading_factor * product, sum(weight * weight for weight in weights))

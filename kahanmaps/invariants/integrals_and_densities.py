@@ -157,29 +157,25 @@ def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
     >>> where(2, a*x + b*y), where(2, (10*eps - 1)*eps*x, a*y), where(2, a*x + eps), where(1, [a*x, b*x])
     ('where a, b are not all 0', 'where 10*eps - 1 is not 0 and a is not 0', '', 'where a, b are not all 0')
     """
-    groups = [[group] if isinstance(group, fmpq_mpoly) else group for group in polynomials]
-    conditions = list(dict.fromkeys(filter(None, (_not_all_zero(group, dim) for group in groups))))
-    text = f"where {' and '.join(conditions)}" if conditions else ""
+    conditions: list[str] = []
+    for group in ([group] if isinstance(group, fmpq_mpoly) else group for group in polynomials):
+        names = names_of(group[0])
+        coefficients = [c for polynomial in group for c in coefficients_in(polynomial, dim)]
+        if "eps" in names[dim:]:  # eps, the last variable, is not 0: divide each coefficient by its power of eps
+            lowest_orders = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
+            coefficients = [
+                c.context().from_dict({(*m[:-1], int(m[-1]) - order): value for m, value in c.terms()})
+                for c, order in zip(coefficients, lowest_orders, strict=True)
+            ]
+        symbols = {name for c in coefficients for name in names if name not in c.unused_gens()}
+        if len(symbols) == 1:
+            # Polynomials in one symbol have the common zeros of their greatest common divisor.
+            coefficients = [reduce(lambda gcd, c: gcd.gcd(c), coefficients)]
+        if not any(c.is_constant() for c in coefficients):
+            texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in coefficients))
+            conditions.append(f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0")
+    text = f"where {' and '.join(dict.fromkeys(conditions))}" if conditions else ""
     return text if len(text) <= _MAX_CONDITION else "where it is defined and not identically 0"
-
-
-def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
-    names = names_of(polynomials[0])
-    coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
-    if "eps" in names[dim:]:  # eps, the last variable, is not 0: divide each coefficient by its power of eps
-        lowest_orders = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
-        coefficients = [
-            c.context().from_dict({(*m[:-1], int(m[-1]) - order): value for m, value in c.terms()})
-            for c, order in zip(coefficients, lowest_orders, strict=True)
-        ]
-    symbols = {name for c in coefficients for name in names if name not in c.unused_gens()}
-    if len(symbols) == 1:
-        # Polynomials in one symbol have the common zeros of their greatest common divisor.
-        coefficients = [reduce(lambda common, c: common.gcd(c), coefficients)]
-    if any(c.is_constant() for c in coefficients):
-        return ""
-    texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in coefficients))
-    return f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
 
 
 class ImageFunction(PhaseFunction):
@@ -195,8 +191,8 @@ def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Seq
     field, image = phi.field, phi.step(point)
     with field.working():
         total = field.zero
-        for x, after, slope in zip(point, image, gradient, strict=True):
-            total = total + evaluate(slope, field, point) * (after - x)
+        for x, x_image, partial_derivative in zip(point, image, gradient, strict=True):
+            total = total + evaluate(partial_derivative, field, point) * (x_image - x)
         return evaluate(H, field, point) + total * field.convert(fmpq(1, 3))
 
 
@@ -383,8 +379,8 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     if numerator.is_zero():
         text = format_rational_function(phi)
         value_text = "0/0" if denominator.is_zero() else "identically 0"
-        place = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
-        explanation = f", which is {value_text} at {place}" if text != "0" else ""
+        eps_and_root = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        explanation = f", which is {value_text} at {eps_and_root}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if explanation else text}{explanation}, "
             "expected a function that is not zero: the measure is dx/phi"
@@ -398,13 +394,13 @@ def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequ
     For a map with several factors, both are products over the factors.
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
-    numerator = [
-        det(factor.numerator_matrix(before, after))
-        for factor, before, after in zip(factors, points, (*points[1:], image), strict=True)
+    numerators = [
+        det(factor.numerator_matrix(point, next_point))
+        for factor, point, next_point in zip(factors, points, (*points[1:], image), strict=True)
     ]
-    denominator = [factor.determinant(before) for factor, before in zip(factors, points, strict=True)]
+    denominators = [factor.determinant(point) for factor, point in zip(factors, points, strict=True)]
     with map_at_eps.field.working():
-        return reduce(mul, numerator), reduce(mul, denominator)
+        return reduce(mul, numerators), reduce(mul, denominators)
 
 
 @dataclass(frozen=True)
@@ -426,9 +422,9 @@ class Normalized:
 
     def combination(self, name: str) -> str:
         """Return the integral as a formula in I (called `name`), the symbols and eps, e.g. "(F1 - 1)/eps^2"."""
-        target = ring([name, *(other for other in self.function.names if other != name)])
-        alpha, beta, gamma = (coefficient.project_to_context(target) for coefficient in self.coefficients)
-        return format_rational_function(RationalFunction(alpha * target.gen(0) + beta, gamma))
+        target_ring = ring([name, *(variable for variable in self.function.names if variable != name)])
+        alpha, beta, gamma = (coefficient.project_to_context(target_ring) for coefficient in self.coefficients)
+        return format_rational_function(RationalFunction(alpha * target_ring.gen(0) + beta, gamma))
 
 
 def normalized(function: RationalFunction, dim: int) -> Normalized:
@@ -456,9 +452,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     P, Q = function.numerator, function.denominator
     eps = P.context().gens()[-1]
     alpha, beta, gamma = eps**0, eps * 0, eps**0  # alpha I + beta = gamma P/Q
-    unchanged = Normalized(function, None, (alpha, beta, gamma))
+    unchanged_result = Normalized(function, None, (alpha, beta, gamma))
     if P.is_zero():
-        return unchanged
+        return unchanged_result
     while True:
         count_work(20 + len(P) + len(Q))
         # Divide by factors that do not contain x: they are conserved trivially.
@@ -466,8 +462,8 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         P, Q = P / numerator, Q / denominator
         alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
         p, q = _lowest_order_terms(P), _lowest_order_terms(Q)
-        common = p.gcd(q)
-        p, q = p / common, q / common
+        common_factor = p.gcd(q)
+        p, q = p / common_factor, q / common_factor
         if degree_in(p, dim) or degree_in(q, dim):
             break
         # P/Q = p/q + O(eps), and p and q do not contain x. They are not divisible by eps, since P and Q have no such
@@ -475,11 +471,11 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         # q P - p Q.
         P, alpha, beta = q * P - p * Q, q * alpha, q * beta - p * gamma
         if P.is_zero():
-            return unchanged
+            return unchanged_result
     scale = primitive_part(p)[0] / primitive_part(q)[0]
     P, gamma = P / scale, gamma * scale
-    common = reduce(lambda left, right: left.gcd(right), (alpha, beta, gamma))
-    coefficients = (alpha / common, beta / common, gamma / common)
+    common_factor = reduce(lambda left, right: left.gcd(right), (alpha, beta, gamma))
+    coefficients = (alpha / common_factor, beta / common_factor, gamma / common_factor)
     leading = RationalFunction(primitive_part(p)[1], primitive_part(q)[1])
     return Normalized(RationalFunction(P, Q), leading, coefficients)
 

@@ -84,8 +84,8 @@ class HamiltonianTensor(PoissonTensor):
     def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         system_over_field = self.hamiltonian.system.over(field)
         with field.working():
-            first, second = system_over_field.jacobian(point), system_over_field.hessian_times(direction)
-            return (second * first + first * second) * field.convert_matrix(self.hamiltonian.J) * -(eps * eps)
+            jacobian, hessian = (system_over_field.jacobian(point), system_over_field.hessian_times(direction))
+            return (hessian * jacobian + jacobian * hessian) * field.convert_matrix(self.hamiltonian.J) * -(eps * eps)
 
 
 class MatrixPoissonTensor(PoissonTensor):
@@ -108,9 +108,9 @@ class MatrixPoissonTensor(PoissonTensor):
             raise InputError(f"found a matrix with {self.dim} rows that is not square, expected as many columns")
         for i, row in enumerate(rows):
             for j, entry in enumerate(row[: i + 1]):
-                other = rows[j][i]
-                if other != RationalFunction(-entry.numerator, entry.denominator):
-                    texts = [format_rational_function(f) for f in (other, entry)]
+                opposite_entry = rows[j][i]
+                if opposite_entry != RationalFunction(-entry.numerator, entry.denominator):
+                    texts = [format_rational_function(f) for f in (opposite_entry, entry)]
                     raise InputError(
                         f"found {texts[0]} in row {j + 1}, column {i + 1} and {texts[1]} in row {i + 1}, "
                         f"column {j + 1}, expected a skew matrix"
@@ -160,7 +160,7 @@ class MatrixPoissonTensor(PoissonTensor):
     def brackets(self) -> dict[tuple[str, str], RationalFunction]:
         """The nonzero brackets {x_i, x_j} = P_ij with i < j."""
         names = self.rows[0][0].names if self.rows else ()
-        return {(names[i], names[j]): entry for (i, j), entry in self._upper.items()}
+        return {(names[i], names[j]): entry for (i, j), entry in self._upper_entries.items()}
 
     @property
     def formula(self) -> str:  # type: ignore[override]
@@ -175,8 +175,8 @@ class MatrixPoissonTensor(PoissonTensor):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
             arguments = (*point, field.convert(eps))
-            upper = {pair: entry.value(field, arguments) for pair, entry in self._upper.items()}
-            return None if None in upper.values() else self._matrix(field, upper)
+            upper_entries = {pair: entry.value(field, arguments) for pair, entry in self._upper_entries.items()}
+            return None if None in upper_entries.values() else self._matrix(field, upper_entries)
 
     def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         with field.working():
@@ -190,17 +190,17 @@ class MatrixPoissonTensor(PoissonTensor):
                 ]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
-            upper = {}
-            for pair, entry in self._upper.items():
+            upper_entries = {}
+            for pair, entry in self._upper_entries.items():
                 numerator, denominator = self._gradients[pair]
                 N, D = evaluate(entry.numerator, field, arguments), evaluate(entry.denominator, field, arguments)
-                upper[pair] = directional_derivative(numerator) / D
+                upper_entries[pair] = directional_derivative(numerator) / D
                 if not entry.is_polynomial:
-                    upper[pair] = upper[pair] - N * directional_derivative(denominator) / (D * D)
-            return self._matrix(field, upper)
+                    upper_entries[pair] = upper_entries[pair] - N * directional_derivative(denominator) / (D * D)
+            return self._matrix(field, upper_entries)
 
     @cached_property
-    def _upper(self) -> dict[tuple[int, int], RationalFunction]:
+    def _upper_entries(self) -> dict[tuple[int, int], RationalFunction]:
         return {
             (i, j): entry
             for i, row in enumerate(self.rows)
@@ -210,16 +210,11 @@ class MatrixPoissonTensor(PoissonTensor):
 
     @cached_property
     def _gradients(self) -> dict[tuple[int, int], tuple[Any, Any]]:
-        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper.items()}
+        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper_entries.items()}
 
-    def _matrix(self, field: Field, upper: Mapping[tuple[int, int], Any]) -> Any:
-        n, zero = self.dim, field.zero
-        entries = [
-            upper[i, j] if (i, j) in upper else -upper[j, i] if (j, i) in upper else zero
-            for i in range(n)
-            for j in range(n)
-        ]
-        return field.matrix(n, n, entries)
+    def _matrix(self, field: Field, upper_entries: Mapping[tuple[int, int], Any]) -> Any:
+        n, entries = self.dim, {**upper_entries, **{(j, i): -entry for (i, j), entry in upper_entries.items()}}
+        return field.matrix(n, n, [entries.get((i, j), field.zero) for i in range(n) for j in range(n)])
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
@@ -247,8 +242,8 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     if any(denominator.is_zero() for _, denominator in entries):
         return ""  # P is not defined at this eps; the verdict says so
     if not numerators:
-        which = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
-        raise InputError(f"found the tensor {which}, expected one that is not zero: every map preserves 0")
+        tensor_text = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
+        raise InputError(f"found the tensor {tensor_text}, expected one that is not zero: every map preserves 0")
     return where(tensor.dim, numerators, *(denominator for _, denominator in entries))
 
 
@@ -264,12 +259,12 @@ def transformation_sides(
     P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))
     if P is None or P_image is None or (_is_zero(field, P) and _is_zero(field, P_image)):
         return None
-    *earlier, (last, last_point) = map_.stages(point)
-    for factor, x in earlier:
+    *earlier_factors, (last_factor, last_point) = map_.stages(point)
+    for factor, x in earlier_factors:
         jacobian = factor.jacobian(x)
         with field.working():
             P = jacobian * P * jacobian.transpose()
-    N, M = last.numerator_matrix(last_point, image), last.denominator_matrix(last_point)
+    N, M = last_factor.numerator_matrix(last_point, image), last_factor.denominator_matrix(last_point)
     with field.working():
         return N * P * N.transpose(), M * P_image * M.transpose()
 

@@ -86,19 +86,19 @@ class Analysis(AnalysisResult, PrintableResult):
     def final_sections(self) -> list[tuple[str, list[Statement]]]:
         """The sections before the first one that a pending step may still change."""
         steps = self._reported_steps
-        waiting = (k for k, step in enumerate(steps) if {step.name, *step.requires}.intersection(self.pending))
-        return self._sections(steps[: next(waiting, None)])
+        indices = (k for k, step in enumerate(steps) if {step.name, *step.requires}.intersection(self.pending))
+        return self._sections(steps[: next(indices, None)])
 
     @property
     def _reported_steps(self) -> list[AnalysisStep]:
         """The steps with statements, in the order of the report."""
-        reported = [step for step in self.analyses if step.statements is not None]
-        return sorted(reported, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
+        steps = [step for step in self.analyses if step.statements is not None]
+        return sorted(steps, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
 
     def _sections(self, steps: Sequence[AnalysisStep]) -> list[tuple[str, list[Statement]]]:
         sections = [(step.title, list(step.statements(self))) for step in steps if step.statements is not None]
-        skipped = [] if self.pending else [Statement(Certainty.NOTE, text) for text in self.skipped]
-        return [(title, lines) for title, lines in (*sections, ("not done", skipped)) if lines]
+        notes = [] if self.pending else [Statement(Certainty.NOTE, text) for text in self.skipped]
+        return [(title, lines) for title, lines in (*sections, ("not done", notes)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
         """One row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
@@ -157,7 +157,7 @@ def analyze(
 
     Args:
         system: the map; a differential equation stands for its Kahan map. Claims and facts of a file are ignored. With
-            an algebraic parameter, steps that do not apply over a number field are named in `skipped`.
+            an algebraic parameter, steps that do not apply over a number field are named in `skip_messages`.
         symbols: names of parameters that stay symbols in integrals and densities; other results use their values.
         eps: half the time step, an exact number; the results then hold at this eps only. None: they hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
@@ -170,7 +170,7 @@ def analyze(
             processor (on Linux only; other threads must tolerate a fork). The results are those of one process.
 
     Returns:
-        An `Analysis`, the same on any machine at any load. Its `skipped` names the steps that were not completed.
+        An `Analysis`, the same on any machine at any load. Its `skip_messages` names the steps that were not completed.
         Ctrl-C and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all
         completed steps.
 
@@ -192,41 +192,41 @@ def analyze(
     analysis.pending = [step.name for step in steps]
     on_result(analysis)
     can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
-    forked = [step for step in steps if step.is_independent and can_fork]
-    skipped: dict[str, str] = {}
+    forked_steps = [step for step in steps if step.is_independent and can_fork]
+    skip_messages: dict[str, str] = {}
     # The independent steps have a separate budget, so that their results are the same with one process and with two.
     accounts = {
         is_independent: _Account(context, [step for step in steps if step.is_independent is is_independent], units)
         for is_independent in (False, True)
     }
-    with _second_process(context, forked, accounts[True]) as outcomes:
-        own, in_fork = [step for step in steps if step not in forked], list(forked)
-        while own or in_fork:
-            has_arrived = bool(in_fork) and (not own or outcomes.poll())
-            step, outcome = (in_fork if has_arrived else own).pop(0), None
+    with _fork_steps(context, forked_steps, accounts[True]) as connection:
+        own_steps, awaited_steps = [step for step in steps if step not in forked_steps], list(forked_steps)
+        while own_steps or awaited_steps:
+            has_arrived = bool(awaited_steps) and (not own_steps or connection.poll())
+            step, outcome = (awaited_steps if has_arrived else own_steps).pop(0), None
             progress(step.name)
             if has_arrived:
                 # The forked process was killed or raised an error; this process then runs the step and meets the error.
                 with suppress(EOFError, OSError):
-                    outcome = outcomes.recv()
+                    outcome = connection.recv()
             account = accounts[step.is_independent]
             result, reason, spent = outcome or account.run(step)
             account.book(step, spent)  # includes the forked process, whose remaining steps this one may have to run
             analysis.units += spent
             if reason:
-                skipped[step.name] = f"{step.name}: {reason}"
-                analysis.skipped = [skipped[step.name] for step in steps if step.name in skipped]
+                skip_messages[step.name] = f"{step.name}: {reason}"
+                analysis.skipped = [skip_messages[step.name] for step in steps if step.name in skip_messages]
             else:
                 analysis[step.key] = result
             analysis.pending.remove(step.name)
             on_result(analysis)
-    if inapplicable := ", ".join(step.name for step in analyses if not context.applies(step)):
+    if inapplicable_names := ", ".join(step.name for step in analyses if not context.applies(step)):
         if context.root is not None:
             analysis.skipped.append(
-                f"over the number field {context.root.number_field}: {inapplicable}, integrals in iterates"
+                f"over the number field {context.root.number_field}: {inapplicable_names}, integrals in iterates"
             )
         else:
-            analysis.skipped.append(f"{inapplicable}: for vector fields only")
+            analysis.skipped.append(f"{inapplicable_names}: for vector fields only")
     return analysis
 
 
@@ -254,9 +254,9 @@ class _Account:
 
 
 @contextmanager
-def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
+def _fork_steps(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
     """Run the steps, if any, in a forked process, and yield the connection on which their outcomes arrive."""
-    parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
+    parent_id, (receiver, sender) = os.getpid(), Pipe(duplex=False)
     if not steps:
         yield receiver
         return
@@ -264,7 +264,7 @@ def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], acc
     def work() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        end_with_parent(parent)
+        end_with_parent(parent_id)
         context.progress = lambda _: None
         with suppress(Exception):
             for step in steps:

@@ -105,5 +105,5 @@ class AnalysisResult:
     @property
     def integrals_were_counted(self) -> bool:
         """Whether `integral_count` was determined; if not, it is 0 because no orbit was followed."""
-        measured = self.integrals is not None and bool(self.integrals.profile.nullities)
-        return measured or self.integral_count > 0
+        has_profile = self.integrals is not None and bool(self.integrals.profile.nullities)
+        return has_profile or self.integral_count > 0

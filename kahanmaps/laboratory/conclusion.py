@@ -63,22 +63,22 @@ class _Facts:
         self.growth_text = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis_text = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
         # The phrase with the number of integrals, or with a lower bound of it.
-        where = f" in dimension {result.dim}"
-        number = counted(self.count, "independent integral") if self.count else "no integral"
-        self.integrals_text = number + where if result.count_is_exact else f"at least {number}{where}"
+        suffix = f" in dimension {result.dim}"
+        count_text = counted(self.count, "independent integral") if self.count else "no integral"
+        self.integrals_text = count_text + suffix if result.count_is_exact else f"at least {count_text}{suffix}"
         if not result.integrals_were_counted:
             self.integrals_text = "the integrals were not counted"
         elif not self.count and result.integrals is not None and not result.count_is_exact:
             degree = result.integrals.profile.degree
-            self.integrals_text = f"no integral{where} up to degree {degree} (relations along orbits)"
+            self.integrals_text = f"no integral{suffix} up to degree {degree} (relations along orbits)"
         period = result.integrals.profile.period if result.integrals is not None else None
         self.closing_text = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
         self.liouville = ""  # why the map is Liouville integrable; empty without a proof
         if result.dim > 2 and not self.is_linear:
             for tensor in reversed(result.poisson.tensors if result.poisson is not None else ()):
-                proved = (tensor.verdict, tensor.jacobi, tensor.involution)
-                if tensor.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
+                verdicts = (tensor.verdict, tensor.jacobi, tensor.involution)
+                if tensor.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in verdicts):
                     self.liouville = f"with the Poisson tensor {tensor.name}"
             if isinstance(result.normal_form, SystemNormalForm):
                 self.liouville = "as a member of the commuting family"
@@ -107,42 +107,42 @@ def conclude(result: AnalysisResult) -> Conclusion:
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
-def _nowhere_defined(facts: _Facts) -> _Verdict | None:
+def _if_nowhere_defined(facts: _Facts) -> _Verdict | None:
     degrees = facts.degrees
     if degrees is None or degrees.ended != Ended.SINGULAR or len(degrees.degrees) > 1:
         return None
     return _Verdict("singular", f"The map is nowhere defined: {degrees.message}.")
 
 
-def _linear(facts: _Facts) -> _Verdict | None:
+def _if_linear(facts: _Facts) -> _Verdict | None:
     if not facts.is_linear:
         return None
     eps, B = facts.result.eps, facts.result.file.system.B
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
         return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Certainty.PROVED)
     proof = None if facts.degrees is None else facts.degrees.proof
-    closes = facts.closing_text and f"; {facts.closing_text}"
+    period_text = facts.closing_text and f"; {facts.closing_text}"
     if proof is not None and proof.is_identity:
-        closes = f"; {proof.reason} (proved)"
-    sentence = f"The system is linear, and so is its Kahan map; {facts.integrals_text}{closes}."
+        period_text = f"; {proof.reason} (proved)"
+    sentence = f"The system is linear, and so is its Kahan map; {facts.integrals_text}{period_text}."
     return _Verdict("linear", sentence, ground=Certainty.PROVED)
 
 
-def _contradictory(facts: _Facts) -> _Verdict | None:
-    if not (sentences := contradictions(facts.result)):
+def _if_inconsistent(facts: _Facts) -> _Verdict | None:
+    """Return "undecided" if results contradict each other, or if the map is not birational.
+
+    The degrees and periodic orbits of a map that is not birational are no evidence.
+    """
+    if sentences := contradictions(facts.result):
+        sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capitalize(facts.integrals_text)}."
+    elif facts.result.defect and facts.growth is not Growth.ZERO:
+        sentence = f"{_capitalize(facts.result.defect)}; {facts.growth_text}."
+    else:
         return None
-    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capital(facts.integrals_text)}."
     return _Verdict("undecided", sentence, ground=None)
 
 
-def _not_birational(facts: _Facts) -> _Verdict | None:
-    """Return "undecided" for maps that are not birational; their degrees and periodic orbits are no evidence."""
-    if not facts.result.defect or facts.growth is Growth.ZERO:
-        return None
-    return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.growth_text}.", ground=None)
-
-
-def _linearisable(facts: _Facts) -> _Verdict | None:
+def _if_linearisable(facts: _Facts) -> _Verdict | None:
     """Return the verdict on periodic maps, maps with a constant iterate, and maps of bounded degrees."""
     proof = facts.degrees.proof if facts.degrees is not None else None
     if proof is not None and proof.is_identity:
@@ -150,32 +150,32 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
         return _Verdict("linearisable", sentence, ground=Certainty.PROVED)
     if facts.closing_text:
         return _Verdict(
-            "linearisable", f"{_capital(facts.closing_text)}: the map is periodic there; {facts.growth_text}."
+            "linearisable", f"{_capitalize(facts.closing_text)}: the map is periodic there; {facts.growth_text}."
         )
     if facts.growth is Growth.ZERO:
         return _Verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
     if facts.growth is not Growth.BOUNDED:
         return None
-    bounded = f"The degrees of the iterates are bounded{facts.basis_text}"
-    sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals_text}."
+    bounded_text = f"The degrees of the iterates are bounded{facts.basis_text}"
+    sentence = f"{bounded_text}: the map is linearisable in the sense of bounded degrees; {facts.integrals_text}."
     return _Verdict("linearisable", sentence, ground=facts.growth_certainty)
 
 
-def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
+def _if_entropy_positive(facts: _Facts) -> _Verdict | None:
     """Return the verdict on maps whose dynamical degree is proved to be above 1."""
     result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
-    bound = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
-    where = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
+    bound_text = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
+    eps_text = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
-        f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
+        f"Not integrable (proved): {bound_text}{eps_text}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.growth_text}{facts.basis_text}."
     )
     return _Verdict("not integrable", sentence, _sense_if_not_integrable(result), Certainty.PROVED)
 
 
-def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
+def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
     """Return the verdict on a map whose orbits lie on curves; unproved integrals count only for unknown growth."""
     result, proved_count = facts.result, 0  # the number of independent integrals that are proved
     if result.integrals is not None:
@@ -186,45 +186,45 @@ def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
         genus = result.pencil.genus if result.pencil is not None else None
         if genus is None and result.dim == 2:  # the genus was not computed, but the growth determines it
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
-        where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
+        clause = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = (
-            f"{sense.capitalize()} (proved): {facts.integrals_text}, {where}; {facts.growth_text}{facts.basis_text}."
+            f"{sense.capitalize()} (proved): {facts.integrals_text}, {clause}; {facts.growth_text}{facts.basis_text}."
         )
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
-    on_curves = orbits_lie_on_curves(result)
-    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
+    is_on_curves = orbits_lie_on_curves(result)
+    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or is_on_curves):
         return None
-    curves = ", so that orbits lie on curves" if on_curves else ""
-    sentence = f"Integrable: {facts.integrals_text}{curves}; degrees: {facts.growth_text}."
-    return _Verdict("integrable", sentence, *_sense(facts.liouville))
+    curves_phrase = ", so that orbits lie on curves" if is_on_curves else ""
+    sentence = f"Integrable: {facts.integrals_text}{curves_phrase}; degrees: {facts.growth_text}."
+    return _Verdict("integrable", sentence, *_sense_and_ground(facts.liouville))
 
 
-def _by_growth(facts: _Facts) -> _Verdict | None:
+def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
     """Return the verdict that follows from exponential or polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals_text
-    is_known = facts.growth is Growth.EXPONENTIAL  # if not, the text says that the growth is estimated
-    if is_known or (facts.degrees is not None and facts.degrees.looks_exponential):
-        although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        growth = f"{facts.growth_text}{facts.basis_text if is_known else ''}"
-        sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
-        ground = facts.growth_certainty if is_known else Certainty.ESTIMATED
+    is_exponential = facts.growth is Growth.EXPONENTIAL  # if not, the text says that the growth is estimated
+    if is_exponential or (facts.degrees is not None and facts.degrees.looks_exponential):
+        clause = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
+        growth = f"{facts.growth_text}{facts.basis_text if is_exponential else ''}"
+        sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{clause}."
+        ground = facts.growth_certainty if is_exponential else Certainty.ESTIMATED
         return _Verdict("not integrable", sentence, _sense_if_not_integrable(facts.result), ground)
     if facts.growth in _POLYNOMIAL:
         sentence = (
             f"Integrable in the sense of zero algebraic entropy: {facts.growth_text}{facts.basis_text}; {integrals}."
         )
-        return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.growth_certainty))
+        return _Verdict("integrable", sentence, *_sense_and_ground(facts.liouville, facts.growth_certainty))
     return None
 
 
 # Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
-    *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
-    *(_orbits_on_curves, _by_growth),
+    *(_if_nowhere_defined, _if_linear, _if_inconsistent, _if_linearisable, _if_entropy_positive),
+    *(_if_orbits_on_curves, _verdict_by_growth),
 )
 
 
-def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tuple[str, Certainty | None]:
+def _sense_and_ground(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tuple[str, Certainty | None]:
     if liouville:
         return "Liouville integrable", Certainty.PROVED
     return "integrable in the sense of zero algebraic entropy", ground
@@ -232,11 +232,11 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
 
 def _sense_if_not_integrable(result: AnalysisResult) -> str:
     """Return "confining and not integrable" or "not integrable"."""
-    confined = {run.verdict for run in result.singularities} == {CONFINED}
-    return "confining and not integrable" if confined else "not integrable"
+    is_confined = {run.verdict for run in result.singularities} == {CONFINED}
+    return "confining and not integrable" if is_confined else "not integrable"
 
 
-def _capital(sentence: str) -> str:
+def _capitalize(sentence: str) -> str:
     return sentence[0].upper() + sentence[1:]
 
 
@@ -263,8 +263,8 @@ def contradictions(result: AnalysisResult) -> list[str]:
         )
     if result.degrees is not None and result.degrees.enclosure is not None and orbits_lie_on_curves(result):
         sentences.append("positive algebraic entropy is proved, which excludes an integral")
-    if result.pencil is not None and (impossible := result.pencil.contradiction(growth)):
-        sentences.append(impossible)
+    if result.pencil is not None and (contradiction := result.pencil.contradiction(growth)):
+        sentences.append(contradiction)
     if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
         sentences.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
     return sentences
@@ -275,8 +275,8 @@ def doubt_of_heights(result: AnalysisResult) -> str:
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth
-    bounded = growth in (Growth.ZERO, Growth.BOUNDED)
-    if bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
+    is_bounded = growth in (Growth.ZERO, Growth.BOUNDED)
+    if is_bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
         reason = "the degrees are bounded"
     elif growth in _POLYNOMIAL and kind is Growth.EXPONENTIAL:
         reason = f"the degrees grow {'linearly' if growth is Growth.LINEAR else 'polynomially'}"
@@ -287,8 +287,8 @@ def doubt_of_heights(result: AnalysisResult) -> str:
     steps = max(len(orbit.growth.heights) for orbit in result.heights.orbits) - 1
     longest = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and longest > steps // 2:
-        too_short = (
+        length_text = (
             f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {longest}"
         )
-        return f"{reason}: {too_short}" if reason else too_short
+        return f"{reason}: {length_text}" if reason else length_text
     return reason

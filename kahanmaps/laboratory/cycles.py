@@ -114,7 +114,7 @@ def cycle_census(
         progress: called with messages.
 
     Returns:
-        A `Census`, exact. A TimeLimit ends the count early: the result is then `stopped`.
+        A `Census`, exact. A TimeLimit ends the count early: the result is then `is_stopped`.
 
     Raises:
         InputError: for a prime, number or dimension out of range; BadPrime if eps or the map has no reduction modulo p.
@@ -124,6 +124,8 @@ def cycle_census(
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
+    import numpy as np
+
     map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
     exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
@@ -131,70 +133,66 @@ def cycle_census(
     space = _ProjectiveMap(map_, exact_eps, prime)
     census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
-        return _of_all_points(space, census, progress)
-    random_seed = derive_seed(seed, map_.subject, exact_eps, prime)
-    return _of_samples(space, census, samples or DEFAULT_SAMPLES, steps, random_seed, progress)
+        return _count_all_points(space, census, progress)
+    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.subject, exact_eps, prime))
+    vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # zero vectors among them are no points
+    initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
+    census = replace(census, examined=initial_points.shape[1])
+    step, lengths, is_stopped = 0, dict[int, int](), False
+    indeterminate = [0, 0]  # initial points without image, and points whose orbits end later
+    try:
+        while step < steps and points.shape[1]:
+            progress(f"p = {prime}: step {step} of at most {steps}")
+            batches = range(0, points.shape[1], space.batch_size)
+            points = np.hstack([space.images(points[:, k : k + space.batch_size]) for k in batches])
+            is_indeterminate, is_periodic = ~points.any(axis=0), (points == initial_points).all(axis=0)
+            indeterminate[step > 0] += int(is_indeterminate.sum())
+            step += 1
+            if is_periodic.any():
+                lengths[step] = int(is_periodic.sum())
+            is_open = ~(is_indeterminate | is_periodic)
+            points, initial_points = points[:, is_open], initial_points[:, is_open]
+    except TimeLimit:
+        is_stopped = True
+    census = replace(census, stopped=is_stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
+    return replace(census, indeterminate=indeterminate[0], pre_indeterminate=indeterminate[1])
 
 
-def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[str], None]) -> Census:
+def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[str], None]) -> Census:
     import numpy as np
 
     p, count = census.prime, census.points
     # The code of a point has the coordinates as digits. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
     place_values = p ** np.arange(census.dim + 1)
-    image = np.full(count + 1, count)  # `count` stands for a point without image
+    images = np.full(count + 1, count)  # `count` stands for a point without image
     try:
-        for low in range(0, count, space.portion):
-            progress(f"p = {p}: the images of {low} of {count} points")
-            image_codes = place_values @ space.images(codes[low : low + space.portion] // place_values[:, None] % p)
-            image[low : low + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
+        for k in range(0, count, space.batch_size):
+            progress(f"p = {p}: the images of {k} of {count} points")
+            image_codes = place_values @ space.images(codes[k : k + space.batch_size] // place_values[:, None] % p)
+            images[k : k + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
     except TimeLimit:
         return replace(census, stopped=True)
-    final = image
+    iterates = images
     for _ in range(count.bit_length()):  # doubles the number of steps until all orbits have reached their cycles
-        final = final[final]
-    cyclic = np.setdiff1d(final, [count])
+        iterates = iterates[iterates]
+    cyclic_points = np.setdiff1d(iterates, [count])
     lengths: Counter[int] = Counter()
-    following, is_seen = image.tolist(), bytearray(count)
-    for point in cyclic.tolist():
+    successors, is_seen = images.tolist(), bytearray(count)
+    for point in cyclic_points.tolist():
         length = 0
         while not is_seen[point]:
             is_seen[point] = 1
-            point = following[point]
+            point = successors[point]
             length += 1
         lengths[length] += length > 0
-    indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, final))
+    indeterminate, ending = (int((points[:count] == count).sum()) for points in (images, iterates))
     counts_by_kind = dict[str, Any](
-        indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
+        indeterminate=indeterminate,
+        pre_indeterminate=ending - indeterminate,
+        preperiodic=count - ending - len(cyclic_points),
     )
     return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **counts_by_kind)
-
-
-def _of_samples(
-    space: _ProjectiveMap, census: Census, samples: int, steps: int, seed: int, progress: Callable[[str], None]
-) -> Census:
-    import numpy as np
-
-    drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
-    start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
-    examined, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
-    try:
-        while done < steps and start.shape[1]:
-            progress(f"p = {census.prime}: step {done} of at most {steps}")
-            portions = range(0, points.shape[1], space.portion)
-            points = np.hstack([space.images(points[:, low : low + space.portion]) for low in portions])
-            is_indeterminate, is_periodic = ~points.any(axis=0), (points == start).all(axis=0)
-            ended[done > 0] += int(is_indeterminate.sum())
-            done += 1
-            if is_periodic.any():
-                lengths[done] = int(is_periodic.sum())
-            goes_on = ~(is_indeterminate | is_periodic)
-            points, start = points[:, goes_on], start[:, goes_on]
-    except TimeLimit:
-        stopped = True
-    census = replace(census, stopped=stopped, examined=examined, steps=done, lengths=lengths)
-    return replace(census, indeterminate=ended[0], pre_indeterminate=ended[1], open=start.shape[1])
 
 
 class _ProjectiveMap:
@@ -205,24 +203,24 @@ class _ProjectiveMap:
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
-        self.portion = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
+        self.batch_size = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
         # For each map of a composition: its forms, or a matrix whose maximal minors are its forms, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
-            matrix, by_minors = factor.equation.polynomials(), False
+            matrix, is_by_minors = factor.equation.polynomials(), False
             if factor.equation.explicit is not None:
                 matrix = factor.equation.explicit.polynomials()
-            elif map_.dim <= MAX_FACTORED and not (reduced := homogeneous_map(factor)).factor.is_constant():
-                matrix = [reduced.forms]
+            elif map_.dim <= MAX_FACTORED and not (projective_map := homogeneous_map(factor)).factor.is_constant():
+                matrix = [projective_map.forms]
             else:
-                by_minors = True
+                is_by_minors = True
             terms = [[[(tuple(map(int, m)), int(c)) for m, c in form.terms()] for form in row] for row in matrix]
-            self.maps.append((by_minors, terms))
+            self.maps.append((is_by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """Return the images of at most `portion` points; a point without image has a column of zeros."""
+        """Return the images of at most `batch_size` points; a point without image has a column of zeros."""
         p = self.prime
-        for by_minors, matrix in self.maps:
+        for is_by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}
             for exponents in {exponents for row in matrix for form in row for exponents, _ in form}:
                 monomial = X[0] ** 0
@@ -231,7 +229,7 @@ class _ProjectiveMap:
                         monomial = monomial * coordinate % p
                 powers[exponents] = monomial
             rows = [[sum(c * powers[m] % p for m, c in f) % p if f else None for f in row] for row in matrix]
-            image = kernel_minors(rows, lambda a, b: a * b % p) if by_minors else rows[0]
+            image = kernel_minors(rows, lambda a, b: a * b % p) if is_by_minors else rows[0]
             values = 0 * X
             for value, form in zip(values, image, strict=True):
                 value += 0 if form is None else form % p
@@ -240,11 +238,11 @@ class _ProjectiveMap:
 
     def normalized(self, X: Any) -> Any:
         """Divide each column by its last nonzero entry; columns of zeros are unchanged."""
-        last = X[0]
+        scale = X[0]
         for row in X[1:]:
-            last = row + last * (row == 0)
+            scale = row + scale * (row == 0)
         for bit in reversed(f"{self.prime - 2:b}"):  # 1/x = x^(p - 2), and 0 for x = 0
-            X, last = X * last % self.prime if bit == "1" else X, last * last % self.prime
+            X, scale = X * scale % self.prime if bit == "1" else X, scale * scale % self.prime
         return X
 
 
@@ -257,10 +255,10 @@ def default_eps(prime: int) -> list[fmpq]:
     >>> default_eps(101)
     [1/7, 2/11]
     """
-    chosen: dict[int, fmpq] = {}
+    eps_by_residue: dict[int, fmpq] = {}
     for eps in map(rational, DEFAULT_EPS):
         if eps.p % prime and eps.q % prime:
             residue = int(GF(prime).convert(eps))
             if prime <= 5 or pow(residue, 4, prime) != 1:
-                chosen.setdefault(min(residue, prime - residue), eps)
-    return list(chosen.values())[:2]
+                eps_by_residue.setdefault(min(residue, prime - residue), eps)
+    return list(eps_by_residue.values())[:2]

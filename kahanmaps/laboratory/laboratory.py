@@ -126,8 +126,8 @@ class Laboratory:
         if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
-                given = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
-                raise InputError(f"found {given}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+                found_text = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {found_text}, expected no other symbols and a degree of at most {MAX_DEGREE}")
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)
@@ -152,8 +152,8 @@ class Laboratory:
             raise InputError(
                 f"found {found_text}, expected a polynomial vector field without eps for an analysis of the flow"
             )
-        subject = self.map.subject if self.root is None else file.map.subject
-        self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all random choices for this map
+        map_key = self.map.subject if self.root is None else file.map.subject
+        self.seed = derive_seed(seed, self.symbols, map_key, self.eps)  # of all random choices for this map
         self.maps = list(self._draw_maps("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
         self.request = file, self.free_symbols, self.eps, seed, self.primes  # the first fields of every search result
@@ -216,8 +216,8 @@ class Laboratory:
         except NoPoint:
             return f"{at_eps_text}the map is defined nowhere: {name} is identically 0"
         if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
-            where = "points" if self.system is None else "images"
-            return f"{at_eps_text}the map is not invertible: {numerator} is 0 at all {where}"
+            where_text = "points" if self.system is None else "images"
+            return f"{at_eps_text}the map is not invertible: {numerator} is 0 at all {where_text}"
         return ""
 
     def cofactors(self) -> list[Cofactor]:
@@ -264,19 +264,19 @@ class Laboratory:
         A function is not expanded if an earlier one with at most as many terms was too long to expand.
         """
         if self.field is not None and self.flow:
-            is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
+            is_preserved = flow_preserves(self.field, function, is_density=is_density, factor=factor)
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIME_DEPENDENT
-            return (Certainty.PROVED if is_kept else Certainty.REFUTED), evidence
+            return (Certainty.PROVED if is_preserved else Certainty.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
         options: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
-        in_planes = self._separated
+        separated_system = self._separated_system
         terms = len(function.numerator) + len(function.denominator)
-        expands = in_planes is None and terms < self._too_long.get(is_density, math.inf)
+        expands = separated_system is None and terms < self._too_long.get(is_density, math.inf)
         verdict, evidence = verdict_on(map_, function, **options, factor=factor, expands=expands)
-        if verdict is Certainty.SUPPORTED and in_planes is not None:
-            moved_factor = None if factor is None else in_planes.function(factor)
+        if verdict is Certainty.SUPPORTED and separated_system is not None:
+            factor_in_z = None if factor is None else separated_system.function(factor)
             certainty, proof = verdict_on(
-                in_planes.system, in_planes.function(function), **options, factor=moved_factor
+                separated_system.system, separated_system.function(function), **options, factor=factor_in_z
             )
             if certainty is not Certainty.SUPPORTED:
                 summary = f"{proof.summary}, in coordinates in which the planes separate"
@@ -286,8 +286,8 @@ class Laboratory:
         return verdict, evidence
 
     @cached_property
-    def _separated(self) -> Separated | None:
-        return None if self.system is None or self.symbols else separated(self.system)
+    def _separated_system(self) -> SeparatedSystem | None:
+        return None if self.system is None or self.symbols else separate_planes(self.system)
 
     def formulas(
         self,
@@ -313,7 +313,7 @@ class Laboratory:
         """
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
-        supports = [set(space.places) for space in model]
+        supports = [set(space.indices) for space in model]
         # In echelon forms the coefficient of the largest monomial is 1. The unknowns are all other nonzero
         # coefficients.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
@@ -328,7 +328,7 @@ class Laboratory:
             except (NoPoint, BadPrime):
                 return None
             if not spaces or any(
-                not set(space.places) <= support or len(space.basis) != len(space_pivots)
+                not set(space.indices) <= support or len(space.basis) != len(space_pivots)
                 for space, support, space_pivots in zip(spaces, supports, pivots, strict=True)
             ):
                 return None  # the spaces have other monomials or dimensions
@@ -341,10 +341,10 @@ class Laboratory:
         names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
         functions: list[RationalFunction] = []
         if any(unknowns):
-            answer = reconstruct_at(root, black_box, names, seed=self.seed, budget=budget)
-            if answer.functions is None:
-                return ClosedForms(None, answer.reason)
-            functions += answer.functions
+            reconstruction = reconstruct_at(root, black_box, names, seed=self.seed, budget=budget)
+            if reconstruction.functions is None:
+                return ClosedForms(None, reconstruction.reason)
+            functions += reconstruction.functions
         context, n = ring((*variables, *symbols, "eps")), len(variables)
         gens, bases = context.gens()[n:], []
         for space, space_pivots, space_unknowns in zip(model, pivots, unknowns, strict=True):
@@ -385,7 +385,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
                 if len(root.residues(GF(prime))) == m:
                     return prime
 
-    def box(prime: int, point: Point) -> list[int] | None:
+    def black_box_over_root(prime: int, point: Point) -> list[int] | None:
         roots, rows = root.residues(GF(prime)), []
         for t in roots:
             values = black_box(prime, (t, *point))
@@ -395,15 +395,15 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
         interpolants = [interpolated(roots, column, prime) for column in zip(*rows, strict=True)]
         return [int(P[j]) for P in interpolants for j in range(m)]
 
-    answer = reconstruct(box, names[1:], draw=draw_splitting_prime, **options)
-    if answer.functions is None:
-        return answer
+    reconstruction = reconstruct(black_box_over_root, names[1:], draw=draw_splitting_prime, **options)
+    if reconstruction.functions is None:
+        return reconstruction
     t, *gens = ring(names).gens()
     functions = []
-    for k in range(0, len(answer.functions), m):
-        numerators, denominator = over_one_denominator(answer.functions[k : k + m], t.context(), gens)
+    for k in range(0, len(reconstruction.functions), m):
+        numerators, denominator = over_one_denominator(reconstruction.functions[k : k + m], t.context(), gens)
         functions.append(RationalFunction(sum((P * t**j for j, P in enumerate(numerators)), 0 * t), denominator))
-    return replace(answer, functions=tuple(functions))
+    return replace(reconstruction, functions=tuple(functions))
 
 
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
@@ -471,7 +471,7 @@ def euler_map(field: PolynomialField) -> ImplicitMap:
     return explicit_map(field.variables, [RationalFunction(P, context.constant(1)) for P in images])
 
 
-def is_kept_by_flow(
+def flow_preserves(
     system: PolynomialField,
     function: RationalFunction,
     *,
@@ -486,7 +486,7 @@ def is_kept_by_flow(
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
-    >>> [is_kept_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
+    >>> [flow_preserves(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
     [True, False]
     """
     P, Q = function.numerator, function.denominator
@@ -501,7 +501,7 @@ def is_kept_by_flow(
 
 
 def verdict_on(
-    given: QuadraticSystem | MapFamily,
+    system_like: QuadraticSystem | MapFamily,
     function: RationalFunction,
     eps: fmpq | None,
     seed: int = 0,
@@ -515,7 +515,7 @@ def verdict_on(
     The identity is to hold for every value of the symbols of the map and, if `eps` is None, for every eps.
 
     Args:
-        given: the map, some of its parameters symbols; a system stands for its Kahan map.
+        system_like: the map, some of its parameters symbols; a system stands for its Kahan map.
         function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
         eps: half the time step (exact), or None for every eps.
         seed: the random seed.
@@ -542,12 +542,12 @@ def verdict_on(
     >>> str(verdict_on(system, parse_rational_function("x^2", ["x", "eps"]), None, is_density=True)[0])
     'proved'
     """
-    map_ = as_map(given)
+    map_ = as_map(system_like)
     n, root = map_.dim, map_.root
 
-    def sides(field: Field, values: tuple[Any, ...], eps_value: Any) -> Sides | None:
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q; for a density, multiplied by the sides of det dPhi(x)."""
-        x, symbols = values[:n], values[n:]
+        x, symbols = point[:n], point[n:]
         map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)
         parameters = (*(symbols if root is None else (root.over(field),)), eps_value)
@@ -569,13 +569,13 @@ def verdict_on(
         return [left], [right]
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
-    eps_text = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
-    values = " and ".join([*eps_text, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    eps_texts = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
+    point = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
-    scope = f"for {values}{restriction}" if values else restriction.removeprefix(", ").strip()
-    subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
+    scope = f"for {point}{restriction}" if point else restriction.removeprefix(", ").strip()
+    identity_key = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
     identity = Identity(
-        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject
+        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=identity_key
     )
     return certified(identity, seed, expands=expands and n <= MAX_DIMENSION)
 
@@ -589,13 +589,13 @@ def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[C
 
 
 @dataclass(frozen=True)
-class Separated:
+class SeparatedSystem:
     """A system written in z, where x = T z; Kahan's method is equivariant under linear changes of variables."""
 
     system: QuadraticSystem
     T: fmpq_mat
 
-    def function(self, given: RationalFunction) -> RationalFunction:
+    def function(self, function: RationalFunction) -> RationalFunction:
         """Write a function of (x, ...) as a function of (z, ...)."""
 
         def change_variables(polynomial: fmpq_mpoly) -> fmpq_mpoly:
@@ -603,17 +603,17 @@ class Separated:
             x = linear_combinations(self.T, context.gens()[:n])
             return polynomial.compose(*x, *context.gens()[n:], ctx=context)
 
-        return RationalFunction(change_variables(given.numerator), change_variables(given.denominator))
+        return RationalFunction(change_variables(function.numerator), change_variables(function.denominator))
 
 
-def separated(system: QuadraticSystem) -> Separated | None:
+def separate_planes(system: QuadraticSystem) -> SeparatedSystem | None:
     """Write a system in coordinates in which the planes over Q of its normal form separate.
 
     Returns None for a system without such planes, and if the system written so is no shorter.
 
     >>> from kahanmaps.documents.catalog import load
     >>> system = load("paper_m2").system
-    >>> [len(f) for f in system.rhs], [len(f) for f in separated(system).system.rhs]
+    >>> [len(f) for f in system.rhs], [len(f) for f in separate_planes(system).system.rhs]
     ([8, 8, 9, 9], [2, 3, 3, 2])
     """
     normal_form = system_normal_form(system)
@@ -623,4 +623,5 @@ def separated(system: QuadraticSystem) -> Separated | None:
     matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
     T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
     separated_system = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
-    return Separated(separated_system, T) if sum(map(len, separated_system.rhs)) < sum(map(len, system.rhs)) else None
+    is_shorter = sum(map(len, separated_system.rhs)) < sum(map(len, system.rhs))
+    return SeparatedSystem(separated_system, T) if is_shorter else None

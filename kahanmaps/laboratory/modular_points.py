@@ -79,7 +79,7 @@ class ModularMap:
 
     def pairs(self, count: int) -> Iterator[tuple[Point, Point]]:
         """Yield `count` random points with their images. Raises NoPoint if the map is undefined at too many points."""
-        missed = 0
+        failure_count = 0
         while count > 0:
             x = self.random_point()
             image = self.step(x)
@@ -87,8 +87,8 @@ class ModularMap:
                 yield x, image
                 count -= 1
             else:
-                missed += 1
-                if missed > _TRIES:
+                failure_count += 1
+                if failure_count > _TRIES:
                     raise NoPoint(_UNDEFINED)
 
     def orbit(self, count: int) -> list[Point]:
@@ -96,7 +96,7 @@ class ModularMap:
 
         If an orbit meets an indeterminacy point, another one is tried. Raises NoPoint if all tried orbits meet one.
         """
-        longest = 0
+        max_length = 0
         for _ in range(_TRIES):
             points = [self.random_point()]
             while len(points) < count and (image := self.step(points[-1])) != points[0]:
@@ -105,8 +105,8 @@ class ModularMap:
                 points.append(image)
             else:
                 return points
-            longest = max(longest, len(points))
-        raise NoPoint(_UNDEFINED if longest == 1 else "orbits modulo a prime meet the singular set")
+            max_length = max(max_length, len(points))
+        raise NoPoint(_UNDEFINED if max_length == 1 else "orbits modulo a prime meet the singular set")
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
@@ -150,14 +150,14 @@ class ModularFlow(ModularMap):
         self._divergence = self._terms(field.divergence)
         # The products from which f is evaluated: each monomial is a variable times an earlier monomial.
         tables = monomial_tables(self.dim, self.degree)
-        waiting = {place for terms in self._f for _, place in terms}
+        indices = {index for terms in self._f for _, index in terms}
         products: dict[int, tuple[int, int]] = {}
-        while waiting:
-            place = waiting.pop()
-            if place > self.dim and place not in products:
-                variable, _, lower = tables[place][-1]
-                products[place] = variable, lower
-                waiting.add(lower)
+        while indices:
+            index = indices.pop()
+            if index > self.dim and index not in products:
+                variable, _, quotient_index = tables[index][-1]
+                products[index] = variable, quotient_index
+                indices.add(quotient_index)
         self._products = sorted(products.items())
 
     def _terms(self, polynomial: fmpq_mpoly) -> list[tuple[int, int]]:
@@ -165,10 +165,10 @@ class ModularFlow(ModularMap):
         field, n = GF(self.prime), self.dim
         terms = []
         for monomial, coefficient in polynomial.terms():
-            total = field.convert(coefficient)
+            residue = field.convert(coefficient)
             for value, exponent in zip(self.values, monomial[n:], strict=True):
-                total = total * field.convert(value) ** int(exponent)
-            terms.append((int(total), places_of(n, self.degree)[tuple(map(int, monomial[:n]))]))
+                residue = residue * field.convert(value) ** int(exponent)
+            terms.append((int(residue), monomial_index(n, self.degree)[tuple(map(int, monomial[:n]))]))
         return terms
 
     def step(self, x: Point) -> Point:
@@ -189,9 +189,9 @@ class ModularFlow(ModularMap):
         p = self.prime
         values = monomial_values(x, degree, p)
         count_work(len(values) * self.dim / 4)
-        f = [after - before for before, after in zip(x, image, strict=True)]
+        f = [image_coordinate - coordinate for coordinate, image_coordinate in zip(x, image, strict=True)]
         image_values = [
-            (value + sum(e * values[place] * f[k] for k, e, place in derivatives)) * factors[1] % p
+            (value + sum(e * values[quotient_index] * f[k] for k, e, quotient_index in derivatives)) * factors[1] % p
             for value, derivatives in zip(values, monomial_tables(self.dim, degree), strict=True)
         ]
         return [factors[0] * value % p for value in values], image_values
@@ -210,31 +210,33 @@ class ModularFlow(ModularMap):
         """
         p, factors = self.prime, monomial_tables(self.dim, degree)
         columns = len(factors) if support is None else len(support)
-        in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
-        count_work(orders * (in_rows + columns / 2) + 3 * columns)
+        recursion_units = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
+        count_work(orders * (recursion_units + columns / 2) + 3 * columns)
         # The keys are indices of monomials: the constant 1 has index 0, the k-th variable has index k + 1.
         coefficients = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
-        coefficients |= {place: list[int]() for place, _ in self._products}
+        coefficients |= {index: list[int]() for index, _ in self._products}
         for order in range(1, orders):
-            for place, (variable, lower) in self._products:
-                coefficients[place].append(sum(map(mul, coefficients[variable + 1], reversed(coefficients[lower]))) % p)
-            derivatives = [sum(c * coefficients[place][-1] for c, place in f) for f in self._f]
-            inverse = pow(order, -1, p)
+            for index, (variable, divisor) in self._products:
+                coefficients[index].append(
+                    sum(map(mul, coefficients[variable + 1], reversed(coefficients[divisor]))) % p
+                )
+            derivatives = [sum(c * coefficients[index][-1] for c, index in f) for f in self._f]
+            inverse_order = pow(order, -1, p)
             coefficients[0].append(0)
             for k, derivative in enumerate(derivatives, 1):
-                coefficients[k].append(derivative * inverse % p)
+                coefficients[k].append(derivative * inverse_order % p)
         solution = [nmod_poly(coefficients[k + 1], p) for k in range(self.dim)]
-        table = {0: nmod_poly([1], p)}
+        monomial_series = {0: nmod_poly([1], p)}
 
-        def monomial(place: int) -> nmod_poly:
-            if place not in table:
-                variable, _, lower = factors[place][-1]
-                table[place] = monomial(lower).mul_low(solution[variable], orders)
-            return table[place]
+        def series_of(index: int) -> nmod_poly:
+            if index not in monomial_series:
+                variable, _, divisor = factors[index][-1]
+                monomial_series[index] = series_of(divisor).mul_low(solution[variable], orders)
+            return monomial_series[index]
 
-        series = [monomial(place).coeffs() for place in (range(len(factors)) if support is None else support)]
+        expansions = [series_of(index).coeffs() for index in (range(len(factors)) if support is None else support)]
         # A list of coefficients ends with its last nonzero entry, so every list may be shorter than `orders`.
-        rows: list[Values] = list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
+        rows: list[Values] = list(islice(zip_longest(*expansions, fillvalue=nmod(0, p)), orders))
         return rows + [[nmod(0, p)] * columns] * (orders - len(rows))
 
 
@@ -245,7 +247,7 @@ def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def places_of(dim: int, degree: int) -> dict[Exponent, int]:
+def monomial_index(dim: int, degree: int) -> dict[Exponent, int]:
     """Return the index of each monomial in `exponents_up_to` this degree."""
     return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
 
@@ -253,22 +255,22 @@ def places_of(dim: int, degree: int) -> dict[Exponent, int]:
 @cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     """Return, for each monomial, (variable, exponent, index of monomial/variable) for each of its variables."""
-    places = places_of(dim, degree)
+    indices = monomial_index(dim, degree)
     return [
-        [(k, e, places[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
-        for exponent in places
+        [(k, e, indices[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
+        for exponent in indices
     ]
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
     """Return, by degree, for each monomial of the support one of its variables and the index of monomial/variable."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
-    positions = {index: position for position, index in enumerate(support)}
+    columns = {index: column for column, index in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
     for index in support:
         if index:
-            variable, _, quotient = tables[index][-1]
-            layers[sum(exponents[index]) - 1].append((variable, positions[quotient]))
+            variable, _, quotient_index = tables[index][-1]
+            layers[sum(exponents[index]) - 1].append((variable, columns[quotient_index]))
     return layers
 
 
@@ -286,11 +288,11 @@ def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
 
 def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
     """Return the values of the monomials in the layers of `_layers_of`, times a factor."""
-    x, table = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
+    x, values = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
-        table += [table[place] * x[variable] for variable, place in layer]
-    count_work(len(table) / 10)
-    return table
+        values += [values[quotient_index] * x[variable] for variable, quotient_index in layer]
+    count_work(len(values) / 10)
+    return values
 
 
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
@@ -301,8 +303,8 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     for coefficient, factors, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
         if coefficient:  # most are 0
             value += coefficient * power
-            for variable, exponent, place in factors:
-                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[place]) % prime
+            for variable, exponent, quotient_index in factors:
+                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[quotient_index]) % prime
     return value % prime, gradient
 
 
@@ -312,8 +314,8 @@ def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int
     rows = [[0] * len(powers) for _ in point]
     count_work(len(point) * len(powers) / 5)
     for k, factors in enumerate(monomial_tables(len(point), degree)):
-        for variable, exponent, place in factors:
-            rows[variable][k] = exponent * powers[place] % prime
+        for variable, exponent, quotient_index in factors:
+            rows[variable][k] = exponent * powers[quotient_index] % prime
     return rows
 
 
@@ -322,42 +324,42 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 
     Lists of coefficients may end before the last monomial; missing coefficients are 0.
     """
-    exponents, places = exponents_up_to(dim, degree), places_of(dim, degree)
-    row = [0] * len(exponents)
+    exponents, indices = exponents_up_to(dim, degree), monomial_index(dim, degree)
+    coefficients = [0] * len(exponents)
     count_work(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
     for a, p in zip(exponents, P, strict=False):
         if p:
             for b, q in zip(exponents, Q, strict=False):
                 if q:
-                    place = places.get(tuple(i + j for i, j in zip(a, b, strict=True)))
-                    if place is None:
+                    index = indices.get(tuple(i + j for i, j in zip(a, b, strict=True)))
+                    if index is None:
                         return None
-                    row[place] = (row[place] + p * q) % prime
-    return row
+                    coefficients[index] = (coefficients[index] + p * q) % prime
+    return coefficients
 
 
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
     """Return the polynomial modulo a prime with these values at distinct nodes, of degree less than their number."""
-    table = list(values)
+    differences = list(values)
     count_work(len(nodes) ** 2 / 2)
     inverse = cache(lambda difference: pow(difference, -1, prime))
     for k in range(1, len(nodes)):  # Newton's divided differences
         for i in range(len(nodes) - 1, k - 1, -1):
-            table[i] = (table[i] - table[i - 1]) * inverse(nodes[i] - nodes[i - k]) % prime
+            differences[i] = (differences[i] - differences[i - 1]) * inverse(nodes[i] - nodes[i - k]) % prime
     P = nmod_poly([0], prime)
-    for node, c in zip(reversed(nodes), reversed(table), strict=True):
+    for node, c in zip(reversed(nodes), reversed(differences), strict=True):
         P = P * nmod_poly([-node % prime, 1], prime) + nmod_poly([c], prime)
     return P
 
 
-def scaled_gradient(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
+def scaled_gradient(function: RationalFunction, field: Any, point: Sequence[Any], n: int) -> list[Any]:
     """Return the gradient of N/D in the first n variables, times D^2."""
-    N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
-    dN, dD = (gradient(part)[:n] for part in (function.numerator, function.denominator))
-    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(dN, dD, strict=True)]
+    N, D = (evaluate(polynomial, field, point) for polynomial in (function.numerator, function.denominator))
+    dN, dD = (gradient(polynomial)[:n] for polynomial in (function.numerator, function.denominator))
+    return [evaluate(a, field, point) * D - evaluate(b, field, point) * N for a, b in zip(dN, dD, strict=True)]
 
 
-class Independent:
+class IndependentGradients:
     """The gradients of independent functions at one random point modulo a prime, for tests of independence.
 
     `rows` are multiples of the gradients of the functions added so far.
@@ -370,8 +372,8 @@ class Independent:
     def gradient(self, function: RationalFunction) -> list[int]:
         """Return a multiple of the gradient, in the variables, of a function of (variables, symbols, eps)."""
         field = GF(self.map.prime)
-        place = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
-        return [int(entry) for entry in scaled_gradient(function, field, place, self.map.dim)]
+        point = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
+        return [int(entry) for entry in scaled_gradient(function, field, point, self.map.dim)]
 
     def adds(self, row: list[int]) -> bool:
         """Return whether a gradient is linearly independent of the stored gradients, without adding it."""

@@ -28,12 +28,12 @@ from kahanmaps.maps.kahan import SystemLike
 LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
 
-_LINE = 100  # maximal number of characters in a line of an expression
-_TERMS_TOGETHER = 100  # longer sums are split by brackets: parsers recurse over sums
+_MAX_LINE = 100  # maximal number of characters in a line of an expression
+_MAX_SUM = 100  # longer sums are split by brackets: parsers recurse over sums
 _MAX_INTEGER = 2**31  # bound for integers in C and Fortran
 # Names that have no other meaning in any language: a lower-case letter with digits (except i, which may be the
 # imaginary unit, and e), and words with an underscore (except those of GP's debugger). Other words may be functions.
-_FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
+_SAFE_NAME = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
 
 def convert(
@@ -79,32 +79,28 @@ def convert(
     if name and not (is_name(name) and name[0] != "_"):
         raise InputError(f"found the name {name[:40]!r}, expected a letter, then letters, digits and _")
     formulas = Formulas(as_file(system), symbols)
-    parts = _parts(what, formulas)
+    if what is None:
+        parts = [*(["system"] if formulas.rhs else []), "map"]
+        parts += [part for part in ("integrals", "density") if part not in formulas.missing]
+    else:
+        if isinstance(what, str):
+            raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
+        requested = list(what)
+        for part in requested:
+            if part not in PARTS:
+                raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
+        if not requested:
+            raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
+        if not formulas.rhs and (of_field := [part for part in ("system", "jacobian") if part in requested]):
+            expected = "map, map-formulas, inverse, integrals or density"
+            raise InputError(f"found the part {of_field[0]} of {formulas.map.kind}, expected {expected}")
+        for part in formulas.missing:
+            if part in requested:
+                raise InputError(formulas.missing[part])
+        parts = [part for part in PARTS if part in requested]
     if language == "latex":
         return write_latex(formulas, parts, command)
     return _Writer(language, formulas, name).text(parts, command)
-
-
-def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
-    """Return the parts in the order of `PARTS`. Raises InputError for unknown or unavailable parts."""
-    if what is None:
-        first = ["system", "map"] if formulas.rhs else ["map"]
-        return [*first, *(part for part in ("integrals", "density") if part not in formulas.missing)]
-    if isinstance(what, str):
-        raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
-    requested = list(what)
-    for part in requested:
-        if part not in PARTS:
-            raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
-    if not requested:
-        raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
-    if not formulas.rhs and (fields := [part for part in ("system", "jacobian") if part in requested]):
-        expected = "map, map-formulas, inverse, integrals or density"
-        raise InputError(f"found the part {fields[0]} of {formulas.map.kind}, expected {expected}")
-    for part in formulas.missing:
-        if part in requested:
-            raise InputError(formulas.missing[part])
-    return [part for part in PARTS if part in requested]
 
 
 class _Writer:
@@ -116,10 +112,10 @@ class _Writer:
         self.formulas = formulas
         self.polynomial = _polynomial_writer(self.language)
         self.written: dict[str, str] = {}  # name of a function in the language -> its text
-        self.used = {"point", "image", "eps", "value"}  # names in lower case, since Fortran ignores case
+        self.used_names = {"point", "image", "eps", "value"}  # names in lower case, since Fortran ignores case
         self.prefix = [prefix] if prefix else []
         kind = "kahan" if formulas.rhs else "map"
-        default_names = {f"kahan_{what}": f"{kind}_{what}" for what in ("matrix", "vector", "inverse", "jacobian")}
+        default_names = {f"kahan_{part}": f"{kind}_{part}" for part in ("matrix", "vector", "inverse", "jacobian")}
         default_names |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
         default_names |= {"kahan_map_formula": default_names["kahan_map"] + "_formula"}
         default_names |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
@@ -132,24 +128,25 @@ class _Writer:
         self.placeholders |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
         # Names of variables and symbols in the file: unchanged unless a name has another meaning; all are distinct.
         names = (*formulas.names, *formulas.new)
-        free = {name for name in names if _FREE.fullmatch(name) and (self.language["underscores"] or "_" not in name)}
-        self.safe = {name: self._fresh_name(name) for name in names if name in free}
-        self.safe |= {name: self._fresh_name("v", name) for name in names if name not in free} | {"eps": "eps"}
+        unchanged = {name for name in names if _SAFE_NAME.fullmatch(name)}
+        unchanged -= set() if self.language["underscores"] else {name for name in names if "_" in name}
+        self.spelling = {name: self._fresh_name(name) for name in names if name in unchanged}
+        self.spelling |= {name: self._fresh_name("v", name) for name in names if name not in unchanged} | {"eps": "eps"}
         self.eps = ["eps"] if formulas.map.has_eps else []
-        self.symbols = [self.safe[name] for name in formulas.symbols]
+        self.symbols = [self.spelling[name] for name in formulas.symbols]
 
     def _fresh_name(self, *words: str) -> str:
         """Return an unused name composed of these words, with a number if necessary, and reserve it."""
         number = 1
         while True:
-            numbered = [*words, str(number)] if number > 1 else words
-            pieces = [piece for word in numbered for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
+            all_words = [*words, str(number)] if number > 1 else words
+            pieces = [piece for word in all_words for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
             if self.language["underscores"]:
                 name = "_".join(pieces)
             else:  # lower case first: Sin and Integral would be names of Mathematica
                 name = pieces[0][0].lower() + pieces[0][1:] + "".join(p[0].upper() + p[1:] for p in pieces[1:])
-            if name.lower() not in self.used:
-                self.used.add(name.lower())
+            if name.lower() not in self.used_names:
+                self.used_names.add(name.lower())
                 return name
             number += 1
 
@@ -159,14 +156,14 @@ class _Writer:
             self._write_part(part)
         language, formulas = self.language, self.formulas
         lines = formulas.header(command)
-        renamed = [f"{name} is called {used}" for name in formulas.names if (used := self.safe[name]) != name]
-        if renamed:
-            lines.append(f"Names that {language['title']} cannot use or reads otherwise: {', '.join(renamed)}")
+        renamings = [f"{name} is called {new}" for name in formulas.names if (new := self.spelling[name]) != name]
+        if renamings:
+            lines.append(f"Names that {language['title']} cannot use or reads otherwise: {', '.join(renamings)}")
         if self.names["kahan_map"] in self.written:
             values = [str(k) for k in range(1, formulas.dim + 1)]
             more = "".join(f", {value}" for value in [*[language["tenth"]] * len(self.eps), *self.symbols])
-            shown = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
-            lines.append(f"For example: {self._fill('usage', values=shown, more=more)}")
+            example_values = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
+            lines.append(f"For example: {self._fill('usage', values=example_values, more=more)}")
         needs_solver = any(self.placeholders["solve"] in text for text in self.written.values())
         pieces = [
             "\n".join(map(self._comment, lines)),
@@ -188,13 +185,13 @@ class _Writer:
             if is_kahan:
                 comments = ["M = I - eps f'(x)", "r = M x + 2 eps f(x)"]
                 comments.append("The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r")
-            rows = [self._listed("row", list(map(self._expression, row[:-1]))) for row in formulas.equation]
-            matrix = self._listed("matrix", rows, self.language["between_rows"])
+            rows = [self._bracketed("row", list(map(self._expression, row[:-1]))) for row in formulas.equation]
+            matrix = self._bracketed("matrix", rows, self.language["between_rows"])
             self._function("kahan_matrix", comments[0], "matrix", matrix, point)
             right = self._vector([row[-1] for row in formulas.equation])
             self._function("kahan_vector", comments[1], "vector", right, point)
             self._function(
-                "kahan_map", comments[2], "vector", self._solved("solve", self._call("kahan_vector", "point"))
+                "kahan_map", comments[2], "vector", self._fill_solver("solve", self._call("kahan_vector", "point"))
             )
         elif part == "inverse" and not is_kahan:
             inverse = self._vector(formulas.inverse_form())
@@ -208,7 +205,7 @@ class _Writer:
             right = self._call("kahan_matrix", self._call("kahan_map", "point"), "-eps")
             comment = "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))"
             solve = "solve_matrix" if self.language["solve_matrix"] else "solve"
-            self._function("kahan_jacobian", comment, "matrix", self._solved(solve, right))
+            self._function("kahan_jacobian", comment, "matrix", self._fill_solver(solve, right))
         elif part == "map-formulas":
             map_name, arguments = "Kahan map" if is_kahan else "map", "x and eps" if self.eps else "x"
             components = self._vector(formulas.closed_form())
@@ -221,7 +218,7 @@ class _Writer:
         elif part == "density":
             self._write_part("map")
             comment = "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))"
-            self._function("density", comment, "number", self._solved("det"))
+            self._function("density", comment, "number", self._fill_solver("det"))
         elif part == "integrals":
             for name, function in formulas.integrals.items():
                 comment = f"{name}: the file says that it is an integral of the map"
@@ -248,32 +245,34 @@ class _Writer:
         Without `points` the function has one point, used as a vector.
         """
         numbers = [*(self.eps if eps else []), *self.symbols]
-        local = {point: [self.safe[name] for name in names] for point, names in (points or {"point": ()}).items()}
-        arguments = [self._fill("point", name=point) for point in local]
+        coordinates = {
+            point: [self.spelling[name] for name in names] for point, names in (points or {"point": ()}).items()
+        }
+        arguments = [self._fill("point", name=point) for point in coordinates]
         arguments += [self._fill("number" if name == "eps" else "symbol", name=name) for name in numbers]
         lines = [
             self._fill("take", name=name, point=point, number=str(k + 1), index=str(k))
-            for point, names in local.items()
+            for point, names in coordinates.items()
             for k, name in enumerate(names)
         ]
         if lines and self.language["exact"]:
             lines += [self._fill("exact", name=name) for name in numbers]
-        names = [name for every in local.values() for name in every]
+        names = [name for point_names in coordinates.values() for name in point_names]
         indent = re.split(r"\$\{?lines", self.language["function"])[0].rpartition("\n")[2]
         text = self._fill(
             "function",
             name=self.names[key],
             kind=self._fill(f"{kind}_kind"),
             arguments=", ".join(arguments),
-            declared=", ".join([*(f"{point}({self.formulas.dim})" for point in local), *numbers]),
+            declared=", ".join([*(f"{point}({self.formulas.dim})" for point in coordinates), *numbers]),
             local=self._fill("local", names=", ".join(names)) if names else "",
             lines="".join(f"{line}\n{indent}" for line in lines),
             value=value,
         ).lstrip("\n")
         if self.language["continued"]:  # lines of Fortran have at most 132 characters
-            joined = text.replace("\n        ", " ").splitlines()
-            wrapped = [textwrap.wrap(line, 110, break_long_words=False) for line in joined]
-            text = "\n".join(f"{self.language['continued']}\n        ".join(line) for line in wrapped)
+            long_lines = text.replace("\n        ", " ").splitlines()
+            broken_lines = [textwrap.wrap(line, 110, break_long_words=False) for line in long_lines]
+            text = "\n".join(f"{self.language['continued']}\n        ".join(line) for line in broken_lines)
         self.written[self.names[key]] = f"{self._comment(comment)}\n{text}"
 
     def _expression(self, function: RationalFunction | fmpq_mpoly) -> str:
@@ -285,24 +284,24 @@ class _Writer:
         texts = []
         for side in sides:
             terms = list(terms_of(side))
-            groups = [dict(terms[k : k + _TERMS_TOGETHER]) for k in range(0, len(terms), _TERMS_TOGETHER)] or [{}]
-            sums = [self.polynomial(side.context().from_dict(group), self.safe) for group in groups]
+            groups = [dict(terms[k : k + _MAX_SUM]) for k in range(0, len(terms), _MAX_SUM)] or [{}]
+            sums = [self.polynomial(side.context().from_dict(group), self.spelling) for group in groups]
             texts.append(sums[0] if len(sums) == 1 else " + ".join(f"({text})" for text in sums))
         expression = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
         lines = [""]  # every line but the last ends with + or -: no language ends the statement there
         for piece in re.split(r"(?<= [+-] )", expression):
-            if lines[-1] and len(lines[-1]) + len(piece) > _LINE:
+            if lines[-1] and len(lines[-1]) + len(piece) > _MAX_LINE:
                 lines.append("")
             lines[-1] += piece
-        broken = "\n        ".join(line.rstrip() for line in lines)
-        return f"({broken})" if len(lines) > 1 else broken
+        broken_text = "\n        ".join(line.rstrip() for line in lines)
+        return f"({broken_text})" if len(lines) > 1 else broken_text
 
     def _vector(self, entries: Iterable[RationalFunction | fmpq_mpoly]) -> str:
-        return self._listed("vector", list(map(self._expression, entries)))
+        return self._bracketed("vector", list(map(self._expression, entries)))
 
-    def _listed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
+    def _bracketed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
         """Return entries in the brackets of a vector, a row or a matrix, on one line if it is not too long."""
-        has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _LINE
+        has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _MAX_LINE
         before, after = (Template(bracket).substitute(self.placeholders) for bracket in self.language[kind])
         return before + (between + (" " if has_room else "\n        ")).join(entries) + after
 
@@ -311,17 +310,17 @@ class _Writer:
             "call", name=self.names[key], arguments=", ".join([point, *(arguments or self.eps), *self.symbols])
         )
 
-    def _solved(self, template: str, right: str = "") -> str:
+    def _fill_solver(self, template: str, right: str = "") -> str:
         return self._fill(template, M=self._call("kahan_matrix", "point"), right=right)
 
-    def _fill(self, template: str, **more: str) -> str:
-        return Template(self.language[template]).substitute(self.placeholders | more)
+    def _fill(self, template: str, **values: str) -> str:
+        return Template(self.language[template]).substitute(self.placeholders | values)
 
     def _comment(self, line: str) -> str:
         # A backslash at the end would continue a comment in C and Maple; the brackets end a comment in Mathematica.
-        safe = re.sub(r"\\$", "/", line.replace("(*", "( *").replace("*)", "* )"))
+        spelling = re.sub(r"\\$", "/", line.replace("(*", "( *").replace("*)", "* )"))
         before, after = self.language["comment"]
-        return f"{before}{safe}{after}".rstrip()
+        return f"{before}{spelling}{after}".rstrip()
 
 
 def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Mapping[str, str]], str]:
@@ -330,8 +329,8 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
     Raises InputError if SymPy is needed and not installed.
     """
     if not language["printer"]:  # PARI
-        return lambda polynomial, safe: Notation(
-            safe.__getitem__, str, "{}^{}".format, ("-", " + ", " - "), gap="", eps_first=False
+        return lambda polynomial, spelling: Notation(
+            spelling.__getitem__, str, "{}^{}".format, ("-", " + ", " - "), gap="", eps_first=False
         ).polynomial(polynomial)
     try:
         import sympy
@@ -349,8 +348,8 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
     settings = {"source_format": "free", "standard": 95} if is_fortran else {}
     code = ExactPrinter().doprint if language["printer"] == "ExactPrinter" else getattr(sympy, language["printer"])
 
-    def write(polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
-        symbols = [sympy.Symbol(safe[name]) for name in names_of(polynomial)]
+    def write(polynomial: fmpq_mpoly, spelling: Mapping[str, str]) -> str:
+        symbols = [sympy.Symbol(spelling[name]) for name in names_of(polynomial)]
         terms = []
         for powers, value in terms_of(polynomial):
             coefficient = sympy.Rational(int(value.p), int(value.q))

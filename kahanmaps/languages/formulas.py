@@ -51,10 +51,10 @@ class Formulas:
         map_ = self.map
         self.variables, self.symbols, self.dim = map_.variables, map_.symbols, len(map_.variables)
         self.names = (*self.variables, *self.symbols)
-        ending = "_new"
-        while any(variable + ending in self.names for variable in self.variables):
-            ending += "_"
-        self.new = tuple(variable + ending for variable in self.variables)
+        suffix = "_new"
+        while any(variable + suffix in self.names for variable in self.variables):
+            suffix += "_"
+        self.new = tuple(variable + suffix for variable in self.variables)
         has_field = isinstance(map_, KahanFamily) and "eps" not in map_.system.symbols
         self.rhs: tuple[fmpq_mpoly, ...] = map_.system.rhs if has_field and isinstance(map_, KahanFamily) else ()
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
@@ -133,7 +133,7 @@ class Formulas:
 
     def inverse_form(self) -> list[RationalFunction]:
         """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is not found."""
-        return self._solved([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
+        return self._solve([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
@@ -145,9 +145,9 @@ class Formulas:
         >>> [format_rational_function(component) for component in Formulas(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
         """
-        return self._solved(self.equation)
+        return self._solve(self.equation)
 
-    def _solved(self, equation: list[list[fmpq_mpoly]]) -> list[RationalFunction]:
+    def _solve(self, equation: list[list[fmpq_mpoly]]) -> list[RationalFunction]:
         if self.dim > MAX_DIMENSION_OF_FORMULAS:
             raise _too_large(f"dimension {self.dim}, expected at most {MAX_DIMENSION_OF_FORMULAS}")
 
@@ -161,11 +161,11 @@ class Formulas:
         *numerators, denominator = kernel_minors(equation, times)
         components = []
         for minor in numerators:
-            common = minor.gcd(denominator)
-            components.append(RationalFunction(-minor / common, denominator / common))
-        total = sum(len(function.numerator) + len(function.denominator) for function in components)
-        if total > MAX_TERMS:
-            raise _too_large(f"{total} terms, expected at most {MAX_TERMS}")
+            gcd = minor.gcd(denominator)
+            components.append(RationalFunction(-minor / gcd, denominator / gcd))
+        term_count = sum(len(function.numerator) + len(function.denominator) for function in components)
+        if term_count > MAX_TERMS:
+            raise _too_large(f"{term_count} terms, expected at most {MAX_TERMS}")
         return components
 
     def header(self, command: str, width: int = 100) -> list[str]:
@@ -198,13 +198,17 @@ class Formulas:
         lines += [f"Source: {SOURCES[key]}" for key in file.catalog.get("sources", ())]
         origin = f"Written by kahanmaps {__version__}" + (f": {command}" if command else "")
         lines.append(origin)
-        wrapped: list[str] = []
+        broken_lines: list[str] = []
         for line in lines:
-            shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
-            keep = line is origin or line.startswith("  ")  # commands are not wrapped, so that they can be copied
-            wrapped += [shown] if keep else textwrap.wrap(shown, width, subsequent_indent="  ", break_long_words=False)
+            shown_line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+            is_code = line is origin or line.startswith("  ")  # commands are not wrapped, so that they can be copied
+            broken_lines += (
+                [shown_line]
+                if is_code
+                else textwrap.wrap(shown_line, width, subsequent_indent="  ", break_long_words=False)
+            )
         # Python interprets "coding: x" in the first two lines of a file as its encoding.
-        return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
+        return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(broken_lines)]
 
 
 def _too_large(size: str) -> InputError:

@@ -13,7 +13,7 @@ from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.convention import describe_eps
 
-_LINE = 140  # maximal number of source characters in a line of a formula
+_MAX_LINE = 140  # maximal number of source characters in a line of a formula
 # Symbols for the point and its image, distinct from x, which may be the name of a variable.
 _X, _Y = r"\mathbf x", r"\widetilde{\mathbf x}"
 
@@ -35,15 +35,15 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
     for part in parts:
         title, rows = _display(part, formulas)
         # A long right-hand side is broken between terms of the sum outside braces.
-        aligned = []
+        aligned_rows = []
         for left, right in rows:
             pieces = [""]
-            for term in re.split(r" (?=[+-] )", right) if len(right) > _LINE else [right]:
-                if pieces[-1] and len(pieces[-1]) + len(term) > _LINE:
+            for term in re.split(r" (?=[+-] )", right) if len(right) > _MAX_LINE else [right]:
+                if pieces[-1] and len(pieces[-1]) + len(term) > _MAX_LINE:
                     pieces.append("")
                 pieces[-1] += f" {term}" if pieces[-1] else term
-            aligned += [f"{left} &= {pieces[0]}", *(rf"&\quad {piece}" for piece in pieces[1:])]
-        lines += [f"{title}:", r"\begin{align*}", " \\\\\n".join(aligned), r"\end{align*}", ""]
+            aligned_rows += [f"{left} &= {pieces[0]}", *(rf"&\quad {piece}" for piece in pieces[1:])]
+        lines += [f"{title}:", r"\begin{align*}", " \\\\\n".join(aligned_rows), r"\end{align*}", ""]
         if part == "map" and formulas.rhs:
             lines.pop()
             jacobian = " \\\\\n".join(" & ".join(map(latex_polynomial, row)) for row in formulas.jacobian)
@@ -53,7 +53,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
 
 def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
     """Return the title of a part and the two sides of each of its equations."""
-    claimed = "" if formulas.file.catalog else ", as the file claims"
+    claim_note = "" if formulas.file.catalog else ", as the file claims"
     if part == "system":
         left = (rf"\dot{{{latex_name(name)}}}" for name in formulas.variables)
         title = r"The system $\dot{\mathbf x} = f(\mathbf x)$"
@@ -63,7 +63,16 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
         rows.append((_X, f"({', '.join(map(latex_name, formulas.variables))})"))
         return rf"The Kahan map ${_X} \mapsto {_Y}$", rows
     if part == "map":
-        return "The map", _equations(formulas)
+        rows = []
+        for row in formulas.equation:
+            entries = [(e, name) for e, name in zip(row, formulas.variables, strict=False) if not e.is_zero()]
+            if len(entries) == 1:
+                ((denominator, name),) = entries
+                rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", RationalFunction(row[-1], denominator))
+            else:
+                terms = (rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
+                rows.append((" + ".join(terms), latex_polynomial(row[-1])))
+        return "The map", rows
     if part == "inverse" and formulas.rhs:
         return "Its inverse", [(_X, rf"{_Y} - 2 \varepsilon (I + \varepsilon f'({_Y}))^{{-1}} f({_Y})")]
     if part == "inverse":
@@ -78,8 +87,8 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
         title = r"The invariant measure $\mathrm{d}\mathbf x/\varphi$"
         if formulas.density is None:
             return title, [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
-        return title + claimed, _quotient(r"\varphi", formulas.density)
-    rows = [row for name, f in formulas.integrals.items() for row in _quotient(_label(name or "I"), f)]
+        return title + claim_note, _quotient(r"\varphi", formulas.density)
+    rows = [row for name, f in formulas.integrals.items() for row in _quotient(_integral_label(name or "I"), f)]
     for k in range(len(formulas.forms)):
         power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
         rows.append((rf"\widetilde H_{{{k}}}", rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"))
@@ -88,25 +97,12 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
     elif formulas.H is not None:
         modified = rf"H({_X}) + \tfrac{{1}}{{3}} (\nabla H({_X}))^{{\mathsf T}} ({_Y} - {_X})"
         rows += [(r"\widehat H", modified), ("H", latex_polynomial(formulas.H))]
-    return f"Integrals of the map{claimed if formulas.integrals else ''}", rows
+    return f"Integrals of the map{claim_note if formulas.integrals else ''}", rows
 
 
 def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Rows:
-    named = zip(formulas.variables, functions, strict=True)
-    return [row for name, function in named for row in _quotient(rf"\widetilde{{{latex_name(name)}}}", function)]
-
-
-def _equations(formulas: Formulas) -> Rows:
-    rows: Rows = []
-    for row in formulas.equation:
-        entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]
-        if len(entries) == 1:
-            ((denominator, name),) = entries
-            rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", RationalFunction(row[-1], denominator))
-        else:
-            left = " + ".join(rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
-            rows.append((left, latex_polynomial(row[-1])))
-    return rows
+    components = zip(formulas.variables, functions, strict=True)
+    return [row for name, function in components for row in _quotient(rf"\widetilde{{{latex_name(name)}}}", function)]
 
 
 def _matrix(matrix: fmpq_mat) -> str:
@@ -114,23 +110,23 @@ def _matrix(matrix: fmpq_mat) -> str:
     return rf"\begin{{pmatrix}} {entries} \end{{pmatrix}}"
 
 
-def _label(name: str) -> str:
+def _integral_label(name: str) -> str:
     r"""Return the name of an integral, any printable text, for use in math mode.
 
     Letters that are not ASCII are written as numbers, since not every TeX supports them.
 
-    >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
+    >>> print(_integral_label("F1"), _integral_label("a_b"), _integral_label("H~ é"))
     F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}
     """
-    shown = "".join(c if c.isascii() else f"[U+{ord(c):04X}]" for c in name)
-    is_text = shown != name or any(c in name for c in "\\^~ ")
-    return latex_name(shown).replace(r"\mathrm{", r"\text{", 1) if is_text else latex_name(shown)
+    ascii_name = "".join(c if c.isascii() else f"[U+{ord(c):04X}]" for c in name)
+    is_text = ascii_name != name or any(c in name for c in "\\^~ ")
+    return latex_name(ascii_name).replace(r"\mathrm{", r"\text{", 1) if is_text else latex_name(ascii_name)
 
 
 def _quotient(left: str, function: RationalFunction) -> Rows:
     """Return the row left = P/Q if it is short, otherwise separate rows for P and Q without fractions."""
     quotient = latex_rational_function(function)
-    if len(quotient) <= _LINE or function.is_polynomial:
+    if len(quotient) <= _MAX_LINE or function.is_polynomial:
         return [(left, quotient)]
     is_negative, numerator, denominator = integer_fraction(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"

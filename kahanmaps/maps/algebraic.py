@@ -33,7 +33,7 @@ class AlgebraicMap(MapFamily):
         self.variables, self.title, self.time_steps = given.variables, given.title, given.time_steps
         self.denominator_name = given.denominator_name
         self._at_number = at_number
-        self._last: tuple[Field, Any] | None = None
+        self._cached_root: tuple[Field, Any] | None = None
 
     @property
     def has_eps(self) -> bool:
@@ -59,23 +59,23 @@ class AlgebraicMap(MapFamily):
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
         """Return the map over a field that contains a root of g. Raises BadPrime if GF(p) contains none."""
         over = self.root.number_field if over is QQ else over
-        if self._last is None or self._last[0] is not over:
-            self._last = over, self.root.over(over)
-        return self.given.at(eps, over, [*values, self._last[1]] if self.given.symbols else values)
+        if self._cached_root is None or self._cached_root[0] is not over:
+            self._cached_root = over, self.root.over(over)
+        return self.given.at(eps, over, [*values, self._cached_root[1]] if self.given.symbols else values)
 
     @property
-    def _name(self) -> str:
+    def _root_name(self) -> str:
         """The name of the root: the symbol of the map; t if the map does not contain the root."""
         return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:
-        return {**self.given.written(), "algebraic": {self._name: str(self.root)}}
+        return {**self.given.written(), "algebraic": {self._root_name: str(self.root)}}
 
     def __str__(self) -> str:
-        return f"{self.given}\nwhere {self._name} is a {self.root}"
+        return f"{self.given}\nwhere {self._root_name} is a {self.root}"
 
     def __repr__(self) -> str:
-        return f"AlgebraicMap({self.given!r}, {self._name} = {self.root})"
+        return f"AlgebraicMap({self.given!r}, {self._root_name} = {self.root})"
 
 
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:

@@ -49,13 +49,13 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
     for equation in equations:
         row = [context.constant(0)] * (n + 1)
         for monomial, coefficient in equation.terms():
-            old, new = monomial[:n], monomial[n : 2 * n]
-            if sum(old) > 1 or sum(new) > 1:
+            old_exponents, new_exponents = monomial[:n], monomial[n : 2 * n]
+            if sum(old_exponents) > 1 or sum(new_exponents) > 1:
                 term = format_polynomial(equation.context().from_dict({monomial: coefficient}))
                 raise InputError(
                     f"found the term {term}, expected terms of degree at most 1 in the old point and in the new one"
                 )
-            column = next((j for j, exponent in enumerate(new) if exponent), n)
-            row[column] = row[column] + context.from_dict({(*old, *monomial[2 * n :]): coefficient})
+            column = next((j for j, exponent in enumerate(new_exponents) if exponent), n)
+            row[column] = row[column] + context.from_dict({(*old_exponents, *monomial[2 * n :]): coefficient})
         rows.append(tuple(row))
     return ImplicitMap(names, tuple(rows), TITLE)

@@ -63,7 +63,7 @@ class ComposedMap(MapFamily):
 
     def __init__(self, variables: tuple[str, ...], parts: Sequence[MapFactor], symbols: tuple[str, ...]) -> None:
         self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
-        self._last: tuple[Field, Any, Map] | None = None
+        self._cache: tuple[Field, Any, Map] | None = None
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -81,19 +81,19 @@ class ComposedMap(MapFamily):
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
         """The sum over the factors, if they are powers of one map; otherwise 0, since they have no common flow."""
-        letters = self._letters
-        return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
+        factors = self._elementary_factors
+        return sum(steps for _, steps in factors) if all(factor == factors[0][0] for factor, _ in factors) else 0
 
     @property
-    def _letters(self) -> list[tuple[Any, int]]:
+    def _elementary_factors(self) -> list[tuple[Any, int]]:
         """The elementary factors, with compositions expanded, each with its signed number of time steps."""
-        all_letters: list[tuple[Any, int]] = []
-        for part in self.parts:
-            part_letters = [(part.map_and_values, part.map.time_steps)]
-            if isinstance(part.map, ComposedMap) and not part.values:
-                part_letters = part.map._letters
-            all_letters += [(letter, -steps if part.is_inverse else steps) for letter, steps in part_letters]
-        return all_letters
+        elementary_factors: list[tuple[Any, int]] = []
+        for map_factor in self.parts:
+            factors = [(map_factor.map_and_values, map_factor.map.time_steps)]
+            if isinstance(map_factor.map, ComposedMap) and not map_factor.values:
+                factors = map_factor.map._elementary_factors
+            elementary_factors += [(factor, -steps if map_factor.is_inverse else steps) for factor, steps in factors]
+        return elementary_factors
 
     @property
     def digits(self) -> int:
@@ -101,15 +101,15 @@ class ComposedMap(MapFamily):
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
         """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if a factor has no reduction."""
-        element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
-            parts = [part.at(element, over, values) for part in self.parts]
-            self._last = (over, None if values else element, Map(parts, element, self.variables))
-        return self._last[2]
+        eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
+        if self._cache is None or values or self._cache[0] is not over or self._cache[1] is not eps_element:
+            parts = [part.at(eps_element, over, values) for part in self.parts]
+            self._cache = (over, None if values else eps_element, Map(parts, eps_element, self.variables))
+        return self._cache[2]
 
     @cached_property
     def _multiplied_out(self) -> ImplicitMap | None:
-        image = _formulas(self.names, self.parts)
+        image = _expand_image(self.names, self.parts)
         return None if image is None else explicit_map(self.variables, image)
 
     @property
@@ -121,7 +121,7 @@ class ComposedMap(MapFamily):
     def multiplied_out(self) -> ImplicitMap:
         """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if these are too long."""
         if self._multiplied_out is None:
-            raise TooLarge(_too_large(self.parts))
+            raise TooLarge(_too_large_message(self.parts))
         return self._multiplied_out
 
     @property
@@ -137,10 +137,10 @@ class ComposedMap(MapFamily):
     @cached_property
     def inverse_rows(self) -> Rows:
         """The rows of the expanded inverse. Raises InputError if the formulas are too long."""
-        backward = _reversed(self.parts)
-        image = _formulas(self.names, backward)
+        inverse_factors = _invert_factors(self.parts)
+        image = _expand_image(self.names, inverse_factors)
         if image is None:
-            raise TooLarge(_too_large(backward))
+            raise TooLarge(_too_large_message(inverse_factors))
         return explicit_map(self.variables, image).rows
 
     @property
@@ -163,8 +163,8 @@ class ComposedMap(MapFamily):
             return str(self.multiplied_out)
         lines = [f"{counted(len(self.parts), 'map')} one after the other, too large to be multiplied out:"]
         for part in self.parts:
-            of = "inverse of the " * part.is_inverse + part.map.title
-            lines.append(f"the {of} in {', '.join(part.map.variables)}")
+            title = "inverse of the " * part.is_inverse + part.map.title
+            lines.append(f"the {title} in {', '.join(part.map.variables)}")
             lines += [f"  {line}" for line in str(part.map).split("\n")]
         return "\n".join(lines)
 
@@ -208,51 +208,55 @@ def composed_map(
     if symbols is None:
         symbols = tuple(dict.fromkeys(name for map_, _ in powers for name in map_.symbols))
     context = ring(symbols)
-    themselves = {
+    symbols_as_functions = {
         name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)
     }
-    given_parts: list[MapFactor] = []
+    requested_factors: list[MapFactor] = []
     for k, (map_, power) in enumerate(powers):
-        functions = themselves | dict(values[k]) if values else themselves
-        missing = next((name for name in map_.symbols if name not in functions), None)
-        if missing is not None:
+        functions = symbols_as_functions | dict(values[k]) if values else symbols_as_functions
+        missing_symbol = next((name for name in map_.symbols if name not in functions), None)
+        if missing_symbol is not None:
             raise InputError(
-                f"found a map with the symbol {missing}: give its value, or make it a symbol of the composition"
+                f"found a map with the symbol {missing_symbol}: give its value, or make it a symbol of the composition"
             )
-        given_parts += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
-    if not given_parts:
+        requested_factors += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
+    if not requested_factors:
         raise InputError("found no map to compose, expected at least one")
-    parts: list[MapFactor] = []  # adjacent factors that are inverse to each other are cancelled
-    for part in given_parts:
-        if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
-            parts.pop()
+    factors: list[MapFactor] = []  # adjacent factors that are inverse to each other are cancelled
+    for factor in requested_factors:
+        if (
+            factors
+            and factors[-1].is_inverse != factor.is_inverse
+            and factors[-1].map_and_values == factor.map_and_values
+        ):
+            factors.pop()
         else:
-            parts.append(part)
-    first = given_parts[0].map
-    parts = parts or [*given_parts[:1], *_reversed(given_parts[:1])]
-    if any(part.map.dim != first.dim for part in parts):
-        dimensions = ", ".join(str(part.map.dim) for part in parts)
-        raise InputError(f"the maps must have the same dimension: got {dimensions}")
-    for part in parts:
-        if set(part.map.variables) == set(first.variables) and part.map.variables != first.variables:
-            orders = f"{', '.join(first.variables)} and {', '.join(part.map.variables)}"
-            raise InputError(f"the maps must have their variables in the same order: got {orders}")
-        if part.is_inverse:
-            _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError if there is no inverse
-    variables = first.variables if variables is None else tuple(variables)
-    if len(variables) != first.dim:
-        raise InputError(f"found {len(variables)} variables for maps of dimension {first.dim}, expected as many")
-    return ComposedMap(tuple(variables), parts, tuple(symbols))
+            factors.append(factor)
+    first_map = requested_factors[0].map
+    factors = factors or [*requested_factors[:1], *_invert_factors(requested_factors[:1])]
+    if any(factor.map.dim != first_map.dim for factor in factors):
+        dimensions_text = ", ".join(str(factor.map.dim) for factor in factors)
+        raise InputError(f"the maps must have the same dimension: got {dimensions_text}")
+    for factor in factors:
+        if set(factor.map.variables) == set(first_map.variables) and factor.map.variables != first_map.variables:
+            orders_text = f"{', '.join(first_map.variables)} and {', '.join(factor.map.variables)}"
+            raise InputError(f"the maps must have their variables in the same order: got {orders_text}")
+        if factor.is_inverse:
+            _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # raises InputError if there is none
+    variables = first_map.variables if variables is None else tuple(variables)
+    if len(variables) != first_map.dim:
+        raise InputError(f"found {len(variables)} variables for maps of dimension {first_map.dim}, expected as many")
+    return ComposedMap(tuple(variables), factors, tuple(symbols))
 
 
-def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
+def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
     """Return the inverses of the factors in the opposite order."""
     return [MapFactor(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
 
 
 def is_involution(map_: MapFamily) -> bool:
     """Return whether Phi(Phi(x)) = x at random points modulo primes; the probability of an error is below 2^-40."""
-    rng, tried = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
+    rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in map_.variables)
@@ -262,13 +266,13 @@ def is_involution(map_: MapFamily) -> bool:
                 return False
         except (BadPrime, SingularStep):
             continue
-        tried += 1
-        if tried == 3:
+        success_count += 1
+        if success_count == 3:
             return True
     return False
 
 
-def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
+def _expand_image(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
     """Return the image of (x_1, ..., x_n) as functions of the names (eps is the last), in lowest terms.
 
     Returns None if the expansion takes too many products of terms.
@@ -285,7 +289,7 @@ def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[Rational
     return [RationalFunction(entry.numerator, entry.denominator) for entry in point]
 
 
-def _too_large(parts: Sequence[MapFactor]) -> str:
+def _too_large_message(parts: Sequence[MapFactor]) -> str:
     return (
         f"found a composition of {counted(len(parts), 'map')} whose formulas are too large to be multiplied out, "
         "expected a shorter one, since the request needs its formulas"

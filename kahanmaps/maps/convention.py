@@ -21,12 +21,12 @@ NO_TIME_STEP = "eps enters the map as its file defines it; there is no time step
 NO_EPS = "the map does not depend on eps"
 
 
-def either(hint: str = "", **given: Any) -> Any:
+def either(hint: str = "", **arguments: Any) -> Any:
     """Return the argument that is given under one of several names, or None. Raises InputError if two are given."""
-    named = {name: value for name, value in given.items() if value is not None}
-    if len(named) > 1:
-        raise InputError(f"found {' and '.join(named)}, expected one of them{hint}")
-    return next(iter(named.values()), None)
+    given_values = {name: value for name, value in arguments.items() if value is not None}
+    if len(given_values) > 1:
+        raise InputError(f"found {' and '.join(given_values)}, expected one of them{hint}")
+    return next(iter(given_values.values()), None)
 
 
 def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:
@@ -73,20 +73,20 @@ def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
 
     The value is None if the maps do not depend on eps.
     """
-    meaning, step = convention(*maps), time_step(1 if eps is None else eps, *maps)
+    convention_text, step = convention(*maps), time_step(1 if eps is None else eps, *maps)
     return {
-        "eps": None if meaning == NO_EPS else "every" if eps is None else format_number(eps),
+        "eps": None if convention_text == NO_EPS else "every" if eps is None else format_number(eps),
         "time_step": None if step is None else "every" if eps is None else format_number(step),
-        "convention": meaning,
+        "convention": convention_text,
     }
 
 
 def eps_record_suffix(context: Mapping[str, Any]) -> str:
     """Return the text about eps and the time step in a record, to be appended to the name of the map."""
-    meaning = context.get("convention", CONVENTION)
-    if meaning == NO_EPS:
+    convention_text = context.get("convention", CONVENTION)
+    if convention_text == NO_EPS:
         return ""
-    multiple, step = meaning.rpartition(" is ")[2], context["time_step"]
+    multiple, step = convention_text.rpartition(" is ")[2], context["time_step"]
     if context["eps"] == "every":
         return f", every eps{'' if step is None else f' (the time step is {multiple})'}"
     return f", eps = {context['eps']}{'' if step is None else f' (time step {multiple} = {step})'}"

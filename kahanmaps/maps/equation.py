@@ -54,13 +54,13 @@ class Equation:
         powers: list[list[Any]] = [[None, entry] for entry in X]
         monomials = []
         for exponent in self.exponents:
-            total = None
-            for table, e in zip(powers, exponent, strict=True):
-                while len(table) <= e:
-                    table.append(times(table[-1], table[1]))
+            product = None
+            for powers_of_entry, e in zip(powers, exponent, strict=True):
+                while len(powers_of_entry) <= e:
+                    powers_of_entry.append(times(powers_of_entry[-1], powers_of_entry[1]))
                 if e:
-                    total = table[e] if total is None else times(total, table[e])
-            monomials.append(total)
+                    product = powers_of_entry[e] if product is None else times(product, powers_of_entry[e])
+            monomials.append(product)
         return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
@@ -104,8 +104,8 @@ class Equation:
         denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
         forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
         # If fractions are not in lowest terms, their common denominator may share a factor with all numerators.
-        common = reduce(lambda P, Q: P.gcd(Q), forms)
-        forms = [form / common for form in forms]
+        common_factor = reduce(lambda P, Q: P.gcd(Q), forms)
+        forms = [form / common_factor for form in forms]
         degree = forms[-1].total_degree()
         if degree > 1:
             exponents = sorted({tuple(map(int, m)) for form in forms for m in form.monoms()})
@@ -113,8 +113,8 @@ class Equation:
             exponents = [tuple(int(i == k) for i in range(self.dim + 1)) for k in range(self.dim + 1)]
         if degree < 1 or sum(map(len, forms)) > _MAX_TERMS:
             return None
-        position = {exponent: k for k, exponent in enumerate(exponents)}
-        terms = (tuple((position[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
+        index = {exponent: k for k, exponent in enumerate(exponents)}
+        terms = (tuple((index[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
         return Equation(self.over, tuple(exponents), (tuple(terms),))
 
     def polynomials(self) -> list[list[Any]]:
@@ -125,9 +125,9 @@ class Equation:
             context = nmod_mpoly_ctx.get(names, modulus=self.over.prime, ordering=Ordering.degrevlex)
         else:
             context = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
-        scalar = int if isinstance(self.over, PrimeField) else fmpq
+        coefficient_type = int if isinstance(self.over, PrimeField) else fmpq
         return [
-            [context.from_dict({self.exponents[k]: scalar(value) for k, value in entry}) for entry in row]
+            [context.from_dict({self.exponents[k]: coefficient_type(value) for k, value in entry}) for entry in row]
             for row in self.terms
         ]
 
@@ -155,26 +155,26 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     rows = list(rows)
     n = len(rows)
     context = ring(names_of(rows[0][-1])[n:])
-    by_monomial: list[list[dict[Exponents, Any]]] = []
+    rows_by_monomial: list[list[dict[Exponents, Any]]] = []
     for row in rows:
-        tables: list[dict[Exponents, Any]] = []
+        entries: list[dict[Exponents, Any]] = []
         for entry in row:
-            collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
+            coefficients: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
             for monomial, coefficient in entry.terms():
-                collected.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
+                coefficients.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
             with over.working():
-                tables.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
-        by_monomial.append(tables)
-    degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
+                entries.append({m: evaluate(context.from_dict(c), over, point) for m, c in coefficients.items()})
+        rows_by_monomial.append(entries)
+    degree = max((sum(m) for row in rows_by_monomial for entry in row for m in entry), default=0)
     if degree <= 1:
         exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
     else:
-        monomials = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
+        monomials = dict.fromkeys(m for row in rows_by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in monomials]
-    drops_zeros = over is QQ or over.characteristic > 0  # a ball that contains 0 need not be 0
-    position = {exponent[:n]: k for k, exponent in enumerate(exponents)}
+    is_exact = over is QQ or over.characteristic > 0  # a ball that contains 0 need not be 0
+    index = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
-        tuple(tuple((position[m], c) for m, c in entry.items() if not drops_zeros or c != 0) for entry in row)
-        for row in by_monomial
+        tuple(tuple((index[m], c) for m, c in entry.items() if not is_exact or c != 0) for entry in row)
+        for row in rows_by_monomial
     )
     return Equation(over, tuple(exponents), terms)

@@ -59,10 +59,10 @@ def explicit_map(
     return ImplicitMap(names, _rows(names, image), TITLE, backward=None if inverse is None else _rows(names, inverse))
 
 
-def _rows(names: tuple[str, ...], given: Sequence[Any]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
-    n, text_of = len(given), import_module("kahanmaps.documents.expressions").formula_text  # from a higher layer
+def _rows(names: tuple[str, ...], formulas: Sequence[Any]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+    n, text_of = len(formulas), import_module("kahanmaps.documents.expressions").formula_text  # from a higher layer
     functions = [
-        f if isinstance(f, RationalFunction) else parse_rational_function(text_of(f), (*names, "eps")) for f in given
+        f if isinstance(f, RationalFunction) else parse_rational_function(text_of(f), (*names, "eps")) for f in formulas
     ]
     return tuple(
         (*(f.denominator if i == j else f.denominator * 0 for j in range(n)), -f.numerator)

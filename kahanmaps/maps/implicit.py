@@ -154,10 +154,12 @@ class Map(LatexDisplay):
         if power:
             return Map([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
         n, one = self.dim, self.field.one
-        units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
+        exponents = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # x~ - x = 0
         flow = self.flow and (self.flow[0], self.field.zero)
-        return ElementaryMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
+        return ElementaryMap(
+            Equation(self.field, exponents, tuple(map(tuple, rows))), self.eps, None, self.variables, flow
+        )
 
     def __eq__(self, other: object) -> bool:
         """Return whether the factors have the same equations in the same order."""
@@ -165,8 +167,10 @@ class Map(LatexDisplay):
             return NotImplemented
         if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
             return False
-        mine, theirs = ([(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other))
-        return mine == theirs
+        own_equations, other_equations = (
+            [(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other)
+        )
+        return own_equations == other_equations
 
     def __hash__(self) -> int:
         return hash((self.dim, self.variables))
@@ -217,23 +221,23 @@ class Map(LatexDisplay):
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """Return det M(x), the denominator of the map; for several factors, the product at the intermediate points."""
-        first, *others = (factor.determinant(x) for factor, x in self.stages(point))
+        first_determinant, *other_determinants = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
-            return reduce(mul, others, first)
+            return reduce(mul, other_determinants, first_determinant)
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """Return the Jacobi matrix dPhi(x); it is M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
         jacobians = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
-            return reduce(lambda total, slope: slope * total, jacobians)
+            return reduce(lambda product, jacobian: jacobian * product, jacobians)
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
-        coordinates = ",".join(self.field.format(entry) for entry in point)
-        if len(coordinates) > 200:
-            coordinates = f"{coordinates[:100]}...{coordinates[-80:]}"
+        coordinates_text = ",".join(self.field.format(entry) for entry in point)
+        if len(coordinates_text) > 200:
+            coordinates_text = f"{coordinates_text[:100]}...{coordinates_text[-80:]}"
         at_eps = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates}{at_eps}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{at_eps}: "
             "the map is not defined there",
             point,
             self.eps,
@@ -333,8 +337,8 @@ class ElementaryMap(Map):
         return IntegerSteps(equation.exponents, equation.terms)
 
     def __repr__(self) -> str:
-        name, eps = type(self).__name__, self.field.format(self.eps)
-        return f"{name}({', '.join(self.variables)}; eps={eps}, over {self.field})"
+        eps = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
+        return f"{type(self).__name__}({', '.join(self.variables)}; {eps}over {self.field})"
 
 
 def det_of(name: str) -> str:
@@ -481,7 +485,7 @@ class ImplicitMap(MapFamily):
     time_steps: int = 0
     backward: Rows | None = None
     of_field: PolynomialField | None = None
-    _last: list[tuple[Field, Any, ElementaryMap]] = field(default_factory=list, init=False, repr=False)
+    _cached_maps: list[tuple[Field, Any, ElementaryMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, names = len(self.variables), self.names
@@ -520,10 +524,10 @@ class ImplicitMap(MapFamily):
         while any(name + ending in self.variables for name in self.variables):
             ending += "_"
         context = ring((*self.variables, *(name + ending for name in self.variables), *self.names[n:]))
-        old = [*context.gens()[:n], *context.gens()[2 * n :]]
-        new = [*context.gens()[n : 2 * n], context.constant(1)]
+        x = [*context.gens()[:n], *context.gens()[2 * n :]]
+        x_new = [*context.gens()[n : 2 * n], context.constant(1)]
         return tuple(
-            sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
+            sum((entry.compose(*x, ctx=context) * y for entry, y in zip(row, x_new, strict=True)), context.constant(0))
             for row in self.rows
         )
 
@@ -540,8 +544,8 @@ class ImplicitMap(MapFamily):
     def __str__(self) -> str:
         if self.image is None:
             return "\n".join(self.written()["equations"])
-        named = zip(self.variables, self.image, strict=True)
-        return "\n".join(f"{name}~ = {format_rational_function(function)}" for name, function in named)
+        functions_by_name = zip(self.variables, self.image, strict=True)
+        return "\n".join(f"{name}~ = {format_rational_function(function)}" for name, function in functions_by_name)
 
     @cached_property
     def digits(self) -> int:
@@ -549,17 +553,17 @@ class ImplicitMap(MapFamily):
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
         """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction."""
-        element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        for cached_field, cached_eps, map_at_eps in self._last:
-            if cached_field is over and cached_eps is element:
+        eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
+        for cached_field, cached_eps, map_at_eps in self._cached_maps:
+            if cached_field is over and cached_eps is eps_element:
                 return map_at_eps
-        point = (*values, element)
+        point = (*values, eps_element)
         equation = equation_of(self.rows, over, point)
         needs_inverse_rows = self.backward is not None or equation.degree > 1
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
-        map_at_eps = ElementaryMap(equation, element, backward, self.variables)
+        map_at_eps = ElementaryMap(equation, eps_element, backward, self.variables)
         map_at_eps.has_eps = self.has_eps
-        self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with symbols are not cached
+        self._cached_maps[:] = [] if values else [(over, eps_element, map_at_eps)]  # maps with symbols are not cached
         return map_at_eps
 
     def __repr__(self) -> str:
@@ -587,8 +591,8 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     modulo which it exists are used.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
-    tried = 0
-    while tried < 3:
+    passed_count = 0
+    while passed_count < 3:
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in range(map_.dim))
         try:
@@ -602,7 +606,7 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
             continue
         except SingularStep:
             return "the map is not defined at random points: the equations do not determine the new point"
-        tried += 1
+        passed_count += 1
         if preimage != x:
             return "the given inverse is not the inverse of the map: it does not map the images of random points back"
     return "" if map_.backward is not None else why_not_birational(map_.rows)

@@ -29,7 +29,7 @@ Quotient = tuple[Any, Any]  # two polynomials
 Solution = dict[int, Quotient]  # for each unknown, given by its index among the variables, its value
 
 _MAX_TERMS = 3000  # terms of a polynomial
-_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, which must be C integers
+_PRIME_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, which must be C integers
 _MAX_RESULTANT = 60_000  # product of the numbers of terms, times the sum of the degrees
 
 
@@ -63,19 +63,19 @@ def inverse_rows(rows: Rows) -> Rows:
     context = ring(
         (*(f"{name}." for name in names[:n]), *names)
     )  # the variables are x, then x~ (under the names of x), then symbols and eps
-    old = [*context.gens()[:n], *context.gens()[2 * n :]]
-    new = [*context.gens()[n : 2 * n], context.constant(1)]
+    x = [*context.gens()[:n], *context.gens()[2 * n :]]
+    x_new = [*context.gens()[n : 2 * n], context.constant(1)]
     equations = [
-        sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
+        sum((entry.compose(*x, ctx=context) * y for entry, y in zip(row, x_new, strict=True)), context.constant(0))
         for row in rows
     ]
     field, sample = _graph_point(rows)
     solution = _solve(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
     names_ring = ring(names)
-    exchanged = [names_ring.constant(0)] * n + list(names_ring.gens())
+    exchanged_variables = [names_ring.constant(0)] * n + list(names_ring.gens())
     inverse = []
     for i in range(n):
-        numerator, denominator = (part.compose(*exchanged, ctx=names_ring) for part in solution[i])
+        numerator, denominator = (part.compose(*exchanged_variables, ctx=names_ring) for part in solution[i])
         scale = denominator.leading_coefficient()
         inverse.append(
             (*(denominator / scale if i == j else names_ring.constant(0) for j in range(n)), -numerator / scale)
@@ -88,7 +88,7 @@ def why_not_birational(rows: Rows) -> str:
     n, names = len(rows), names_of(rows[0][-1])
     reasons = []
     for seed in range(2):
-        field, sample = _graph_point(rows, _BITS, seed)
+        field, sample = _graph_point(rows, _PRIME_BITS, seed)
         context = fmpz_mod_mpoly_ctx.get(
             (*(f"{name}." for name in names[:n]), *names[:n]), modulus=field.prime, ordering=Ordering.degrevlex
         )
@@ -140,7 +140,7 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
     return bool(total == 0)
 
 
-def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], is_on_graph: Callable[[Any], bool]) -> Solution:
     """Solve for the unknowns as functions of the other variables, from polynomials that vanish on the graph."""
     if not unknowns:
         return {}
@@ -150,21 +150,21 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
             continue
         if len(polynomial) > _MAX_TERMS:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
-        factor = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
+        factor = next((factor for factor, _ in polynomial.factor()[1] if is_on_graph(factor)), None)
         if factor is None:
             raise TooLarge("the elimination found no inverse of this map: give it as well")
         if factor not in relations:
             relations.append(factor)
     if len(relations) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in relations):
         raise NotBirational("the map is not dominant: det dPhi is identically 0")
-    linear = [(len(p), p, u) for p in relations for u in unknowns if p.degrees()[u] == 1]
-    if linear:
-        _, chosen, u = min(
-            linear, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
+    candidates = [(len(p), p, u) for p in relations for u in unknowns if p.degrees()[u] == 1]
+    if candidates:
+        _, relation, u = min(
+            candidates, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
         )
-        constant, factor = _coefficients(chosen, u)  # constant + factor x_u = 0
-        others = [_substituted(p, u, -constant, factor) for p in relations if p is not chosen]
-        solution = _solve(others, [v for v in unknowns if v != u], on_graph)
+        constant, factor = _coefficients_in(relation, u)  # constant + factor x_u = 0
+        remaining_relations = [_substitute_quotient(p, u, -constant, factor) for p in relations if p is not relation]
+        solution = _solve(remaining_relations, [v for v in unknowns if v != u], is_on_graph)
         (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-constant, factor))
         return solution | {u: _in_lowest_terms(a * d, b * c)}
     # If no equation is linear in an unknown, resultants eliminate an unknown.
@@ -174,23 +174,22 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callab
             f"{relations[0].degrees()[unknowns[0]]} preimages"
         )
     u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in relations))
-    containing = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
-    pivot, name = containing[0], str(containing[0].context().names()[u])
-    eliminated = [p for p in relations if not p.degrees()[u]]
-    for p in containing[1:]:
+    relations_with_u = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
+    pivot, name = relations_with_u[0], str(relations_with_u[0].context().names()[u])
+    relations_without_u = [p for p in relations if not p.degrees()[u]]
+    for p in relations_with_u[1:]:
         if len(pivot) * len(p) * (pivot.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
-        eliminated.append(pivot.resultant(p, name))
-    others = [v for v in unknowns if v != u]
-    solution = _solve(eliminated, others, on_graph)
-    common = None
-    for p in containing:
+        relations_without_u.append(pivot.resultant(p, name))
+    solution = _solve(relations_without_u, [v for v in unknowns if v != u], is_on_graph)
+    gcd = None
+    for p in relations_with_u:
         numerator, _ = _substitute_solution(p, solution)
-        common = numerator if common is None else common.gcd(numerator)
-    return solution | _solve([common], [u], on_graph)
+        gcd = numerator if gcd is None else gcd.gcd(numerator)
+    return solution | _solve([gcd], [u], is_on_graph)
 
 
-def _coefficients(polynomial: Any, u: int) -> list[Any]:
+def _coefficients_in(polynomial: Any, u: int) -> list[Any]:
     """Return the coefficients of the powers of a variable, starting with the constant term."""
     context = polynomial.context()
     terms_by_power: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
@@ -199,9 +198,9 @@ def _coefficients(polynomial: Any, u: int) -> list[Any]:
     return [context.from_dict(terms) for terms in terms_by_power]
 
 
-def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
+def _substitute_quotient(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
     """Substitute numerator/denominator for a variable, and clear the denominator."""
-    *coefficients, total = _coefficients(polynomial, u)
+    *coefficients, total = _coefficients_in(polynomial, u)
     power = denominator**0
     for coefficient in reversed(coefficients):
         power = power * denominator
@@ -214,10 +213,10 @@ def _substitute_solution(polynomial: Any, solution: Solution) -> Quotient:
     denominator = polynomial.context().constant(1)
     for u, (numerator, denominator_of_unknown) in solution.items():
         denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])
-        polynomial = _substituted(polynomial, u, numerator, denominator_of_unknown)
+        polynomial = _substitute_quotient(polynomial, u, numerator, denominator_of_unknown)
     return _in_lowest_terms(polynomial, denominator)
 
 
 def _in_lowest_terms(numerator: Any, denominator: Any) -> Quotient:
-    common = numerator.gcd(denominator)
-    return numerator / common, denominator / common
+    gcd = numerator.gcd(denominator)
+    return numerator / gcd, denominator / gcd

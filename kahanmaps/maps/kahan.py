@@ -85,14 +85,16 @@ class KahanMap(ElementaryMap):
             system = as_system(system)
         if isinstance(system, SystemOver):
             self.local, self.eps = system, eps
-            self._given: tuple[Any, ...] = (system,)
+            self._arguments: tuple[Any, ...] = (system,)
         else:
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
-            self._inside = self.eps if inside is None else inside
-            remaining = iter(self.values)
-            self.local = system.over(field, [self._inside if x == "eps" else next(remaining) for x in system.symbols])
-            self._given = (system, field, self.values, self._inside)
+            self._system_eps = self.eps if inside is None else inside
+            remaining_values = iter(self.values)
+            self.local = system.over(
+                field, [self._system_eps if x == "eps" else next(remaining_values) for x in system.symbols]
+            )
+            self._arguments = (system, field, self.values, self._system_eps)
         self.field, self.dim = self.local.field, self.local.dim
 
     def denominator_name(self, backward: bool) -> str:
@@ -102,7 +104,7 @@ class KahanMap(ElementaryMap):
     def inverse(self) -> KahanMap:
         """The inverse map Phi(., -eps) of the same vector field (an eps in the coefficients does not change)."""
         with self.field.working():  # outside of this context, -eps would have FLINT's default precision
-            return KahanMap(self._given[0], -self.eps, *self._given[1:])
+            return KahanMap(self._arguments[0], -self.eps, *self._arguments[1:])
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
         """Return the matrix I - eps f'(x)."""
@@ -144,21 +146,21 @@ class KahanMap(ElementaryMap):
                     ]
                     for j in range(n)
                 ]
-                right = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
-                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*matrix, right)))
+                rhs = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
+                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*matrix, rhs)))
         return Equation(field, exponents, tuple(terms))
 
     @property
     def flow(self) -> tuple[Any, Any] | None:
         """The flow of the system, with the values of its symbols, for the time step 2 eps."""
-        if isinstance(self._given[0], SystemOver):
+        if isinstance(self._arguments[0], SystemOver):
             return None
-        symbols = self._inside if "eps" in self.system.symbols else None, *self.values
+        symbols = self._system_eps if "eps" in self.system.symbols else None, *self.values
         with self.field.working():
             return (str(self.system), symbols), time_step_at(self.eps)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return KahanMap, (self._given[0], self.eps, *self._given[1:])
+        return KahanMap, (self._arguments[0], self.eps, *self._arguments[1:])
 
 
 class KahanFamily(MapFamily):
@@ -174,7 +176,7 @@ class KahanFamily(MapFamily):
     def __init__(self, system: QuadraticSystem) -> None:
         self.system = system
         self.variables = system.variables
-        self._last: KahanMap | None = None
+        self._cached_map: KahanMap | None = None
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -194,10 +196,15 @@ class KahanFamily(MapFamily):
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> KahanMap:
         """Return the map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime if it has no reduction."""
-        cached = self._last
-        if cached is None or cached.field is not over or cached.eps is not eps or cached.values != tuple(values):
-            self._last = cached = KahanMap(self.system, eps, over, values)
-        return cached
+        cached_map = self._cached_map
+        if (
+            cached_map is None
+            or cached_map.field is not over
+            or cached_map.eps is not eps
+            or cached_map.values != tuple(values)
+        ):
+            self._cached_map = cached_map = KahanMap(self.system, eps, over, values)
+        return cached_map
 
     @cached_property
     def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # read only

@@ -52,50 +52,43 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     degree_of_field = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
     if degree_of_field > degree:
         raise InputError(f"found right-hand sides of degree {degree_of_field}, expected at most {degree}")
-    copies = degree - 1
-    variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
+    copy_count = degree - 1
+    variables = (*names, *(f"{name}_{k}" for k in range(1, copy_count) for name in names))
     context = ring((*variables, *parameters))
-    points = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
-    step = 2 * copies * context.gens()[-1]
-    last_point = [_linear_in_one_point(f, points, step, degree) for f in rhs]
+    points = [context.gens()[k * n : (k + 1) * n] for k in range(copy_count)]
+    step = 2 * copy_count * context.gens()[-1]
+    one, zero = context.constant(1), context.constant(0)
 
-    def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
-        """Return the row of the equation that sets a coordinate of the image equal to `other`."""
-        return (*(context.constant(int(j == column)) for j in range(copies * n)), -other)
+    def unit_row(column: int, value: Any) -> tuple[fmpq_mpoly, ...]:
+        """Return the row of the equation that sets a coordinate of the image equal to `value`."""
+        return (*(context.constant(int(j == column)) for j in range(copy_count * n)), -value)
 
     # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}); the inverse gives (x_{k-1}, ..., x_{k+d-3}), with -h for h.
-    zero = [context.constant(0)] * ((copies - 1) * n)
-    forward = [unit(k * n + i, points[k + 1][i]) for k in range(copies - 1) for i in range(n)]
-    backward = [unit((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
-    for i, (matrix, right) in enumerate(last_point):
-        unknown = [context.constant(int(i == j)) for j in range(n)]
-        new_row = [delta - entry for delta, entry in zip(unknown, matrix, strict=True)]
-        old_row = [delta + entry for delta, entry in zip(unknown, matrix, strict=True)]
-        forward.append((*zero, *new_row, -points[0][i] - right))
-        backward.append((*old_row, *zero, -points[-1][i] + right))
+    zeros = [zero] * ((copy_count - 1) * n)
+    forward = [unit_row(k * n + i, points[k + 1][i]) for k in range(copy_count - 1) for i in range(n)]
+    backward = [unit_row((k + 1) * n + i, points[k][i]) for k in range(copy_count - 1) for i in range(n)]
+    for i, f in enumerate(rhs):
+        # `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term.
+        linear_coefficients, constant = [zero] * n, zero
+        for monomial, coefficient in f.terms():
+            indices: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
+            indices += [None] * (degree - len(indices))
+            exponents = (*[0] * (n * copy_count), *monomial[n:])
+            term = step * context.from_dict({exponents: coefficient / factorial(degree)})
+            # The mean over all arrangements of the points is the symmetric form; equal ones are counted repeatedly.
+            for arrangement in permutations(indices):
+                product = term
+                for point, j in zip(points, arrangement[:copy_count], strict=True):
+                    product = product * (one if j is None else point[j])
+                j = arrangement[-1]
+                if j is None:
+                    constant = constant + product
+                else:
+                    linear_coefficients[j] = linear_coefficients[j] + product
+        deltas = [context.constant(int(i == j)) for j in range(n)]
+        new_row = [delta - entry for delta, entry in zip(deltas, linear_coefficients, strict=True)]
+        old_row = [delta + entry for delta, entry in zip(deltas, linear_coefficients, strict=True)]
+        forward.append((*zeros, *new_row, -points[0][i] - constant))
+        backward.append((*old_row, *zeros, -points[-1][i] + constant))
     field = PolynomialField(tuple(substitute(f, {parameters[-1]: fmpq(0)}) for f in rhs), parameters[:-1])
     return ImplicitMap(variables, tuple(forward), TITLE, time_steps=1, backward=tuple(backward), of_field=field)
-
-
-def _linear_in_one_point(
-    f: fmpq_mpoly, points: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
-) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
-    """Return `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term."""
-    n, copies = len(points[0]), len(points)
-    one = step * 0 + 1
-    linear, constant = [step * 0 for _ in range(n)], step * 0
-    for monomial, coefficient in f.terms():
-        factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
-        factors += [None] * (degree - len(factors))
-        term = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
-        # The mean over all arrangements of the points is the symmetric form; equal arrangements are counted repeatedly.
-        for arrangement in permutations(factors):
-            product = term
-            for point, j in zip(points, arrangement[:copies], strict=True):
-                product = product * (one if j is None else point[j])
-            j = arrangement[-1]
-            if j is None:
-                constant = constant + product
-            else:
-                linear[j] = linear[j] + product
-    return linear, constant

@@ -46,35 +46,36 @@ def homogeneous_map(map_over: Map) -> HomogeneousMap:
     >>> homogeneous_map(KahanMap(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"]), 1)).forms
     [x1*x2 + x1*z, -2*x1^2 - x2^2 + x2*z, 2*x1^2 - x2*z + z^2]
     """
-    first, *others = map_over.equations
-    composed = _of_equation(first)
-    for equation in others:
-        factor_map = _of_equation(equation)
-        size, degree = equation.dim, composed.degree * factor_map.degree
+    first_equation, *equations = map_over.equations
+    composition = _map_of_equation(first_equation)
+    for equation in equations:
+        factor_map = _map_of_equation(equation)
+        size, degree = equation.dim, composition.degree * factor_map.degree
         if comb(degree + size, size) > _MAX_TERMS:
-            raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
-        forms, common = _without_common_factor([form.compose(*composed.forms) for form in factor_map.forms])
-        factor, denominator = (part.compose(*composed.forms) for part in (factor_map.factor, factor_map.denominator))
-        outer_factor = composed.factor**equation.image_degree
-        composed = HomogeneousMap(forms, outer_factor * factor * common, composed.denominator * denominator)
-    return composed
+            raise TooLarge(f"the composition of {len(equations) + 1} maps is too large for forms on projective space")
+        forms, gcd = _divide_by_common_factor([form.compose(*composition.forms) for form in factor_map.forms])
+        factor = factor_map.factor.compose(*composition.forms)
+        denominator = factor_map.denominator.compose(*composition.forms)
+        outer_factor = composition.factor**equation.image_degree
+        composition = HomogeneousMap(forms, outer_factor * factor * gcd, composition.denominator * denominator)
+    return composition
 
 
-def _of_equation(equation: Equation) -> HomogeneousMap:
+def _map_of_equation(equation: Equation) -> HomogeneousMap:
     rows = equation.polynomials()
     if equation.explicit is None:
         minors = kernel_minors(rows)
-        return HomogeneousMap(*_without_common_factor(minors), minors[-1])
+        return HomogeneousMap(*_divide_by_common_factor(minors), minors[-1])
     (forms,) = equation.explicit.polynomials()
     return HomogeneousMap(forms, forms[0] * 0 + 1, prod(-row[i] for i, row in enumerate(rows)))
 
 
-def _without_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:
+def _divide_by_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:
     """Return the forms divided by their common factor, and this factor; the factor is 1 if it is constant."""
     context = forms[0].context()
-    common = context.constant(0)
+    gcd = context.constant(0)
     for form in forms:
-        common = common.gcd(form)
-    if common.is_zero() or common.is_constant():
+        gcd = gcd.gcd(form)
+    if gcd.is_zero() or gcd.is_constant():
         return forms, context.constant(1)
-    return [form / common for form in forms], common
+    return [form / gcd for form in forms], gcd

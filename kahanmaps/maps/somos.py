@@ -15,7 +15,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.integers import divide_exactly, split_by_primes
 
-_DIRECT = 8  # up to this n, quotients of s(n) are computed from s(n) itself, for larger n from quotients at n/2
+_MAX_DIRECT_INDEX = 8  # up to this n, quotients of s(n) are computed from s(n); for larger n, from quotients at n/2
 
 
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
@@ -27,7 +27,7 @@ def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
     a = H / y
     U = [one, one, a, a * a * H / z]
     while len(U) < 6:
-        U.append(_next(U[-4:], H))
+        U.append(_next_term(U[-4:], H))
     # U(n + 3) U(n - 2) W(2) W(1) = W(3) W(2) U(n + 2) U(n - 1) - W(4) W(1) U(n + 1) U(n), for n = 3
     return [one, H, H**3, H * (H**3 * U[4] * U[1] - U[5] * U[0]) / (U[3] * U[2])], U[:4]
 
@@ -39,17 +39,17 @@ def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> d
     """
     terms = list(first)
     while len(terms) < bound:
-        terms.append(_next(terms[-4:], (multiples or first)[1]))
+        terms.append(_next_term(terms[-4:], (multiples or first)[1]))
     terms_by_index = dict(enumerate(terms, start=1))
     if not multiples:
         return terms_by_index | {-n: -term for n, term in terms_by_index.items()} | {0: 0 * first[0]}
-    backward = list(first)[::-1]  # the recurrence is symmetric
-    while len(backward) < bound + 5:
-        backward.append(_next(backward[-4:], multiples[1]))
-    return terms_by_index | {4 - k: term for k, term in enumerate(backward)}
+    backward_terms = list(first)[::-1]  # the recurrence is symmetric
+    while len(backward_terms) < bound + 5:
+        backward_terms.append(_next_term(backward_terms[-4:], multiples[1]))
+    return terms_by_index | {4 - k: term for k, term in enumerate(backward_terms)}
 
 
-def _next(terms: Sequence[Any], H: Any) -> Any:
+def _next_term(terms: Sequence[Any], H: Any) -> Any:
     """Return the term that follows four given terms, for alpha = H^2 and beta = -H^3."""
     previous, a, b, c = terms
     return (H**2 * c * a - H**3 * b * b) / previous
@@ -65,8 +65,8 @@ class Integers:
         """Return integer and scale of a nonzero value. Raises ArithmeticError for other primes in the denominator."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
-        integer, part = split_by_primes(value.p, self.power)
-        return integer, fmpq(part, value.q)
+        integer, bad_part = split_by_primes(value.p, self.power)
+        return integer, fmpq(bad_part, value.q)
 
     def prepared_divisor(self, value: fmpz) -> fmpz:
         """Return the divisor in the form that `difference` needs; here the integer itself."""
@@ -75,10 +75,10 @@ class Integers:
     def difference(self, s: fmpq, first: fmpz, t: fmpq, second: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
         """Return integer and scale of (s first - t second)/divisor, which is integral up to the primes of `power`."""
         denominator = s.q.lcm(t.q)
-        total = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
+        numerator = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
         if divisor is not None:
-            total = divide_exactly([total], divisor)[0]
-        value, scale_numerator = split_by_primes(total, self.power)
+            numerator = divide_exactly([numerator], divisor)[0]
+        value, scale_numerator = split_by_primes(numerator, self.power)
         return value, fmpq(scale_numerator, denominator)
 
 
@@ -107,7 +107,7 @@ class Terms:
         self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
         self._short_scales: dict[int, Any] = {}  # s(n), while it is short
         self._pairs: dict[int, tuple[Any, Any]] = {}
-        self._order = deque[int]()  # the order in which the terms after the first ones were computed
+        self._computation_order = deque[int]()  # the order in which the terms after the first ones were computed
         self._own_quotients: dict[int, Any] = {}
         self._mixed_quotients: dict[int, Any] = {}
         for n, term in enumerate(first, start=1):
@@ -117,10 +117,10 @@ class Terms:
         # The division by t(i - j): by 1 or W(2) in the scale for W, otherwise by w, which divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
         self._divisor_and_scale = {
-            low: (None, first[low - 1])
+            small_index: (None, first[small_index - 1])
             if is_by_scale
-            else (numbers.prepared_divisor(self._terms[low]), self._short_scales[low])
-            for low in (1, 2)
+            else (numbers.prepared_divisor(self._terms[small_index]), self._short_scales[small_index])
+            for small_index in (1, 2)
         }
 
     def value(self, n: int) -> Any:
@@ -132,19 +132,19 @@ class Terms:
         if n not in self._terms:
             if n < 5:
                 raise ArithmeticError("found an index before the first term")
-            low = 2 - n % 2
-            i, j = (n + low) // 2, (n - low) // 2
+            small_index = 2 - n % 2
+            i, j = (n + small_index) // 2, (n - small_index) // 2
             a, b = self.own_quotient(i), self._W.own_quotient(j)
             if self._gamma is not None and (i % 3 == 0) != (j % 3 == 0):
                 a, b = (a * self._gamma, b) if j % 3 == 0 else (a, b * self._gamma)
-            (square, outer), (W_square, W_outer) = self.pair(i), self._W.pair(j)
-            divisor, scale = self._divisor_and_scale[low]
+            (square, neighbour_product), (W_square, W_neighbour_product) = self.pair(i), self._W.pair(j)
+            divisor, scale = self._divisor_and_scale[small_index]
             self._terms[n], numerator_scale = self._numbers.difference(
-                a, outer * W_square, b, square * W_outer, divisor
+                a, neighbour_product * W_square, b, square * W_neighbour_product, divisor
             )
             self._scales[n] = numerator_scale / scale
-            if n > _DIRECT + 1:
-                self._order.append(n)
+            if n > _MAX_DIRECT_INDEX + 1:
+                self._computation_order.append(n)
             else:
                 scale_product = self._short_scales[i] * self._W._short_scales[j]
                 self._short_scales[n] = self._scales[n] * scale_product * scale_product
@@ -160,9 +160,9 @@ class Terms:
     def own_quotient(self, n: int) -> Any:
         """Return s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
         if n not in self._own_quotients:
-            at_n_minus_1, at_n, at_n_plus_1 = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
-            quotient = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
-            if n > _DIRECT:
+            scale_before, scale_n, scale_after = (self._scale(k, n <= _MAX_DIRECT_INDEX) for k in (n - 1, n, n + 1))
+            quotient = scale_after * scale_before / (scale_n * scale_n)
+            if n > _MAX_DIRECT_INDEX:
                 k = n // 2
                 root = self.mixed_quotient(k + 1) * self._W.own_quotient(k) if n % 2 else 1 / self.mixed_quotient(k)
                 quotient = quotient * root * root
@@ -175,10 +175,10 @@ class Terms:
             return self.own_quotient(n)
         if n not in self._mixed_quotients:
             W = self._W
-            is_short = n <= _DIRECT
+            is_short = n <= _MAX_DIRECT_INDEX
             quotient = W._scale(n - 1, is_short) * self._scale(n + 1, is_short)
             quotient = quotient / (W._scale(n, is_short) * self._scale(n, is_short))
-            if n > _DIRECT:
+            if n > _MAX_DIRECT_INDEX:
                 k = n // 2
                 root = self.mixed_quotient(k + 1) * W.own_quotient(k) if n % 2 else 1 / W.own_quotient(k)
                 quotient = quotient * root * root
@@ -190,8 +190,8 @@ class Terms:
 
         Products that are needed again are recomputed, which takes a fifth of the time of the first computation.
         """
-        while self._order and self._order[0] < n:
-            self._terms.pop(self._order.popleft(), None)
+        while self._computation_order and self._computation_order[0] < n:
+            self._terms.pop(self._computation_order.popleft(), None)
         for k in [k for k in self._pairs if not (n <= k <= n + 12 or k >= 2 * n + 7)]:
             del self._pairs[k]
 

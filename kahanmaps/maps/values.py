@@ -12,7 +12,7 @@ from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InexactNumber, InputError, counted
 
-_MATRICES = (fmpq_mat, fmpz_mat)  # a matrix with one column or row contains coordinates
+_MATRIX_TYPES = (fmpq_mat, fmpz_mat)  # a matrix with one column or row contains coordinates
 
 
 def is_float_value(value: Any) -> bool:
@@ -36,11 +36,11 @@ def as_point(value: Any, variables: Sequence[str]) -> Any:
     if isinstance(value, str):
         return parse_point(value)
     if isinstance(value, Mapping):
-        named = {str(name): coordinate for name, coordinate in value.items()}
-        if set(named) != set(variables):
-            raise InputError(f"found the coordinates {', '.join(named)}, expected {', '.join(variables)}")
-        return [named[name] for name in variables]
-    if isinstance(value, _MATRICES):
+        coordinates_by_name = {str(name): coordinate for name, coordinate in value.items()}
+        if set(coordinates_by_name) != set(variables):
+            raise InputError(f"found the coordinates {', '.join(coordinates_by_name)}, expected {', '.join(variables)}")
+        return [coordinates_by_name[name] for name in variables]
+    if isinstance(value, _MATRIX_TYPES):
         return value.entries()
     if not hasattr(value, "__len__") or isinstance(value, set | frozenset):  # the order of a set is arbitrary
         raise InputError(f"found the point {value!r}, expected a sequence of {len(variables) or 'its'} numbers")
@@ -103,7 +103,7 @@ def point_of(arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
         if arguments:
             raise InputError(f"found a point and {', '.join(named)}=, expected f(x) or f({', '.join(named)}=...)")
         return named
-    is_point = len(arguments) == 1 and (hasattr(arguments[0], "__len__") or isinstance(arguments[0], _MATRICES))
+    is_point = len(arguments) == 1 and (hasattr(arguments[0], "__len__") or isinstance(arguments[0], _MATRIX_TYPES))
     return arguments[0] if is_point else arguments
 
 
@@ -128,25 +128,27 @@ def function_value(function: RationalFunction, arguments: Sequence[Any], named: 
 
         values = [function_value(function, (row, *arguments[1:]), named) for row in arguments[0]]
         return np.array(values, dtype=np.float64 if any(map(is_float_value, values)) else object)
-    names, given, values = function.names, dict(named), list[Any]()
+    names, values_by_name, values = function.names, dict(named), list[Any]()
     for name in {"h", "time_step"} & {*named} - {*names}:  # 2 eps
-        h = given.pop(name)
-        given["eps"] = h / 2 if is_float_value(h) else QQ.convert(h) / 2
+        h = values_by_name.pop(name)
+        values_by_name["eps"] = h / 2 if is_float_value(h) else QQ.convert(h) / 2
     for entry in arguments:
         if isinstance(entry, Mapping):
-            given.update({str(name): value for name, value in entry.items()})
+            values_by_name.update({str(name): value for name, value in entry.items()})
         else:
             values.extend(as_point(entry, ()) if hasattr(entry, "__len__") else [entry])
-    rest = [name for name in names if name not in given]
-    unused = {*function.numerator.unused_gens()}.intersection(function.denominator.unused_gens())
-    if len(values) == len(rest) - 1 and rest[-1] == "eps" and "eps" in unused:
+    free_names = [name for name in names if name not in values_by_name]
+    unused_names = {*function.numerator.unused_gens()}.intersection(function.denominator.unused_gens())
+    if len(values) == len(free_names) - 1 and free_names[-1] == "eps" and "eps" in unused_names:
         values.append(0)  # any value, since the function does not contain this name
-    if len(values) != len(rest) or not {*given} <= {*names}:
-        hint = ', for example I(x, eps="1/10")' if len(values) == len(rest) - 1 and rest[-1] == "eps" else ""
-        values_given = ", ".join([f"{len(values)} values", *(f"{name}=" for name in given)])
-        raise InputError(f"found {values_given}, expected {len(names)}: {', '.join(names)}{hint}")
-    given.update(zip(rest, values, strict=True))
-    values = [given[name] for name in names]
+    if len(values) != len(free_names) or not {*values_by_name} <= {*names}:
+        hint = (
+            ', for example I(x, eps="1/10")' if len(values) == len(free_names) - 1 and free_names[-1] == "eps" else ""
+        )
+        given_text = ", ".join([f"{len(values)} values", *(f"{name}=" for name in values_by_name)])
+        raise InputError(f"found {given_text}, expected {len(names)}: {', '.join(names)}{hint}")
+    values_by_name.update(zip(free_names, values, strict=True))
+    values = [values_by_name[name] for name in names]
     if any(map(is_float_value, values)):
         from kahanmaps.maps.floats.float_conversion import FLOATS, double
 

@@ -23,82 +23,90 @@ class Control:
     least_m: int = 1
 
 
-def broken_H(o: PaperObjects) -> PaperObjects:
+def broken_H(objects: PaperObjects) -> PaperObjects:
     """Add the cube of a random linear form to H; for m = 1, where every cubic is allowed, double f but not H."""
-    if o.m == 1:
-        return o.changed(base=o.f.transformed(o.I * o.number(2)))
-    u = o.vector("break 1")
-    return o.changed(third=o.third + o.tensor(u, u, u), base=None)
+    if objects.m == 1:
+        return objects.replace(base=objects.f.transformed(objects.I * objects.number(2)))
+    u = objects.vector("break 1")
+    return objects.replace(d3H=objects.d3H + objects.tensor(u, u, u), base=None)
 
 
-def broken_J(o: PaperObjects) -> PaperObjects:
+def broken_J(objects: PaperObjects) -> PaperObjects:
     """Add a random skew matrix of rank 2 to J; for m = 1, where A^T J = J A for every skew J, double J."""
-    u, v = o.vector("break 1"), o.vector("break 2")
-    return o.changed(J=o.J + u * v.transpose() - v * u.transpose(), base=None)
+    u, v = objects.vector("break 1"), objects.vector("break 2")
+    return objects.replace(J=objects.J + u * v.transpose() - v * u.transpose(), base=None)
 
 
-def broken_f(o: PaperObjects) -> PaperObjects:
+def broken_f(objects: PaperObjects) -> PaperObjects:
     """Add a random vector times the square of a random linear form to f; H is unchanged."""
-    p, u = o.vector("break 1"), o.vector("break 2")
-    return o.changed(base=SystemOver(o.K, o.f.tensor + o.tensor(p, u, u), o.f.B, o.f.c))
+    p, u = objects.vector("break 1"), objects.vector("break 2")
+    return objects.replace(
+        base=SystemOver(objects.K, objects.f.tensor + objects.tensor(p, u, u), objects.f.B, objects.f.c)
+    )
 
 
-def broken_B(o: PaperObjects) -> PaperObjects:
-    matrices = o.associate_matrices and tuple((o.I * o.number(3) - B) * o.number(1, 2) for B in o.associate_matrices)
-    return o.changed(minus=o.number(2), associate_matrices=matrices)
+def broken_B(objects: PaperObjects) -> PaperObjects:
+    matrices = objects.associate_matrices and tuple(
+        (objects.I * objects.number(3) - B) * objects.number(1, 2) for B in objects.associate_matrices
+    )
+    return objects.replace(B_at_root=objects.number(2), associate_matrices=matrices)
 
 
-def repeated_root(o: PaperObjects) -> PaperObjects:
+def repeated_root(objects: PaperObjects) -> PaperObjects:
     """Replace A by A + (lambda_2 - lambda_1) E_1: A stays skew-Hamiltonian, H stays in its space."""
-    A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
-    return o.changed(A=A, roots=(o.lam[1], *o.lam[1:]), known_chi=None)
+    A = objects.A + objects.projector(0) * (objects.lam[1] - objects.lam[0])
+    return objects.replace(A=A, roots=(objects.lam[1], *objects.lam[1:]), known_chi=None)
 
 
-def linear_f(o: PaperObjects) -> PaperObjects:
+def linear_f(objects: PaperObjects) -> PaperObjects:
     """Replace H by its quadratic part: then f is linear, and its maps with different time steps commute."""
-    zero = o.zeros(o.n * o.n, o.n)
-    return o.inhomogeneous().changed(third=zero, gradient_of_linear_part=o.zeros(o.n, 1), base=None, draw=o.vector)
+    zero = objects.zeros(objects.n * objects.n, objects.n)
+    return objects.inhomogeneous().replace(
+        d3H=zero, gradient_of_linear_part=objects.zeros(objects.n, 1), base=None, draw=objects.vector
+    )
 
 
-def _rank_1(o: PaperObjects) -> Any:
-    return o.vector("break 1") * o.vector("break 2").transpose()
+def _random_rank_1_matrix(objects: PaperObjects) -> Any:
+    return objects.vector("break 1") * objects.vector("break 2").transpose()
 
 
 CONTROLS: dict[str, Control] = {
-    "A": Control("A is not skew-Hamiltonian", lambda o: o.changed(A=o.A + _rank_1(o))),  # H, J, roots unchanged
+    "A": Control(
+        "A is not skew-Hamiltonian", lambda o: o.replace(A=o.A + _random_rank_1_matrix(o))
+    ),  # H, J, roots unchanged
     "H": Control("H is outside the space of A", broken_H),
     "J": Control("J is not the standard structure, and A^T J = J A fails", broken_J),
     "f": Control("f is not Hamiltonian", broken_f),
     # Add a random matrix times the first component of v to f'' v.
-    "f''": Control("f'' is not the derivative of f'", lambda o: o.changed(error_of_second=_rank_1(o))),
+    "f''": Control("f'' is not the derivative of f'", lambda o: o.replace(error_of_second=_random_rank_1_matrix(o))),
     "B": Control("B^2 = I fails: B_i(lambda_i) = 2", broken_B),
     # Set B_i(lambda_i) = 1: then every B_i is I, and all associated systems are f.
     "B=I": Control(
-        "all B_i are I", lambda o: o.changed(minus=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
+        "all B_i are I", lambda o: o.replace(B_at_root=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
     ),
     "eps": Control(
-        "the maps are computed with twice the eps of the formulas", lambda o: o.changed(step_eps=o.eps * o.number(2))
+        "the maps are computed with twice the eps of the formulas", lambda o: o.replace(step_eps=o.eps * o.number(2))
     ),
-    "map": Control("the map is the explicit Euler method, not Kahan's", lambda o: o.changed(method="euler")),
+    "map": Control("the map is the explicit Euler method, not Kahan's", lambda o: o.replace(method="euler")),
     "roots": Control(
         "the lambda_i are not the eigenvalues of A",
-        lambda o: o.changed(roots=tuple(root + o.scalar(f"break {i}") for i, root in enumerate(o.lam))),
+        lambda o: o.replace(roots=tuple(root + o.scalar(f"break {i}") for i, root in enumerate(o.lam))),
     ),
     "repeated": Control("chi has a repeated root", repeated_root, least_m=2),
     # A := B_1, so that H_1 is associated to H_0.
-    "A=B": Control("A itself has A^2 = I", lambda o: o.changed(A=o.B(0)), least_m=2),
-    "H0": Control("H = 0", lambda o: o.changed(third=o.zeros(o.n * o.n, o.n), base=None)),
+    "A=B": Control("A itself has A^2 = I", lambda o: o.replace(A=o.B(0)), least_m=2),
+    "H0": Control("H = 0", lambda o: o.replace(d3H=o.zeros(o.n * o.n, o.n), base=None)),
     "linear": Control("f is linear", linear_f),
     # Add quadratic and linear terms to H such that A nabla^2 H = nabla^2 H A^T still holds.
     "inhomogeneous": Control("H is not homogeneous", PaperObjects.inhomogeneous),
     "unvaried": Control(
-        "nothing is varied: H homogeneous, J standard, equal steps, distinct roots", lambda o: o.changed(varied=False)
+        "nothing is varied: H homogeneous, J standard, equal steps, distinct roots", lambda o: o.replace(varied=False)
     ),
 }
 
 
 def broken(name: str, objects: PaperObjects) -> PaperObjects:
     """Return the objects changed by a control; vectors that were drawn before are unchanged."""
-    changed = CONTROLS[name].function(objects)
-    changed.draw = objects.vector
-    return changed
+    broken_objects = CONTROLS[name].function(objects)
+    broken_objects.draw = objects.vector
+    return broken_objects

@@ -73,18 +73,18 @@ class Multilinear:
 
     def __call__(self, *arguments: Expression) -> Expression:
         terms = []
-        for chosen in product(*(argument.coefficients.items() for argument in arguments)):
+        for term_choice in product(*(argument.coefficients.items() for argument in arguments)):
             coefficient = fmpq_poly([1])
-            for _, factor in chosen:
-                coefficient *= factor
-            inner = [term for term, _ in chosen]
+            for _, term_coefficient in term_choice:
+                coefficient *= term_coefficient
+            letters = [term for term, _ in term_choice]
             if self.symmetry:
-                inversions = sum(a > b for i, a in enumerate(inner) for b in inner[i + 1 :])
+                inversions = sum(a > b for i, a in enumerate(letters) for b in letters[i + 1 :])
                 coefficient *= self.symmetry**inversions
-                if self.symmetry < 0 and len(set(inner)) < len(inner):
+                if self.symmetry < 0 and len(set(letters)) < len(letters):
                     continue
-                inner.sort()
-            terms.append(((self.name, *inner), coefficient))
+                letters.sort()
+            terms.append(((self.name, *letters), coefficient))
         return combine(terms)
 
 
@@ -97,11 +97,11 @@ X, Y, Z = letter("x"), letter("y"), letter("z")
 class KahanEquation:
     """Kahan's equation E = 0 for f(x) = Q(x, x) + B x + c, with the matrices M = I - eps f' and P = I + eps f'."""
 
-    def __init__(self, Q: Multilinear = Q, homogeneous: bool = False) -> None:
+    def __init__(self, Q: Multilinear = Q, is_homogeneous: bool = False) -> None:
         self.Q = Q
-        none = Expression({})
-        self.B: Callable[[Expression], Expression] = (lambda v: none) if homogeneous else B
-        self.c = none if homogeneous else letter("c")
+        zero = Expression({})
+        self.B: Callable[[Expression], Expression] = (lambda v: zero) if is_homogeneous else B
+        self.c = zero if is_homogeneous else letter("c")
 
     def f(self, x: Expression) -> Expression:
         return self.Q(x, x) + self.B(x) + self.c
@@ -130,7 +130,7 @@ def map_of_any_quadratic_system(Q: Multilinear = Q) -> Pairs:
 
 def map_of_any_homogeneous_system(Q: Multilinear = Q) -> Pairs:
     """Yield the identities that imply (8) and (9)."""
-    kahan = KahanEquation(Q, homogeneous=True)
+    kahan = KahanEquation(Q, is_homogeneous=True)
     yield kahan.M(X, Y) - X, kahan.E(X, Y)
     yield Y - kahan.P(Y, X), kahan.E(X, Y)
 
@@ -151,12 +151,12 @@ def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -
     """
     pairing = skew or Multilinear("G.JG", symmetry=-1)
     steps = {"xy": Y - X, "yz": Z - Y}
-    parts = ((X, Y, "xy", "xy"), (Y, Z, "yz", "xy"), (X, Y, "xy", "yz"))  # u, v, the name of G_uv, and the step
-    differences = (T(u, v, steps[step]) for u, v, _, step in parts)
-    by_the_equation = (pairing(letter(G), letter(step)) for _, _, G, step in parts)
-    none = Expression({})
-    yield sum(differences, none), T(Y, Y, Z) - T(X, X, Y)
-    yield sum(by_the_equation, none), none
+    factors = ((X, Y, "xy", "xy"), (Y, Z, "yz", "xy"), (X, Y, "xy", "yz"))  # u, v, the name of G_uv, and the step
+    differences = (T(u, v, steps[step]) for u, v, _, step in factors)
+    pairings = (pairing(letter(G), letter(step)) for _, _, G, step in factors)
+    zero = Expression({})
+    yield sum(differences, zero), T(Y, Y, Z) - T(X, X, Y)
+    yield sum(pairings, zero), zero
     yield T(X, X, X) + T(X, X, Y - X), T(X, X, Y)  # the second form of the integral, H + (1/3) nabla H . (y - x)
 
 
@@ -169,16 +169,16 @@ def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:
     one, zero = Expression({(): fmpq_poly([1])}), Expression({})
     J, S = letter("J"), letter("S")
 
-    def transposed(expression: Expression) -> Expression:
+    def transpose(expression: Expression) -> Expression:
         terms = expression.coefficients.items()
         return combine([(word[::-1], c * sign_of_transpose ** word.count("J")) for word, c in terms])
 
-    yield transposed(one + EPS * J.times(S)), one - EPS * S.times(J)
+    yield transpose(one + EPS * J.times(S)), one - EPS * S.times(J)
     A, C = EPS * J, S
-    middle, shear = ((one, A), (C, one)), ((one, A * -1), (zero, one))
+    block_matrix, shear = ((one, A), (C, one)), ((one, A * -1), (zero, one))
     for left, right, triangular in (
-        (middle, shear, ((one, zero), (C, one - C.times(A)))),
-        (shear, middle, ((one - A.times(C), zero), (C, one))),
+        (block_matrix, shear, ((one, zero), (C, one - C.times(A)))),
+        (shear, block_matrix, ((one - A.times(C), zero), (C, one))),
     ):
         for i, k in product(range(2), repeat=2):
             yield left[i][0].times(right[0][k]) + left[i][1].times(right[1][k]), triangular[i][k]

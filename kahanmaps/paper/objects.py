@@ -26,21 +26,21 @@ from kahanmaps.systems.quadratic import SystemOver
 Method = TypeVar("Method", bound=Callable[..., Any])
 # The fields of `PaperObjects` that consist of elements of K: numbers, matrices, tuples of these, a system.
 _IN_K = (
-    *("A", "J", "third", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part"),
-    *("gradient_of_linear_part", "lower_terms", "minus", "step_eps", "base", "error_of_second"),
+    *("A", "J", "d3H", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part"),
+    *("gradient_of_linear_part", "lower_terms", "B_at_root", "step_eps", "base", "error_of_second"),
 )
 
 
-def remembered(method: Method) -> Method:
+def cache_by_id(method: Method) -> Method:
     """Cache the values of a method by the `id` of its arguments; references keep the arguments alive."""
     name = method.__name__
 
     @wraps(method)
     def wrapper(self: PaperObjects, *arguments: Any, **options: int) -> Any:
         key = (name, *(a if isinstance(a, int) else id(a) for a in arguments), *options.items())
-        if key not in self._memory:
-            self._memory[key] = (method(self, *arguments, **options), arguments)
-        return self._memory[key][0]
+        if key not in self._cache:
+            self._cache[key] = (method(self, *arguments, **options), arguments)
+        return self._cache[key][0]
 
     return cast(Method, wrapper)
 
@@ -49,10 +49,10 @@ def remembered(method: Method) -> Method:
 class PaperObjects:
     """The paper's objects over the field `K`.
 
-    `third` contains the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H.
-    `draw` returns further vectors by name (random vectors at a point, indeterminates in a proof). `step_eps` is the eps
-    of the maps, and `minus` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler
-    method), and `error_of_second`, an error of the tensor f''.
+    `d3H` are the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw` gives
+    further vectors by name (random vectors at a point, indeterminates in a proof). `step_eps` is the eps of the maps,
+    and `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
+    and `error_of_second`, an error of the tensor f''.
     """
 
     K: Field
@@ -62,14 +62,14 @@ class PaperObjects:
     method: str = "kahan"
     error_of_second: Any = None
     used: set[str] = field(default_factory=set)
-    _memory: dict[Any, Any] = field(default_factory=dict)
+    _cache: dict[Any, Any] = field(default_factory=dict)
     A: Any
-    third: Any
+    d3H: Any
     J: Any = None  # by default [[0, I], [-I, 0]]
     roots: tuple[Any, ...] | None
     hessian_of_quadratic_part: Any = None  # for an inhomogeneous H
     gradient_of_linear_part: Any = None
-    minus: Any = None
+    B_at_root: Any = None
     base: SystemOver | None = None  # f_0, if it is given by a rational system
     sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to be tested; None: all
     associate_matrices: tuple[Any, ...] | None = None  # their matrices B, if given without the roots of chi
@@ -82,8 +82,8 @@ class PaperObjects:
     def __post_init__(self) -> None:
         if self.step_eps is None:
             self.step_eps = self.eps
-        if self.minus is None:
-            self.minus = -self.K.one
+        if self.B_at_root is None:
+            self.B_at_root = -self.K.one
         if self.J is None:
             self.J = self.K.convert_matrix(standard_structure(self.n))
 
@@ -115,27 +115,23 @@ class PaperObjects:
 
     def vector(self, name: str) -> Any:
         """Return the independent vector with this name: the point x, another point, or a direction."""
-        if name not in self._memory:
+        if name not in self._cache:
             self.used.add(name)
-            self._memory[name] = self.draw(name)
-        return self._memory[name]
+            self._cache[name] = self.draw(name)
+        return self._cache[name]
 
-    def forget(self, kept: tuple[str, ...] = ()) -> None:
-        """Discard all computed values, except the drawn vectors and the values of the methods `kept`."""
-        drawn = {
-            key: value
-            for key, value in self._memory.items()
-            if isinstance(key, str) and key not in ("lifted", "inhomogeneous")
-        }
-        drawn |= {key: value for key, value in self._memory.items() if not isinstance(key, str) and key[0] in kept}
-        self._memory.clear()
-        self._memory.update(drawn)
+    def forget(self, kept_methods: tuple[str, ...] = ()) -> None:
+        """Discard all computed values, except the drawn vectors and the values of the methods `kept_methods`."""
+        computed_names = ("over_dual_numbers", "inhomogeneous")  # other text keys are the names of drawn vectors
+        for key in list(self._cache):
+            if key in computed_names if isinstance(key, str) else key[0] not in kept_methods:
+                del self._cache[key]
 
     def scalar(self, name: str) -> Any:
         """Return an independent number with this name."""
         return self.vector(name)[0, 0]
 
-    @remembered
+    @cache_by_id
     def unit(self, k: int) -> Any:
         """Return the k-th unit vector."""
         return self.K.column([self.K.one if i == k else self.K.zero for i in range(self.n)])
@@ -187,17 +183,17 @@ class PaperObjects:
         """Return f(x)."""
         return self.K.column(f.value(x.entries()))
 
-    @remembered
+    @cache_by_id
     def jac(self, f: SystemOver, x: Any) -> Any:
         """Return the Jacobi matrix f'(x)."""
         return f.jacobian(x.entries())
 
     def second(self, f: SystemOver, v: Any) -> Any:
         """Return the matrix f''v, for which f'(x + v) = f'(x) + f''v."""
-        second = f.hessian_times(v.entries())
-        return second if self.error_of_second is None else second + self.error_of_second * v[0, 0]
+        matrix = f.hessian_times(v.entries())
+        return matrix if self.error_of_second is None else matrix + self.error_of_second * v[0, 0]
 
-    @remembered
+    @cache_by_id
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
         """Return Phi_f(x, `times` eps)."""
         eps = self.step_eps * self.number(times)
@@ -211,17 +207,17 @@ class PaperObjects:
             return self.I + self.jac(f, x) * (self.step_eps * self.number(2))
         return KahanMap(f, self.step_eps).jacobian(x.entries())
 
-    @remembered
+    @cache_by_id
     def minus_eps_jac(self, f: SystemOver, x: Any) -> Any:
         """I - eps f'(x)."""
         return self.I - self.jac(f, x) * self.eps
 
-    @remembered
+    @cache_by_id
     def plus_eps_jac(self, f: SystemOver, x: Any) -> Any:
         """I + eps f'(x)."""
         return self.I + self.jac(f, x) * self.eps
 
-    @remembered
+    @cache_by_id
     def one_minus_square(self, f: SystemOver, x: Any) -> Any:
         """I - eps^2 f'(x)^2."""
         jacobian = self.jac(f, x)
@@ -231,12 +227,12 @@ class PaperObjects:
 
     def slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any) -> Any:
         """Return the exact derivative at x along v of a scalar function of (objects, point), by dual numbers."""
-        return function(self.lifted(), self._moving(x, v)).slope
+        return function(self.over_dual_numbers(), self._dual_point(x, v)).slope
 
-    @remembered
-    def _moving(self, x: Any, v: Any) -> Any:
+    @cache_by_id
+    def _dual_point(self, x: Any, v: Any) -> Any:
         """Return the dual number x + d v."""
-        dual: Any = self.lifted().K
+        dual: Any = self.over_dual_numbers().K
         return dual.matrix(self.n, 1, [dual.dual(a, b) for a, b in zip(x.entries(), v.entries(), strict=True)])
 
     def second_slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any, w: Any) -> Any:
@@ -276,26 +272,26 @@ class PaperObjects:
 
     # ---- H and its chain ----------------------------------------------------------------------------------------
 
-    def _reshaped(self, column: Any) -> Any:
+    def _square_matrix(self, column: Any) -> Any:
         return self.K.matrix(self.n, self.n, column.entries())
 
-    @remembered
+    @cache_by_id
     def hess(self, x: Any, i: int = 0) -> Any:
         """Return the Hesse matrix nabla^2 H_i = A^i nabla^2 H_0 at x (by definition of the chain)."""
-        hessian = self._reshaped(self.third * x)
+        hessian = self._square_matrix(self.d3H * x)
         if self.hessian_of_quadratic_part is not None:
             hessian = hessian + self.hessian_of_quadratic_part
         return self.A_to(i) * hessian
 
-    @remembered
+    @cache_by_id
     def A_to(self, i: int) -> Any:
         """A^i."""
         return self.power(self.A, i)
 
-    @remembered
+    @cache_by_id
     def grad(self, x: Any, i: int = 0) -> Any:
         """Return nabla H_i(x) = A^i nabla H_0(x)."""
-        gradient = self._reshaped(self.third * x) * x * self.number(1, 2)
+        gradient = self._square_matrix(self.d3H * x) * x * self.number(1, 2)
         if self.hessian_of_quadratic_part is not None:
             gradient = gradient + self.hessian_of_quadratic_part * x + self.gradient_of_linear_part
         return self.A_to(i) * gradient
@@ -310,7 +306,7 @@ class PaperObjects:
 
     def potential(self, matrix: Any, x: Any) -> Any:
         """Return at x the function with gradient `matrix` nabla H_0 that is 0 at 0, if there is one."""
-        value = self.dot(x, matrix * (self._reshaped(self.third * x) * x)) * self.number(1, 6)
+        value = self.dot(x, matrix * (self._square_matrix(self.d3H * x) * x)) * self.number(1, 6)
         if self.hessian_of_quadratic_part is not None:
             value = value + self.dot(x, matrix * (self.hessian_of_quadratic_part * x)) * self.number(1, 2)
             value = value + self.dot(x, matrix * self.gradient_of_linear_part)
@@ -321,7 +317,7 @@ class PaperObjects:
         """The system f = f_0 = J nabla H_0."""
         return self.base if self.base is not None else self.hamiltonian_system(self.I)
 
-    @remembered
+    @cache_by_id
     def f_(self, i: int) -> SystemOver:
         """The system f_i = J nabla H_i = J A^i nabla H_0."""
         return self.f if i == 0 else self.hamiltonian_system(self.A_to(i))
@@ -329,11 +325,11 @@ class PaperObjects:
     def hamiltonian_system(self, matrix: Any) -> SystemOver:
         """The system J `matrix` nabla H_0."""
         n, K = self.n, self.K
-        left = self.J * matrix
-        tensor = K.matrix(n * n, n, (left * K.matrix(n, n * n, self.third.entries())).entries())
+        JM = self.J * matrix
+        tensor = K.matrix(n * n, n, (JM * K.matrix(n, n * n, self.d3H.entries())).entries())
         if self.hessian_of_quadratic_part is None:
             return SystemOver(K, tensor)
-        return SystemOver(K, tensor, left * self.hessian_of_quadratic_part, left * self.gradient_of_linear_part)
+        return SystemOver(K, tensor, JM * self.hessian_of_quadratic_part, JM * self.gradient_of_linear_part)
 
     # ---- the associated systems ---------------------------------------------------------------------------------
 
@@ -355,7 +351,7 @@ class PaperObjects:
         """The indices i at which a claim "for all i" is tested."""
         return self.each if self.free_indices is None else self.free_indices
 
-    @remembered
+    @cache_by_id
     def lagrange(self, i: int) -> list[Any]:
         """Return the coefficients of the polynomial B_i of degree < m with B_i(lambda_i) = -1 and B_i(lambda_j) = 1.
 
@@ -367,7 +363,7 @@ class PaperObjects:
             if j != i:
                 product = _times_linear(self.K, product, self.lam[j])
                 denominator = denominator * (self.lam[i] - self.lam[j])
-        factor = (self.minus - self.K.one) / denominator
+        factor = (self.B_at_root - self.K.one) / denominator
         coefficients = [coefficient * factor for coefficient in product]
         coefficients[0] = coefficients[0] + self.K.one
         return coefficients
@@ -376,7 +372,7 @@ class PaperObjects:
         """Return the polynomial in A with these coefficients, constant term first."""
         return self.sum([self.A_to(k) * coefficient for k, coefficient in enumerate(coefficients)])
 
-    @remembered
+    @cache_by_id
     def B(self, i: int) -> Any:
         """B_i."""
         return self.polynomial_in_A(self.lagrange(i))
@@ -395,9 +391,9 @@ class PaperObjects:
             yield from self.associate_matrices
             return
         for signs in self.all_signs():
-            if ("B", signs) not in self._memory:
-                self._memory["B", signs] = self.B_signs(signs)
-            yield self._memory["B", signs]
+            if ("B", signs) not in self._cache:
+                self._cache["B", signs] = self.B_signs(signs)
+            yield self._cache["B", signs]
 
     def all_signs(self) -> tuple[tuple[int, ...], ...]:
         """The sign vectors s of the associated systems that are tested."""
@@ -408,7 +404,7 @@ class PaperObjects:
             return ((-1,),)
         return tuple((1, *other_signs) for other_signs in itertools.product((1, -1), repeat=count - 1))[1:]
 
-    @remembered
+    @cache_by_id
     def g(self, B: Any) -> SystemOver:
         """The associated system g = J B nabla H_0 = J nabla K."""
         return self.hamiltonian_system(B)
@@ -440,24 +436,24 @@ class PaperObjects:
 
     # ---- integrals and the Poisson tensor -----------------------------------------------------------------------
 
-    @remembered
+    @cache_by_id
     def integral(self, g: SystemOver, x: Any) -> Any:
         """Return eps^{-1} x^T J x^, where x^ = Phi_g(x): H~ for g = f, K~ for an associated g."""
         return self.dot(x, self.J * self.step(g, x)) / self.eps
 
-    @remembered
+    @cache_by_id
     def H_tilde(self, x: Any) -> Any:
         """H~(x, eps)."""
         return self.integral(self.f, x)
 
-    @remembered
+    @cache_by_id
     def H_tilde_(self, i: int, x: Any) -> Any:
         """H~_i = eps^{-1} x^T J (A^T)^i x~, a perturbation of -6 H_i."""
         image = self.A_to(i).transpose() * self.step(self.f, x)
         return self.dot(x, self.J * image) / self.eps
 
-    @remembered
-    def modified(self, B: Any, x: Any) -> Any:
+    @cache_by_id
+    def modified_K(self, B: Any, x: Any) -> Any:
         """Return K + (2 eps/3) nabla K^T (I - eps g')^{-1} g for the associated g; it tends to K for eps -> 0."""
         g = self.f if B is self.I else self.g(B)
         increment = self.solve(self.minus_eps_jac(g, x), self.value(g, x))
@@ -465,7 +461,7 @@ class PaperObjects:
 
     def modified_H(self, x: Any) -> Any:
         """H + (2 eps/3) nabla H^T (I - eps f')^{-1} f."""
-        return self.modified(self.I, x)
+        return self.modified_K(self.I, x)
 
     def Pi(self, x: Any) -> Any:
         """The Poisson tensor J - eps^2 f'(x)^2 J."""
@@ -473,12 +469,12 @@ class PaperObjects:
 
     # ---- f'^2 as a combination of I and the B_i -----------------------------------------------------------------
 
-    @remembered
+    @cache_by_id
     def square(self, x: Any) -> Any:
         """f'(x)^2."""
         return self.jac(self.f, x) * self.jac(self.f, x)
 
-    @remembered
+    @cache_by_id
     def projector(self, i: int) -> Any:
         """Return the projector onto the eigenspace for lambda_i: prod_{j != i} (A - lambda_j)/(lambda_i - lambda_j)."""
         product = self.I
@@ -487,7 +483,7 @@ class PaperObjects:
                 product = product * (self.A - self.I * self.lam[j]) * (self.K.one / (self.lam[i] - self.lam[j]))
         return product
 
-    @remembered
+    @cache_by_id
     def eigenvalue_of_square(self, i: int, x: Any) -> Any:
         """Return -D_i, the eigenvalue of f'^2 on the eigenspace of A^T for lambda_i; D_i = det f' on this plane."""
         return self.trace(self.projector(i).transpose() * self.square(x)) * self.number(1, 2)
@@ -496,22 +492,22 @@ class PaperObjects:
         """Return D_i, the determinant of f' on the plane of lambda_i."""
         return -self.eigenvalue_of_square(i, x)
 
-    @remembered
+    @cache_by_id
     def eighth_of_trace(self, x: Any) -> Any:
         """tr f'^2/8."""
         return self.trace(self.square(x)) * self.number(1, 8)
 
-    @remembered
+    @cache_by_id
     def p0(self, x: Any) -> Any:
         """Return p_0 = (4 - m)/8 tr f'^2; for m = 3 this is the paper's 1/8 tr f'^2."""
         return self.eighth_of_trace(x) * self.number(4 - self.m)
 
-    @remembered
+    @cache_by_id
     def q(self, i: int, x: Any) -> Any:
         """q_i = 1/8 tr (B_i^T f'^2)."""
         return self.trace(self.B(i).transpose() * self.square(x)) * self.number(1, 8)
 
-    @remembered
+    @cache_by_id
     def coefficient_of_power(self, k: int, x: Any) -> Any:
         """Return pi_k, where f'^2 = sum_k pi_k (A^T)^k; for m = 3 these are the paper's p, q, r."""
         value = self.p0(x) if k == 0 else self.K.zero
@@ -519,7 +515,7 @@ class PaperObjects:
             value = value + self.lagrange(i)[k] * self.q(i, x)
         return value
 
-    @remembered
+    @cache_by_id
     def s(self, i: int, x: Any) -> Any:
         """s_i = 1 - eps^2 (p_0 + sum_j q_j - 2 q_i), the factor of det(I - eps f') that belongs to lambda_i."""
         total = self.p0(x) - self.q(i, x) * self.number(2)
@@ -527,18 +523,18 @@ class PaperObjects:
             total = total + self.q(j, x)
         return self.K.one - self.eps * self.eps * total
 
-    @remembered
+    @cache_by_id
     def reciprocals(self, x: Any) -> Any:
         """sum_i 1/s_i."""
         return self.sum([self.K.one / self.s(i, x) for i in self.each])
 
-    @remembered
+    @cache_by_id
     def P0(self, x: Any) -> Any:
         """P_0 = ((m - 2)^2 + (4 - m) sum 1/s_j)/4; for m = 3 this is the paper's (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4."""
         m = self.m
         return (self.number((m - 2) ** 2) + self.number(4 - m) * self.reciprocals(x)) * self.number(1, 4)
 
-    @remembered
+    @cache_by_id
     def Q(self, i: int, x: Any) -> Any:
         """Q_i = (2 - m + sum 1/s_j - 2/s_i)/(4 eps^2)."""
         numerator = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
@@ -546,9 +542,9 @@ class PaperObjects:
 
     # ---- variations ---------------------------------------------------------------------------------------------
 
-    def lifted(self) -> PaperObjects:
+    def over_dual_numbers(self) -> PaperObjects:
         """The objects over the dual numbers K[d]/(d^2)."""
-        if "lifted" not in self._memory:
+        if "over_dual_numbers" not in self._cache:
             dual = DualField(self.K)
 
             def lift(value: Any) -> Any:
@@ -560,15 +556,17 @@ class PaperObjects:
                     return SystemOver(dual, lift(value.tensor), lift(value.B), lift(value.c))
                 return dual.lift_matrix(value) if hasattr(value, "entries") else dual.convert(value)
 
-            data = {name: lift(getattr(self, name)) for name in _IN_K}
-            self._memory["lifted"] = self.changed(K=dual, draw=lambda name: dual.lift_matrix(self.vector(name)), **data)
-        lifted: PaperObjects = self._memory["lifted"]
-        return lifted
+            dual_fields = {name: lift(getattr(self, name)) for name in _IN_K}
+            self._cache["over_dual_numbers"] = self.replace(
+                K=dual, draw=lambda name: dual.lift_matrix(self.vector(name)), **dual_fields
+            )
+        objects: PaperObjects = self._cache["over_dual_numbers"]
+        return objects
 
-    def changed(self, **changes: Any) -> PaperObjects:
+    def replace(self, **changes: Any) -> PaperObjects:
         """Return objects with some of the data replaced, and an empty cache."""
-        kept = {entry.name: getattr(self, entry.name) for entry in fields(PaperObjects)}
-        return PaperObjects(**{**kept, "_memory": {}, **changes})
+        current = {entry.name: getattr(self, entry.name) for entry in fields(PaperObjects)}
+        return PaperObjects(**{**current, "_cache": {}, **changes})
 
     def inhomogeneous(self) -> PaperObjects:
         """Add random quadratic and linear terms to H such that A nabla^2 H = nabla^2 H A^T still holds.
@@ -579,7 +577,7 @@ class PaperObjects:
         """
         if self.hessian_of_quadratic_part is not None:
             return self
-        if "inhomogeneous" not in self._memory:
+        if "inhomogeneous" not in self._cache:
             X = self.zeros(self.n, self.n)
             linear = self.zeros(self.n, 1)
             if self.lower_terms is not None:
@@ -591,16 +589,16 @@ class PaperObjects:
                     for i in range(self.m):
                         X = X + self.A_to(i) * u * (self.horner(i) * u).transpose()
             base = self.base
-            self._memory["inhomogeneous"] = self.changed(
+            self._cache["inhomogeneous"] = self.replace(
                 hessian_of_quadratic_part=X,
                 gradient_of_linear_part=linear,
                 base=base and SystemOver(self.K, base.tensor, self.J * X, self.J * linear),
                 draw=self.vector,
             )
-        objects: PaperObjects = self._memory["inhomogeneous"]
+        objects: PaperObjects = self._cache["inhomogeneous"]
         return objects
 
-    def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
+    def arbitrary_system(self, is_homogeneous: bool = False) -> SystemOver:
         """Return a quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
@@ -608,7 +606,7 @@ class PaperObjects:
             for k in range(j, n):
                 rows[j, k] = rows[k, j] = self.vector(f"f'' {j} {k}")
         tensor = [rows[j, k][i, 0] for i in range(n) for j in range(n) for k in range(n)]
-        if homogeneous:
+        if is_homogeneous:
             return SystemOver(K, K.matrix(n * n, n, tensor))
         linear = self.columns([self.vector(f"B {j}") for j in range(n)])
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
@@ -621,38 +619,38 @@ class PaperObjects:
         """
         n, K = self.n, self.K
 
-        def form(name: str) -> list[Any]:
-            parts = [self.A_to(k) * self.vector(name) for k in range(self.m)]
+        def linear_form(name: str) -> list[Any]:
+            power_vectors = [self.A_to(k) * self.vector(name) for k in range(self.m)]
             horner = [self.horner(k).transpose() for k in range(self.m)]
-            return [self.sum([h * p[j, 0] for h, p in zip(horner, parts, strict=True)]) for j in range(n)]
+            return [self.sum([h * p[j, 0] for h, p in zip(horner, power_vectors, strict=True)]) for j in range(n)]
 
         rows: list[list[Any]] = [[K.zero] * (n * n) for _ in range(n)]
         for term in ("1", "2"):
-            a, b, e = form(f"a{term}"), form(f"b{term}"), self.vector(f"e{term}")
+            a, b, e = linear_form(f"a{term}"), linear_form(f"b{term}"), self.vector(f"e{term}")
             for j, k in itertools.product(range(n), repeat=2):
                 value = a[j] * (b[k] * e) + a[k] * (b[j] * e)
                 for i in range(n):
                     rows[i][j * n + k] = rows[i][j * n + k] + value[i, 0]
-        linear = self.columns([M * self.vector("e'") for M in form("c")])
+        linear = self.columns([M * self.vector("e'") for M in linear_form("c")])
         return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
-    def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
-        """Return objects with a random H with terms of all degrees up to 3, and a skew J, random unless `standard`."""
+    def arbitrary_hamiltonian(self, has_standard_J: bool = False) -> PaperObjects:
+        """Return objects with a random H, of terms of all degrees up to 3, and the standard J or a random skew J."""
         n, K = self.n, self.K
-        tensor: dict[tuple[int, ...], Any] = {}
+        entry_of: dict[tuple[int, ...], Any] = {}
         for i, j in itertools.combinations_with_replacement(range(n), 2):
             entries = self.vector(f"H {i} {j}")
             for k in range(j, n):
-                for place in itertools.permutations((i, j, k)):
-                    tensor[place] = entries[k, 0]
-        third = K.matrix(n * n, n, [tensor[place] for place in itertools.product(range(n), repeat=3)])
+                for indices in itertools.permutations((i, j, k)):
+                    entry_of[indices] = entries[k, 0]
+        d3H = K.matrix(n * n, n, [entry_of[indices] for indices in itertools.product(range(n), repeat=3)])
         X = self.columns([self.vector(f"X {j}") for j in range(n)])
         J = self.columns([self.vector(f"J {j}") for j in range(n)])
-        return self.changed(
-            third=third,
+        return self.replace(
+            d3H=d3H,
             hessian_of_quadratic_part=X + X.transpose(),
             gradient_of_linear_part=self.vector("linear"),
-            J=self.J if standard else J - J.transpose(),
+            J=self.J if has_standard_J else J - J.transpose(),
             base=None,
             draw=self.vector,
         )
@@ -667,8 +665,8 @@ class PaperObjects:
         e, h = self.vector("e"), self.vector("h")
         U, V = ([self.A_to(i) * vector for i in range(m)] for vector in (e, h))
         gram = K.matrix(m, m, [self.dot(u, self.J * v) for u in U for v in V])
-        parts = [self.columns(U), self.columns(V) * solve(gram, K.identity(m))]
-        S = K.matrix(self.n, self.n, [part[i, j] for i in range(self.n) for part in parts for j in range(m)])
+        column_blocks = [self.columns(U), self.columns(V) * solve(gram, K.identity(m))]
+        S = K.matrix(self.n, self.n, [block[i, j] for i in range(self.n) for block in column_blocks for j in range(m)])
         return S, self.companion(self.chi)
 
     def companion(self, chi: Sequence[Any]) -> Any:
@@ -677,7 +675,7 @@ class PaperObjects:
         entries = [-chi[i] if j == m - 1 else one if i == j + 1 else zero for i in range(m) for j in range(m)]
         return self.K.matrix(m, m, entries)
 
-    def doubled(self, W: Any) -> Any:
+    def block_diagonal(self, W: Any) -> Any:
         """Return diag(W, W^T) for an m x m matrix W."""
         m, zeros = self.m, [self.K.zero] * self.m
         rows = [[W[i, j] for j in range(m)] + zeros for i in range(m)]
@@ -696,17 +694,17 @@ class PaperObjects:
     def rank_of_cubic_equations(self) -> int:
         """Return the rank of the linear system A nabla^2 H = nabla^2 H A^T for the coefficients of a cubic H."""
         n, K = self.n, self.K
-        pairs = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
+        index_of_pair = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
         rows = []
         for a, b, c in itertools.combinations_with_replacement(range(n), 3):
-            row = [K.zero] * (n * len(pairs))
+            row = [K.zero] * (n * len(index_of_pair))
             # The Hesse matrix of x_a x_b x_c contains x_l in the entries (j, k) and (k, j), where {j, k, l} = {a, b,
             # c}.
             for j, k, l in set(itertools.permutations((a, b, c))):
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # add A_ij to entry (i, k) of A nabla^2 H and to entry (k, i) of nabla^2 H A^T
                     if i != k:
-                        column = l * len(pairs) + pairs[min(i, k), max(i, k)]
+                        column = l * len(index_of_pair) + index_of_pair[min(i, k), max(i, k)]
                         row[column] = row[column] + self.A[i, j] * (factor if i < k else -factor)
             rows.append(row)
         return rank(K, K.matrix(len(rows), len(rows[0]), [entry for row in rows for entry in row]))

@@ -111,7 +111,7 @@ class Claim:
 _claims: dict[str, Claim] = {}
 
 
-def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
+def claim(place: str, label: str, breaks: str = "", **options: Any) -> Callable[[ClaimFunction], ClaimFunction]:
     """Register a function as a claim; its file determines the section.
 
     The first line of the docstring is the title, the second line the formula. `breaks` are names of controls, separated
@@ -125,8 +125,8 @@ def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[Cl
         if key in _claims:
             raise ValueError(f"two claims have the name {key}")
         formula = (function.__doc__ or "").splitlines()[1].strip()
-        kind = more.pop("kind", ClaimKind.ATTAINED if more.get("at_most") else ClaimKind.EQUAL)
-        _claims[key] = Claim(key, section, place, label, formula, function, tuple(breaks.split()), kind, **more)
+        kind = options.pop("kind", ClaimKind.ATTAINED if options.get("at_most") else ClaimKind.EQUAL)
+        _claims[key] = Claim(key, section, place, label, formula, function, tuple(breaks.split()), kind, **options)
         return function
 
     return register
@@ -172,15 +172,15 @@ class ClaimOutcome:
         return self.failure is None
 
 
-def evaluate(claim: Claim, o: PaperObjects) -> ClaimOutcome:
+def evaluate(claim: Claim, objects: PaperObjects) -> ClaimOutcome:
     """Evaluate a claim. Raises one of `UNDEFINED` (SingularStep, ...) if the claim is undefined for the objects."""
     pairs = 0
-    with o.K.working():
-        for left, right in claim.function(o):
+    with objects.K.working():
+        for left, right in claim.function(objects):
             pairs += 1
-            if same(o.K, left, right) != (claim.kind is not ClaimKind.DIFFERENT):
-                return ClaimOutcome(o, pairs, (left, right))
-    return ClaimOutcome(o, pairs, None)
+            if same(objects.K, left, right) != (claim.kind is not ClaimKind.DIFFERENT):
+                return ClaimOutcome(objects, pairs, (left, right))
+    return ClaimOutcome(objects, pairs, None)
 
 
 def outcomes(
@@ -199,19 +199,21 @@ def witness_of(outcome: ClaimOutcome) -> Witness | None:
     """Return the point at which a claim failed, with both sides or, for matrices, the first entry that differs."""
     if outcome.failure is None:
         return None
-    o = outcome.objects
+    objects = outcome.objects
     left, right = outcome.failure
     labels = ("left side", "right side")
     if isinstance(left, int):
         sides = (str(left), str(right))
     else:
         a, b = entries(left), entries(right)
-        k = next((k for k, (x, y) in enumerate(zip(a, b, strict=True)) if not o.K.equal(x, y)), 0)
+        k = next((k for k, (x, y) in enumerate(zip(a, b, strict=True)) if not objects.K.equal(x, y)), 0)
         if len(a) > 1:
             columns = left.ncols()
             labels = tuple(f"{side}, entry ({k // columns + 1},{k % columns + 1})" for side in labels)  # type: ignore[assignment]
-        sides = (o.K.format(a[k]), o.K.format(b[k]))
-    drawn = {name: o.vector(name) for name in sorted(o.used - {"roots"}) if not name.startswith("break")}
-    text = {name: tuple(o.K.format(entry) for entry in vector.entries()) for name, vector in drawn.items()}
-    point = text.pop("x", ())
-    return Witness(point, o.K.format(o.eps), (sides[0],), (sides[1],), *labels, o.K.name, text)
+        sides = (objects.K.format(a[k]), objects.K.format(b[k]))
+    vectors = {name: objects.vector(name) for name in sorted(objects.used - {"roots"}) if not name.startswith("break")}
+    coordinates = {
+        name: tuple(objects.K.format(entry) for entry in vector.entries()) for name, vector in vectors.items()
+    }
+    point = coordinates.pop("x", ())
+    return Witness(point, objects.K.format(objects.eps), (sides[0],), (sides[1],), *labels, objects.K.name, coordinates)

@@ -35,7 +35,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
 
-_SHEARS = 5  # symmetric shears, alternately upper and lower: products of 5 give every symplectic matrix
+_SHEAR_COUNT = 5  # symmetric shears, alternately upper and lower: products of 5 give every symplectic matrix
 # If there are more sign vectors, a sample is tested: those with one sign -1, and random ones.
 MAX_SIGN_VECTORS = 32
 
@@ -49,11 +49,11 @@ class MemberObjects(PaperObjects):
     member: FamilyMember
 
     @classmethod
-    def at(cls, member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, **more: Any) -> MemberObjects:
+    def at(cls, member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, **options: Any) -> MemberObjects:
         """Return the objects of a member over K; `roots` are the roots of chi, None if they are not in K."""
         base, chi = member.hamiltonians[0].system.over(K), chi_of(member.A)
         known_chi = tuple(K.convert(chi[k]) for k in range(member.m + 1))
-        objects = cls(**_given(member, K), roots=roots, base=base, known_chi=known_chi, **more)
+        objects = cls(**_member_data(member, K), roots=roots, base=base, known_chi=known_chi, **options)
         objects.member = member
         return objects
 
@@ -84,9 +84,9 @@ class MemberObjects(PaperObjects):
         return super().B_signs(signs)
 
     def _associate(self, signs: tuple[int, ...]) -> AssociatedSystem:
-        if ("associate", signs) not in self._memory:
-            self._memory["associate", signs] = self.member.associate(signs)
-        system: AssociatedSystem = self._memory["associate", signs]
+        if ("associate", signs) not in self._cache:
+            self._cache["associate", signs] = self.member.associate(signs)
+        system: AssociatedSystem = self._cache["associate", signs]
         return system
 
     def H_tilde(self, x: Any) -> Any:
@@ -116,9 +116,9 @@ def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | Non
     """Return a sample of sign vectors (all vectors with one sign -1, and random ones); None stands for all vectors."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
-    flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
+    single_flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
     random_signs = [(1, *(rng.choice((1, -1)) for _ in range(m - 1))) for _ in range(4)]
-    return tuple(dict.fromkeys(signs for signs in [*flips, *random_signs] if -1 in signs))
+    return tuple(dict.fromkeys(signs for signs in [*single_flips, *random_signs] if -1 in signs))
 
 
 # ---- points over GF(p) and Q -----------------------------------------------------------------------------------
@@ -154,10 +154,10 @@ def point_over(
     member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
     """Return the objects of a member at a random point over QQ or GF(p); `eps` None means a random eps."""
-    value = K.zero if eps is None else K.convert(eps)
-    value = _not_zero(K, rng) if value == 0 else value
+    eps_in_K = K.zero if eps is None else K.convert(eps)
+    eps_in_K = _random_nonzero(K, rng) if eps_in_K == 0 else eps_in_K
     signs, draw = sign_sample(member.m, rng), random_draw(K, member.dim, rng)
-    return MemberObjects.at(member, K, roots, eps=value, draw=draw, sign_vectors=signs, order=order)
+    return MemberObjects.at(member, K, roots, eps=eps_in_K, draw=draw, sign_vectors=signs, order=order)
 
 
 def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
@@ -169,7 +169,7 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
     roots = tuple(K.random(rng) for _ in range(m))
     cubics = [[K.random(rng) for _ in range(4)] for _ in range(m)]
     S, S_inverse = K.identity(n), K.identity(n)
-    for k in range(_SHEARS):
+    for k in range(_SHEAR_COUNT):
         entries = {}
         for i in range(m):
             for j in range(i, m):
@@ -179,16 +179,16 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
             position = i * n + m + j if k % 2 == 0 else (m + i) * n + j
             shear[position], inverse_shear[position] = value, -value
         S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, inverse_shear) * S_inverse
-    A, third = _normal_form(K, roots, cubics)
+    A, d3H = _normal_form(K, roots, cubics)
     # x = S z: A becomes S^{-T} A S^T, and S^{-1} acts on each of the three indices of the third derivatives: on the
     # last index, which then becomes the first, three times.
     for _ in range(3):
-        third = K.matrix(n * n, n, (third * S_inverse).transpose().entries())
-    eps = _not_zero(K, rng)
+        d3H = K.matrix(n * n, n, (d3H * S_inverse).transpose().entries())
+    eps = _random_nonzero(K, rng)
     signs = sign_sample(m, rng)
     A = S_inverse.transpose() * A * S.transpose()
     return PaperObjects(
-        K=K, A=A, third=third, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
+        K=K, A=A, d3H=d3H, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
     )
 
 
@@ -203,33 +203,33 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
     one block of a larger system.
     """
     n = 2 * m
-    lower = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
-    blockwise = [f"{c}{i + 1}" for i in range(m) for c in ["a", "c", "d", *lower]]
-    drawn = [vector for vector in vectors if vector not in ("x", "linear", "u1", "u2", "u3")]
-    letters = _letters(drawn, n)
+    lower_letters = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
+    block_symbols = [f"{c}{i + 1}" for i in range(m) for c in ["a", "c", "d", *lower_letters]]
+    generic_vectors = [vector for vector in vectors if vector not in ("x", "linear", "u1", "u2", "u3")]
+    symbols = _symbol_names(generic_vectors, n)
     names = [
         *(f"l{i + 1}" for i in range(m)),
-        *blockwise,
+        *block_symbols,
         "eps",
-        *(name for symbol_names in letters.values() for name in symbol_names),
+        *(name for symbol_names in symbols.values() for name in symbol_names),
     ]
     K = FunctionField(names, budget, reduces=True)
     by_name = dict(zip(names, K.variables, strict=True))
     roots = tuple(by_name[f"l{i + 1}"] for i in range(m))
     cubics = [[by_name[f"a{i + 1}"], K.zero, by_name[f"c{i + 1}"], by_name[f"d{i + 1}"]] for i in range(m)]
-    A, third = _normal_form(K, roots, cubics)
+    A, d3H = _normal_form(K, roots, cubics)
 
     def draw(name: str) -> Any:
         if name == "x":
             return K.column([K.one] * m + [K.zero] * m)
-        return K.column([by_name[letter] for letter in letters[name]])
+        return K.column([by_name[symbol] for symbol in symbols[name]])
 
     # Blocks may be permuted, and signs act block by block: vectors with -1 on the first blocks represent all.
     signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
     objects = PaperObjects(
         K=K,
         A=A,
-        third=third,
+        d3H=d3H,
         eps=by_name["eps"],
         roots=roots,
         draw=draw,
@@ -237,10 +237,10 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
         free_indices=(0,),
         order=order,
     )
-    if lower:
-        p, q, r, s, t = ([by_name[f"{c}{i + 1}"] for i in range(m)] for c in lower)
+    if lower_letters:
+        p, q, r, s, t = ([by_name[f"{c}{i + 1}"] for i in range(m)] for c in lower_letters)
         entries = {(i, i): p[i] for i in range(m)} | {(m + i, m + i): r[i] for i in range(m)}
-        entries |= {place: q[i] for i in range(m) for place in ((i, m + i), (m + i, i))}
+        entries |= {position: q[i] for i in range(m) for position in ((i, m + i), (m + i, i))}
         X = K.matrix(n, n, [entries.get((i, j), K.zero) for i in range(n) for j in range(n)])
         objects.lower_terms = (X, K.column([*s, *t]))
     return objects
@@ -251,31 +251,31 @@ def member_functions(
 ) -> MemberObjects:
     """Return the objects of a member over rational functions: x is indeterminate, and so is eps if `eps` is None."""
     n = member.dim
-    letters = _letters(vectors, n)
-    names = ["eps", *(name for letter in letters.values() for name in letter)]
+    symbols = _symbol_names(vectors, n)
+    names = ["eps", *(name for symbol_names in symbols.values() for name in symbol_names)]
     K = FunctionField(names, budget)
     by_name = dict(zip(names, K.variables, strict=True))
 
     def draw(name: str) -> Any:
-        return K.column([by_name[letter] for letter in letters[name]])
+        return K.column([by_name[symbol] for symbol in symbols[name]])
 
     roots = rational_roots(member)
-    lifted = None if roots is None else tuple(K.convert(root) for root in roots)
-    value = by_name["eps"] if eps is None else K.convert(eps)
+    K_roots = None if roots is None else tuple(K.convert(root) for root in roots)
+    eps_in_K = by_name["eps"] if eps is None else K.convert(eps)
     signs = sign_sample(member.m, random.Random("signs"))
-    return MemberObjects.at(member, K, lifted, eps=value, draw=draw, sign_vectors=signs, order=order)
+    return MemberObjects.at(member, K, K_roots, eps=eps_in_K, draw=draw, sign_vectors=signs, order=order)
 
 
 def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
     """Return a member's normal form at a random exact point: one planar system over Q[t]/chi, for all roots at once."""
-    form = normal_form(member)
-    K = EtaleAlgebra(form.chi)
+    planar_form = normal_form(member)
+    K = EtaleAlgebra(planar_form.chi)
     root = K.generator
-    A, third = _normal_form(K, (root,), [[K.convert(c) for c in form.coefficients]])
-    value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
+    A, d3H = _normal_form(K, (root,), [[K.convert(c) for c in planar_form.coefficients]])
+    eps_in_K = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
     signs = ((1,), (-1,))
     return PaperObjects(
-        K=K, A=A, third=third, eps=value, roots=(root,), draw=random_draw(K, 2, rng), sign_vectors=signs, order=order
+        K=K, A=A, d3H=d3H, eps=eps_in_K, roots=(root,), draw=random_draw(K, 2, rng), sign_vectors=signs, order=order
     )
 
 
@@ -293,10 +293,10 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
     K = CC(bits)
     roots = complex_roots(member, bits)
     with K.working():
-        value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
+        eps_in_K = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
         return PaperObjects(
-            **_given(member, K),
-            eps=value,
+            **_member_data(member, K),
+            eps=eps_in_K,
             roots=roots,
             draw=lambda name: K.column([K.convert(QQ.random(rng)) for _ in range(member.dim)]),
             sign_vectors=sign_sample(member.m, rng),
@@ -316,14 +316,14 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
         # If d is the common denominator of chi, d times a root is an algebraic integer; Cauchy's bound bounds all its
         # conjugates.
         denominator = chi.denom()
-        largest = denominator * (2 + max(abs(chi[k]) for k in range(member.m)))
-        root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(denominator)
+        root_bound = denominator * (2 + max(abs(chi[k]) for k in range(member.m)))
+        root = K.polynomial(0, float(root_bound.p.bit_length())) / K.convert(denominator)
     else:
         root = K.matrix(1, member.m, [K.convert(abs(r)) for r in rational_roots(member) or ()])[0, 0]
-    value = K.variable() if eps is None else K.convert(eps)
+    eps_in_K = K.variable() if eps is None else K.convert(eps)
     return PaperObjects(
-        **_given(member, K),
-        eps=value,
+        **_member_data(member, K),
+        eps=eps_in_K,
         roots=(root,) * member.m,
         draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
         known_chi=tuple(K.convert(abs(chi[k])) for k in range(member.m + 1)),
@@ -337,14 +337,14 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
     K = BoundField()
     n = 2 * m
     # The shears have entries of degree 1, so entries of S and S^{-1} have degree 5: each is a sum of m^4 monomials.
-    S = K.polynomial(_SHEARS, (_SHEARS - 1) * math.log2(m) + _SHEARS)
-    root, cubic = K.variable(), K.variable()
+    S = K.polynomial(_SHEAR_COUNT, (_SHEAR_COUNT - 1) * math.log2(m) + _SHEAR_COUNT)
+    root, coefficient = K.variable(), K.variable()
     A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
-    third = K.matrix(n * n, n, [S * S * S * cubic * K.convert(6 * n**3)] * n**3)
+    d3H = K.matrix(n * n, n, [S * S * S * coefficient * K.convert(6 * n**3)] * n**3)
     return PaperObjects(
         K=K,
         A=A,
-        third=third,
+        d3H=d3H,
         eps=K.variable(),
         roots=(root,) * m,
         draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
@@ -356,23 +356,23 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
 # ---- helpers ---------------------------------------------------------------------------------------------------
 
 
-def _not_zero(K: Field, rng: random.Random) -> Any:
+def _random_nonzero(K: Field, rng: random.Random) -> Any:
     return next(value for value in iter(lambda: K.random(rng), None) if value != 0)
 
 
-def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
+def _symbol_names(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
     return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 
-def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
+def _member_data(member: FamilyMember, K: Field) -> dict[str, Any]:
     """Return the data of a member over K: A, the third derivatives of H and, if chi has repeated roots, the matrices B.
 
     These B have one sign for each irreducible factor of chi, on the kernel of the power of this factor.
     """
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]
-    third = fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
-    values = {"K": K, "A": K.convert_matrix(member.A), "third": K.convert_matrix(third)}
+    d3H = fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
+    values = {"K": K, "A": K.convert_matrix(member.A), "d3H": K.convert_matrix(d3H)}
     if not member.is_generic:
         values["associate_matrices"] = tuple(K.convert_matrix(g.B) for g in list(member.associated())[1:])
     return values
@@ -383,14 +383,14 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
     m = len(roots)
     n = 2 * m
     A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])
-    third = [K.zero] * n**3
+    d3H = [K.zero] * n**3
     for i, coefficients in enumerate(cubics):
-        for place in range(8):
-            where = [i + m * (place >> k & 1) for k in range(3)]
-            number_of_v = bin(place).count("1")
+        for bits in range(8):
+            indices = [i + m * (bits >> k & 1) for k in range(3)]
+            number_of_v = bin(bits).count("1")
             factor = K.convert((6, 2, 2, 6)[number_of_v])
-            third[(where[0] * n + where[1]) * n + where[2]] = coefficients[number_of_v] * factor
-    return A, K.matrix(n * n, n, third)
+            d3H[(indices[0] * n + indices[1]) * n + indices[2]] = coefficients[number_of_v] * factor
+    return A, K.matrix(n * n, n, d3H)
 
 
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:

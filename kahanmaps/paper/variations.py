@@ -27,27 +27,27 @@ def other_structure(o: PaperObjects) -> PaperObjects:
     """J is a random skew matrix with A^T J = J A, singular or not: a polynomial in A^T times the standard J."""
     weights = o.vector("weights")
     factor = o.polynomial_in_A([weights[k, 0] for k in range(o.m)]).transpose()
-    return o.changed(J=factor * o.J, base=None, draw=o.vector)
+    return o.replace(J=factor * o.J, base=None, draw=o.vector)
 
 
 def any_structure(o: PaperObjects) -> PaperObjects:
     """J is a random constant skew matrix; A^T J = J A need not hold."""
     J = o.columns([o.vector(f"J {j}") for j in range(o.n)])
-    return o.changed(J=J - J.transpose(), base=None, draw=o.vector)
+    return o.replace(J=J - J.transpose(), base=None, draw=o.vector)
 
 
 def different_steps(o: PaperObjects) -> PaperObjects:
     """The maps of the associated g = B^T f are taken at 2 eps: they are the maps of 2 g at eps."""
-    return o.changed(associate_matrices=tuple(B * o.number(2) for B in o.associates()), draw=o.vector)
+    return o.replace(associate_matrices=tuple(B * o.number(2) for B in o.associates()), draw=o.vector)
 
 
 def jordan_block(o: PaperObjects) -> PaperObjects:
     """A has a double root and is not diagonalizable: chi is its minimal polynomial. H is random in the space of A."""
     roots = (o.lam[0], o.lam[0], *o.lam[2:])
-    chi = tuple(o.changed(roots=roots).chi_of_roots)
+    chi = tuple(o.replace(roots=roots).chi_of_roots)
     S, _ = o.symplectic_normal_form()
-    A = -(S * o.doubled(o.companion(chi)) * o.J * S.transpose() * o.J)
-    p = o.changed(A=A, known_chi=chi, base=None, draw=o.vector)
+    A = -(S * o.block_diagonal(o.companion(chi)) * o.J * S.transpose() * o.J)
+    p = o.replace(A=A, known_chi=chi, base=None, draw=o.vector)
     # Third derivatives of a sum of l(M_a(x)^3) in the space of A; t^k and C_k are dual bases for the functional l.
     terms = []
     for name in ("d1", "d2", "d3"):
@@ -55,26 +55,26 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
         for k in range(p.m):
             for l in range(p.m):
                 terms.append(p.tensor(powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
-    return p.changed(roots=None, third=p.sum(terms), associate_matrices=_signs(o, A, roots), draw=o.vector)
+    return p.replace(roots=None, d3H=p.sum(terms), associate_matrices=_associate_matrices(o, A, roots), draw=o.vector)
 
 
 def derogatory(o: PaperObjects) -> PaperObjects:
     """A is diagonalizable with lambda_1 = lambda_2; H is an arbitrary cubic on the eigenspace of this root."""
     E = o.projector(0) + o.projector(1)
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
-    third = o.sum([o.third, *(o.tensor(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3")))])
-    signs = _signs(o, A, (o.lam[1], *o.lam[1:]))
-    return o.changed(A=A, known_chi=None, base=None, roots=None, third=third, associate_matrices=signs, draw=o.vector)
+    d3H = o.sum([o.d3H, *(o.tensor(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3")))])
+    matrices = _associate_matrices(o, A, (o.lam[1], *o.lam[1:]))
+    return o.replace(A=A, known_chi=None, base=None, roots=None, d3H=d3H, associate_matrices=matrices, draw=o.vector)
 
 
-def _signs(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
+def _associate_matrices(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return (B,), where B = I - 2 E and E is the projector of A for the simple third root; () if m < 3."""
     if o.m < 3:
         return ()
-    E, simple = o.I, roots[2]
+    E, simple_root = o.I, roots[2]
     for root in (*roots[:2], *roots[3:]):
-        E = E * (A - o.I * root) * (o.K.one / (simple - root))
-    return (o.I + E * (o.minus - o.K.one),)
+        E = E * (A - o.I * root) * (o.K.one / (simple_root - root))
+    return (o.I + E * (o.B_at_root - o.K.one),)
 
 
 _CMOQ = "the theorem of Celledoni, McLachlan, Owren and Quispel"

@@ -58,7 +58,6 @@ from kahanmaps.paper.registry import (
     UNDEFINED,
     Claim,
     ClaimKind,
-    ClaimOutcome,
     claims,
     entries,
     evaluate,
@@ -73,8 +72,8 @@ MAX_M = 8
 PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # in a proof for one member
 _MAX_UNDEFINED = 40
-_POINTS = 4  # number of points for statements that objects differ or have full rank
-_LARGE = 5  # for m >= 5, controls are evaluated over GF(p) first
+_POINT_COUNT = 4  # number of points for statements that objects differ or have full rank
+_MIN_LARGE_M = 5  # for m >= 5, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
@@ -210,37 +209,37 @@ class Verifier:
     def findings(self) -> list[Finding]:
         """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
         sections = self.options.sections
-        made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
-        selected = [c for c in made if sections is None or c.section in sections]
+        applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
+        selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]
         findings: list[Finding] = []
-        without: list[str] = []
-        for k, claim in enumerate(selected):
-            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
+        unrefuted_keys: list[str] = []
+        for k, claim in enumerate(selected_claims):
+            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected_claims)})")
             if self.options.controls:
                 controls = self.controls(claim)
                 findings += controls
                 if self.why_outside(claim) is None and not any(finding.is_as_expected for finding in controls):
-                    without.append(claim.key)
+                    unrefuted_keys.append(claim.key)
             else:
                 findings.append(self.verify_claim(claim))
             for objects in self._points.values():  # otherwise the objects would cache the values of all claims
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
-            tried = {"claims": len({finding.place["key"] for finding in findings})}
-            text = f"{len(findings)} controls of {tried['claims']} claims, all refuted at exact points"
-            if without or not findings:
-                text = f"no control refutes {', '.join(without)}" if without else "no claim was tested"
-            verdict = Certainty.UNDECIDED if without or not findings else Certainty.PROVED
-            claimed = "every claim fails on some input that breaks one of its hypotheses"
-            findings.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
+            counts = {"claims": len({finding.place["key"] for finding in findings})}
+            text = f"{len(findings)} controls of {counts['claims']} claims, all refuted at exact points"
+            if unrefuted_keys or not findings:
+                text = f"no control refutes {', '.join(unrefuted_keys)}" if unrefuted_keys else "no claim was tested"
+            verdict = Certainty.UNDECIDED if unrefuted_keys or not findings else Certainty.PROVED
+            statement = "every claim fails on some input that breaks one of its hypotheses"
+            findings.append(Finding(statement, verdict, Evidence("controls", text, counts)))
         return findings
 
-    def point(self, roots: bool, number: int) -> PaperObjects | None:
+    def point(self, needs_roots: bool, number: int) -> PaperObjects | None:
         """Return the random point with this number over GF(p); None if the roots of chi are needed and not found."""
         # For the generic member, and if chi splits over Q, all claims use the same points.
-        needs_split = roots and self.member is not None and self.roots is None
-        key = (needs_split, number)
+        must_split = needs_roots and self.member is not None and self.roots is None
+        key = (must_split, number)
         if key not in self._points:
             self._points[key] = None
             member, order = self.member, self.options.order
@@ -248,28 +247,28 @@ class Verifier:
                 rng = random.Random(f"universal {self._seed} {number}")
                 self._points[key] = specialize.random_objects(self.m, random_prime_field(rng), rng, order)
                 return self._points[key]
-            rng = random.Random(f"verify {self._seed} {needs_split} {number}")
-            if needs_split and not member.is_generic:
+            rng = random.Random(f"verify {self._seed} {must_split} {number}")
+            if must_split and not member.is_generic:
                 return None
-            in_K: tuple[Any, ...] | None
+            roots_in_K: tuple[Any, ...] | None
             while self._points[key] is None:
                 with suppress(BadPrime):
-                    if needs_split:
+                    if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
                         # At least one prime in m! splits chi, so that this fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
-                        K, in_K = split_field
+                        K, roots_in_K = split_field
                     else:
                         K = random_prime_field(rng)
-                        in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                    self._points[key] = specialize.point_over(member, K, in_K, self.settings.eps, rng, order)
+                        roots_in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
+                    self._points[key] = specialize.point_over(member, K, roots_in_K, self.settings.eps, rng, order)
         return self._points[key]
 
-    def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
+    def exact_point(self, needs_roots: bool, number: int) -> PaperObjects | None:
         """Return a random point over Q; None for the generic member, and if roots of chi are needed but irrational."""
-        if self.member is None or (roots and self.roots is None):
+        if self.member is None or (needs_roots and self.roots is None):
             return None
         rng = random.Random(f"exact {self._seed} {number}")
         return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
@@ -280,9 +279,9 @@ class Verifier:
             return specialize.universal_bound_objects(self.m, self.options.order)
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
-    def conjugates(self, roots: bool) -> int:
+    def conjugates(self, needs_roots: bool) -> int:
         """Return a bound for the degree of the field that contains all numbers."""
-        if self.member is None or not roots or self.roots is not None:
+        if self.member is None or not needs_roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
 
@@ -307,17 +306,19 @@ class Verifier:
             return "its A is not generic"
         form = normal_form(self.member)
 
-        def vanishing(coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
-            """Return the monic polynomial of the roots at which all of these elements of Q[t]/chi vanish."""
+        def common_factor(coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
+            """Return the factor of chi at whose roots all of these elements of Q[t]/chi vanish."""
             return reduce(fmpq_poly.gcd, coefficients, form.chi)
 
-        zero = vanishing(form.coefficients)
-        cubes = vanishing(form.D_coefficients) // zero
-        special = ((zero, "H vanishes"), (cubes, "H is the cube of a linear form"))
+        factor_of_zeros = common_factor(form.coefficients)
+        factor_of_cubes = common_factor(form.D_coefficients) // factor_of_zeros
         reasons = [
-            f"{what} on the eigenspaces of the roots of {format_univariate(roots)}"
-            for roots, what in special
-            if roots.degree() > 0
+            f"{property_text} on the eigenspaces of the roots of {format_univariate(factor)}"
+            for factor, property_text in (
+                (factor_of_zeros, "H vanishes"),
+                (factor_of_cubes, "H is the cube of a linear form"),
+            )
+            if factor.degree() > 0
         ]
         if all(factor.degree == 1 and abs(factor.polynomial[0]) in (0, 1) for factor in self.member.factors):
             reasons.append("A^3 = A, so that H_1 is associated to H_0 where it is not 0")
@@ -345,10 +346,10 @@ class Verifier:
         if claim.misprint or decision.verdict is Certainty.REFUTED:
             return finding
         try:
-            proof = self.proof(claim, statement.needs, *statement.bound)
+            proof = self.proof(claim, statement.used_names, *statement.bound)
             if proof is None and claim.theorem:
                 proof = Evidence("hypotheses", f"{claim.theorem} applies; its hypotheses hold by construction")
-            also = tuple(self.also(claim))
+            also = tuple(self.further_evidence(claim))
         except Contradiction as error:
             text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
             return self._finding(claim, Certainty.REFUTED, Evidence("contradiction", text), witness=error.witness)
@@ -361,71 +362,73 @@ class Verifier:
 
     def _verify_existence(self, claim: Claim) -> Finding:
         """Verify a claim that two objects differ, or that a rank is attained: one point is a proof."""
-        roots, outcome, tried = False, None, 0
+        needs_roots, outcome, point_count = False, None, 0
         for number in range(_MAX_UNDEFINED):
             # Large matrices over Q are expensive; a point over GF(p) suffices if `at_most` is given.
-            modular = bool(claim.at_most) and self.m > 3
-            objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
+            is_modular = bool(claim.at_most) and self.m > 3
+            objects = (None if is_modular else self.exact_point(needs_roots, number)) or self.point(needs_roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"
                 return self._finding(claim, Certainty.UNDECIDED, Evidence("random points over GF(p)", text))
             try:
                 outcome = evaluate(claim, objects)
             except LookupError:  # the roots of chi are needed but not in this field
-                roots = True
+                needs_roots = True
                 continue
             except UNDEFINED:
                 continue
-            tried += 1
+            point_count += 1
             if outcome.holds and outcome.pairs:
-                where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
+                point_text = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
                 method = "exact rational point" if objects.K is QQ else "point over GF(p)"
-                text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {where}"
+                text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {point_text}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
-                return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
-            if tried >= _POINTS:
+                return self._finding(claim, verdict, Evidence(method, text, {"points": point_count}))
+            if point_count >= _POINT_COUNT:
                 break
         if outcome is None or not outcome.pairs:
             text = f"the claim is not defined at any of {_MAX_UNDEFINED} random points"
             return self._finding(claim, Certainty.UNDECIDED, Evidence("random points over GF(p)", text))
         text = "both sides agree" if claim.kind is ClaimKind.DIFFERENT else "not attained"
         if claim.in_general:
-            special = f"stated in general; for this member {text} at {tried} random points: {self.what_is_special()}"
-            evidence = Evidence("special member", special, {"points": tried})
+            special_text = (
+                f"stated in general; for this member {text} at {point_count} random points: {self.what_is_special()}"
+            )
+            evidence = Evidence("special member", special_text, {"points": point_count})
             return replace(self._finding(claim, Certainty.UNDECIDED, evidence), applies=False)
-        evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
+        evidence = Evidence("random points", f"{text} at each of {point_count} random points", {"points": point_count})
         return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
-    def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
+    def proof(self, claim: Claim, used_names: set[str], size: CoefficientSize, pole_degree: int) -> Evidence | None:
         """Return a proof of a claim; None if there is none within the budget."""
         if claim.formal is not None:
             return formal_proof(claim)
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
         if self.member is None:
             return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
-        if not needs - {"roots"} and (self.roots is not None or "roots" not in needs):
-            objects = self.exact_point("roots" in needs, 0)
+        if not used_names - {"roots"} and (self.roots is not None or "roots" not in used_names):
+            objects = self.exact_point("roots" in used_names, 0)
             with suppress(*UNDEFINED):
-                if objects is not None and equation.degree == 0 and evaluate(claim, objects).holds:
+                if objects is not None and size.degree == 0 and evaluate(claim, objects).holds:
                     return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
             evidence = normal_form_proof(claim.key, blocks, order)
             if evidence is not None:
-                verified = "A^T J = J A, A Hess(H) = Hess(H) A^T, distinct roots: verified"
-                data = {**evidence.data, "hypotheses_verified": verified}
-                return Evidence(evidence.method, f"{evidence.summary}; {verified}", data)
-        vectors = sorted(needs - {"roots"})
-        if equation.degree > 6 or poles > 4 or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
+                hypotheses_text = "A^T J = J A, A Hess(H) = Hess(H) A^T, distinct roots: verified"
+                data = {**evidence.data, "hypotheses_verified": hypotheses_text}
+                return Evidence(evidence.method, f"{evidence.summary}; {hypotheses_text}", data)
+        vectors = sorted(used_names - {"roots"})
+        if size.degree > 6 or pole_degree > 4 or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
             return None
-        if "roots" in needs and self.roots is None:
+        if "roots" in used_names and self.roots is None:
             return None
-        functions = specialize.member_functions(self.member, vectors, self.settings.eps, PROOF_BUDGET, order)
+        generic_objects = specialize.member_functions(self.member, vectors, self.settings.eps, PROOF_BUDGET, order)
         try:
-            outcome = evaluate(claim, functions)
+            outcome = evaluate(claim, generic_objects)
         except (BudgetExceeded, *UNDEFINED):
             return None
         if not outcome.holds:
@@ -434,7 +437,7 @@ class Verifier:
         scope = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
-    def also(self, claim: Claim) -> Iterable[Evidence]:
+    def further_evidence(self, claim: Claim) -> Iterable[Evidence]:
         """Return further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
         if self.member is None or not self.member.is_generic:
             return
@@ -452,7 +455,7 @@ class Verifier:
         if self.options.ball_bits is not None:
             bits = self.options.ball_bits
             objects = specialize.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
-            widest, pairs = -math.inf, 0
+            largest_log2, pairs = -math.inf, 0
             try:
                 with objects.K.working():
                     for left, right in claim.function(objects):
@@ -462,13 +465,13 @@ class Verifier:
                         for a, b in zip(entries(left), entries(right), strict=True):
                             distance = abs(objects.K.convert(a) - objects.K.convert(b)).abs_upper()
                             if distance != 0:
-                                widest = max(widest, float(distance.log().mid()) / math.log(2))
+                                largest_log2 = max(largest_log2, float(distance.log().mid()) / math.log(2))
             except (PrecisionLost, *UNDEFINED):
                 yield Evidence("complex balls", f"balls of {bits} bits are too wide to compare", {"bits": bits})
                 return
             text = f"over complex balls of {bits} bits the sides overlap"
-            if widest > -math.inf:
-                text += f", to within 2^{math.ceil(widest)}"
+            if largest_log2 > -math.inf:
+                text += f", to within 2^{math.ceil(largest_log2)}"
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
@@ -489,41 +492,35 @@ class Verifier:
         """Return a finding for each control of a claim: on its input the claim should be refuted."""
         if claim.misprint:
             return [self.verify_claim(claim)]
+        # One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
+        # object exists or that it has a certain rank counts as refuted if several points do not show it. For m >= 5
+        # points modulo p come first: over Q a rank or a step of a control takes minutes, since nothing cancels.
+        is_equation = claim.kind is ClaimKind.EQUAL
+        is_rational_first = is_equation and self.m < _MIN_LARGE_M
+        sources = (self.exact_point, self.point) if is_rational_first else (self.point, self.exact_point)
+        choices = list(product((False, True), sources, range(_POINT_COUNT)))
         controls = []
         for name in claim.breaks:
             if self.m < CONTROLS[name].least_m or self.why_outside(claim) is not None:
                 continue
-            outcome = self._broken(claim, name)
+            outcome, failures = None, 0
+            points = (point(needs_roots, number) for needs_roots, point, number in choices)
+            for outcome in outcomes(claim, points, partial(broken, name)):
+                failures += not outcome.holds
+                if (outcome.holds and not is_equation) or failures >= (1 if is_equation else _POINT_COUNT):
+                    break
             if outcome is None:
-                verdict, what = Certainty.UNDECIDED, "not defined, or no roots of chi"
+                verdict, outcome_text = Certainty.UNDECIDED, "not defined, or no roots of chi"
             elif outcome.holds or not outcome.pairs:
-                verdict, what = Certainty.SUPPORTED, "the claim holds all the same"
+                verdict, outcome_text = Certainty.SUPPORTED, "the claim holds all the same"
             else:
-                verdict, what = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
-            evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
+                verdict, outcome_text = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
+            evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {outcome_text}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
             controls.append(replace(finding, control=True, place=place, certified={}))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar): their controls are skipped.
         return [finding for finding in controls if finding.is_as_expected] or controls
-
-    def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
-        """Return an outcome that refutes the claim on the input of a control; the last outcome if none refutes it.
-
-        One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
-        object exists or that it has a certain rank counts as refuted if several points do not show it. For m >= 5
-        points modulo p come first: over Q a rank or a step of a control takes minutes, since nothing cancels.
-        """
-        at_one = claim.kind is ClaimKind.EQUAL
-        finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
-        chosen = product((False, True), finds, range(_POINTS))
-        points = (find(roots, number) for roots, find, number in chosen)
-        outcome, failed = None, 0
-        for outcome in outcomes(claim, points, partial(broken, name)):
-            failed += not outcome.holds
-            if (outcome.holds and not at_one) or failed >= (1 if at_one else _POINTS):
-                break
-        return outcome
 
     def _finding(
         self,
@@ -568,9 +565,9 @@ class ClaimAtPoints:
         self._verifier, self._claim = verifier, claim
         bounds = verifier.bounds()
         self.bound = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
-        self.needs = bounds.used
-        self._roots = "roots" in self.needs
-        self.conjugates = verifier.conjugates(self._roots)
+        self.used_names = bounds.used
+        self._needs_roots = "roots" in self.used_names
+        self.conjugates = verifier.conjugates(self._needs_roots)
 
     @property
     def where(self) -> str:
@@ -582,7 +579,7 @@ class ClaimAtPoints:
     def trials(self, seed: int) -> Iterator[Trial]:
         """Yield the values of the claim at random points."""
         for number in count():
-            objects = self._verifier.point(self._roots, number)
+            objects = self._verifier.point(self._needs_roots, number)
             if objects is None:
                 return
             try:
@@ -591,12 +588,12 @@ class ClaimAtPoints:
                 yield Trial()
                 continue
             if not outcome.holds:
-                why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
-                text = f"fails at a point over {outcome.objects.K.name}, where {why}"
+                reason = "chi splits" if self._needs_roots else "all denominators are units, so it fails over Q"
+                text = f"fails at a point over {outcome.objects.K.name}, where {reason}"
                 evidence = Evidence("point over GF(p)", text)
                 # A rational point is easier to read.
-                exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
-                if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
+                points = (self._verifier.exact_point(self._needs_roots, k) for k in range(12))
+                if failure := next((result for result in outcomes(self._claim, points) if not result.holds), None):
                     outcome = failure
                     evidence = Evidence("exact rational point", "fails at a rational point, exactly")
                 yield Trial(decision=Decision(Certainty.REFUTED, evidence, witness_of(outcome)))
@@ -617,14 +614,14 @@ def formal_proof(claim: Claim) -> Evidence | None:
     Raises Contradiction if the two sides of an identity differ.
     """
     assert claim.formal is not None
-    number = 0
+    count = 0
     for left, right in claim.formal():
-        number += 1
+        count += 1
         if left != right:
-            raise Contradiction(f"{claim.place}: {claim.title}: identity {number} of its formal proof fails")
-    what = "one identity" if number == 1 else f"{number} identities"
-    text = f"follows, in every dimension, from {what} without coordinates (docs/mathematics.md, Formal proofs)"
-    return Evidence("formal proof", text, {"identities": number})
+            raise Contradiction(f"{claim.place}: {claim.title}: identity {count} of its formal proof fails")
+    count_text = "one identity" if count == 1 else f"{count} identities"
+    text = f"follows, in every dimension, from {count_text} without coordinates (docs/mathematics.md, Formal proofs)"
+    return Evidence("formal proof", text, {"identities": count})
 
 
 @lru_cache(maxsize=4096)
@@ -649,9 +646,9 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
         raise Contradiction(text, witness_of(outcome))
     if not outcome.pairs:
         return None
-    what = counted(blocks, "block")
+    blocks_text = counted(blocks, "block")
     return Evidence(
         "symbolic, normal form",
-        f"multiplied out in normal form, {what}, all data indeterminate",
+        f"multiplied out in normal form, {blocks_text}, all data indeterminate",
         {"blocks": blocks, "indeterminates": len(K.variables), "products_of_terms": PROOF_BUDGET - K.budget},
     )

@@ -81,12 +81,12 @@ def survey_escape(
     starts[:, axes[0]], starts[:, axes[1]] = np.tile(centers[0], cells), np.repeat(centers[1], cells)
     ensemble = ensemble_for(map_, eps, starts, steps, radius=radius)
     ensemble.advance(steps, progress=progress)
-    left, ended = ensemble.escaped_at >= 0, ensemble.failed_at >= 0
-    seen = np.nan_to_num(ensemble.escaped_to)
-    largest = np.abs(seen).argmax(axis=1)
-    sides = 2 * largest + (seen[np.arange(len(seen)), largest] < 0)
-    times = np.where(left, ensemble.escaped_at, ensemble.failed_at)  # both -1 for orbits that stay
-    directions = np.where(left, sides, np.where(ended, ENDS, STAYS))
+    has_left, has_ended = ensemble.escaped_at >= 0, ensemble.failed_at >= 0
+    escape_points = np.nan_to_num(ensemble.escaped_to)
+    largest_index = np.abs(escape_points).argmax(axis=1)
+    escape_directions = 2 * largest_index + (escape_points[np.arange(len(escape_points)), largest_index] < 0)
+    times = np.where(has_left, ensemble.escaped_at, ensemble.failed_at)  # both -1 for orbits that stay
+    directions = np.where(has_left, escape_directions, np.where(has_ended, ENDS, STAYS))
     shape = cells, cells
     return Escape(map_.variables, axes, window, radius, steps, times.reshape(shape), directions.reshape(shape))
 
@@ -95,9 +95,9 @@ def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time
     """Plot the escape times ("time") or the directions ("basin"); orbits that stay are white."""
     style, (x, y) = style or Style(), result.window
     names = [side + label_of(name) for name in result.variables for side in ("+", "\N{MINUS SIGN}")]
-    kinds, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)
-    kinds = kinds[np.argsort(-counts, kind="stable")][: len(COLORS)]  # the rarest directions are white, too
-    labels = ["ends at a pole" if kind == ENDS else names[int(kind)] for kind in kinds]
+    directions, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)
+    directions = directions[np.argsort(-counts, kind="stable")][: len(COLORS)]  # the rarest directions are white, too
+    labels = ["ends at a pole" if direction == ENDS else names[int(direction)] for direction in directions]
     with drawing(style):
         from matplotlib.colors import ListedColormap, LogNorm
         from matplotlib.patches import Patch
@@ -105,21 +105,21 @@ def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time
         is_basin = show == "basin"
         figure = new_figure(style, 0.8 + (legend_height(labels, style, title=True) if is_basin else 0))
         axes = figure.subplots()
-        place: Any = {"extent": (*x, *y), "origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+        image_options: Any = {"extent": (*x, *y), "origin": "lower", "aspect": "auto", "interpolation": "nearest"}
         if is_basin:
-            image = np.full(result.times.shape, np.nan)
-            for number, kind in enumerate(kinds):
-                image[result.directions == kind] = number
-            colors = COLORS[: max(1, len(kinds))]
-            axes.imshow(image, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5, **place)
-            handles = [Patch(color=color) for color in colors[: len(kinds)]]
+            cells = np.full(result.times.shape, np.nan)
+            for number, direction in enumerate(directions):
+                cells[result.directions == direction] = number
+            colors = COLORS[: max(1, len(directions))]
+            axes.imshow(cells, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5, **image_options)
+            handles = [Patch(color=color) for color in colors[: len(directions)]]
             legend_above(figure, handles, labels, style, f"direction in which |x| > {result.radius:g}")
         else:
-            image = np.where(result.times >= 0, np.maximum(result.times, 1.0), np.nan)
-            least = float(np.nanmin(image, initial=result.steps))
-            norm = LogNorm(least, np.nanmax(image, initial=least + 1))
-            drawn = axes.imshow(image, cmap=COLOR_MAP, norm=norm, **place)
-            figure.colorbar(drawn, ax=axes, label=f"steps until |x| > {result.radius:g}")
+            cells = np.where(result.times >= 0, np.maximum(result.times, 1.0), np.nan)
+            first_step = float(np.nanmin(cells, initial=result.steps))
+            norm = LogNorm(first_step, np.nanmax(cells, initial=first_step + 1))
+            mappable = axes.imshow(cells, cmap=COLOR_MAP, norm=norm, **image_options)
+            figure.colorbar(mappable, ax=axes, label=f"steps until |x| > {result.radius:g}")
         axes.set_xlabel(label_of(result.variables[result.axes[0]]))
         axes.set_ylabel(label_of(result.variables[result.axes[1]]))
     return figure

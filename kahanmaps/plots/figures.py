@@ -104,24 +104,30 @@ def label_of(text: str) -> str:
         sides = [label_of(side) for side in text.split(" = ")]
         if all(side.startswith("$") and side.count("$") == 2 for side in sides):
             return "$" + " = ".join(side.strip("$") for side in sides) + "$"
-        return plain(text)
+        return escape_dollars(text)
     if not is_name(text):
-        return _label_of_expression(text)
+        if re.fullmatch(r"-?\d+(/\d+)?", text):
+            return f"${text}$"
+        names = sorted(set(re.findall(r"[A-Za-z_]\w*~*", text)))
+        if len(text) > _MAX_FORMULA or not names:
+            return escape_dollars(text)
+        try:
+            latex = _ON_ONE_LINE.rational(parse_rational_function(text, names))
+        except InputError:
+            return escape_dollars(text)
+        # mathtext supports only a part of TeX, and stacked fractions in a line of text are too small to read.
+        return escape_dollars(text) if "mathrm" in latex else f"${latex}$"
     latex = latex_name(text)
     if "mathrm" not in latex:
         return f"${latex}$"
-    first, *others = text.split("_")
-    symbols = [latex_name(part) if part else r"\mathrm" for part in (first, *others)]
-    if not others or any("mathrm" in symbol for symbol in symbols):
-        return plain(text)
-    if _is_word(first):
-        parts = [
-            part if _is_word(part) else f"${symbol}$" for part, symbol in zip((first, *others), symbols, strict=True)
-        ]
-        return " ".join(parts)
-    indices = [
-        rf"\mathrm{{{part}}}" if _is_word(part) else symbol for part, symbol in zip(others, symbols[1:], strict=True)
-    ]
+    parts = text.split("_")
+    symbols = [latex_name(part) if part else r"\mathrm" for part in parts]
+    if len(parts) < 2 or any("mathrm" in symbol for symbol in symbols):
+        return escape_dollars(text)
+    parts_with_symbols = list(zip(parts, symbols, strict=True))
+    if _is_word(parts[0]):
+        return " ".join(part if _is_word(part) else f"${symbol}$" for part, symbol in parts_with_symbols)
+    indices = [rf"\mathrm{{{part}}}" if _is_word(part) else symbol for part, symbol in parts_with_symbols[1:]]
     return f"${symbols[0]}_{{{','.join(indices)}}}$"
 
 
@@ -130,36 +136,21 @@ def _is_word(text: str) -> bool:
     return len(text) > 2 and text.isalpha() and latex_name(text) == text
 
 
-def _label_of_expression(text: str) -> str:
-    if re.fullmatch(r"-?\d+(/\d+)?", text):
-        return f"${text}$"
-    names = sorted(set(re.findall(r"[A-Za-z_]\w*~*", text)))
-    try:
-        function = parse_rational_function(text, names) if len(text) <= _MAX_FORMULA and names else None
-    except InputError:
-        function = None
-    if function is None:
-        return plain(text)
-    latex = _ON_ONE_LINE.rational(function)
-    # mathtext supports only a part of TeX, and stacked fractions in a line of text are too small to read.
-    return plain(text) if "mathrm" in latex else f"${latex}$"
-
-
 def _in_brackets(text: str) -> str:
     return f"({text})" if " + " in text or " - " in text or " " in text else text
 
 
-def plain(text: str) -> str:
+def escape_dollars(text: str) -> str:
     """Escape the dollar signs in a text, so that no part of it is typeset as a formula."""
     return text.replace("$", r"\$")
 
 
-def wrapped(text: str, width: float, size: float, max_lines: int = 3) -> str:
+def wrap_text(text: str, width: float, size: float, max_lines: int = 3) -> str:
     """Break plain text into at most `max_lines` lines of about `width` points for letters of `size` points.
 
     Longer text is cut, and ends in dots.
 
-    >>> wrapped("relative error of a_very_very_long_name", width=80, size=8)
+    >>> wrap_text("relative error of a_very_very_long_name", width=80, size=8)
     'relative error of\\na_very_very_long_...'
     """
     letters = max(8, int(width / (LETTER_WIDTH * size)))
@@ -184,7 +175,7 @@ def write_title(figure: Figure, text: str, style: Style) -> None:
     """Put a title above all panels, broken into lines that fit into the width of the figure."""
     size = style.font_size + 1
     with drawing(style):
-        figure.suptitle(plain(wrapped(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
+        figure.suptitle(escape_dollars(wrap_text(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
 
 
 def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:

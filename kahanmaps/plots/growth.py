@@ -6,6 +6,7 @@ The data are results of the library, or are read from the output of `degrees --j
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,12 +25,12 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.plots.figures import (
     drawing,
+    escape_dollars,
     label_number,
     legend_above,
     legend_height,
     log_scale_with_zero,
     new_figure,
-    plain,
     shortened_name,
 )
 from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
@@ -65,18 +66,17 @@ def plot_degrees(
     if not 1 <= len(growths) <= _MAX_SYSTEMS:
         raise InputError(f"found {len(growths)} systems, expected 1 to {_MAX_SYSTEMS} in one picture")
     style = style or Style()
-    is_log = any(each.looks_exponential or each.growth is Growth.EXPONENTIAL for each in growths.values())
-    scale = _scale(scale, "log" if is_log else "linear")
+    is_log = any(growth.looks_exponential or growth.growth is Growth.EXPONENTIAL for growth in growths.values())
+    scale = _checked_scale(scale, "log" if is_log else "linear")
     suffixes = [_degree_label(growth) for growth in growths.values()]
-    labels = [
-        plain(shortened_name(name, suffix, style)) + suffix for name, suffix in zip(growths, suffixes, strict=True)
-    ]
+    names = [shortened_name(name, suffix, style) for name, suffix in zip(growths, suffixes, strict=True)]
+    labels = [escape_dollars(name) + suffix for name, suffix in zip(names, suffixes, strict=True)]
     values = [d for growth in growths.values() for d in growth.degrees]
     positive = [d for d in values if d]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, max_columns=1))
         axes = figure.subplots()
-        _step_axis(axes, scale, max(len(growth.degrees) for growth in growths.values()))
+        _format_step_axis(axes, scale, max(len(growth.degrees) for growth in growths.values()))
         zero = 0.0
         if scale == "linear":
             axes.set_ylim(0, 1.05 * max(values))
@@ -84,13 +84,13 @@ def plot_degrees(
             has_zeros = len(positive) < len(values)
             zero = log_scale_with_zero(axes, min(positive), max(positive), has_zeros) or 1.0
         for k, (label, growth) in enumerate(zip(labels, growths.values(), strict=True)):
-            look: dict[str, Any] = {"color": COLORS[k]}
+            mark: dict[str, Any] = {"color": COLORS[k]}
             line: dict[str, Any] = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
             steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
-            heights = np.array([float(growth.degrees[n] or zero) for n in steps])
+            shown_degrees = np.array([float(growth.degrees[n] or zero) for n in steps])
             # On a logarithmic scale a degree 0 lies in the band below, and no line leads to it.
             is_gap = np.array([scale != "linear" and not growth.degrees[n] for n in steps])
-            n, d = steps, np.where(is_gap, np.nan, heights)
+            n, d = steps, np.where(is_gap, np.nan, shown_degrees)
             recurrence = growth.recurrence
             if (
                 recurrence is not None
@@ -99,14 +99,15 @@ def plot_degrees(
                 and recurrence.preperiod == 0
             ):
                 # d_n is one polynomial in n: draw a smooth curve instead of straight lines from point to point.
-                few = range(recurrence.power + 1)
-                law = np.polynomial.Polynomial.fit(list(few), [recurrence.predict(n) for n in few], recurrence.power)
+                fit_steps = range(recurrence.power + 1)
+                fit_degrees = [recurrence.predict(n) for n in fit_steps]
+                polynomial = np.polynomial.Polynomial.fit(list(fit_steps), fit_degrees, recurrence.power)
                 n = np.linspace(steps[0], steps[-1], 200)
-                d = law(n)
-            axes.plot(n, d, zorder=2, **line, **look)
-            axes.plot(steps, heights, marker=MARKS[k], markersize=4, linestyle="none", clip_on=False, **look)
+                d = polynomial(n)
+            axes.plot(n, d, zorder=2, **line, **mark)
+            axes.plot(steps, shown_degrees, marker=MARKS[k], markersize=4, linestyle="none", clip_on=False, **mark)
             # An empty plot for the legend entry, a line with a mark.
-            axes.plot([], [], marker=MARKS[k], markersize=4, label=label, **line, **look)
+            axes.plot([], [], marker=MARKS[k], markersize=4, label=label, **line, **mark)
         axes.set_xlabel("iterate $n$")
         axes.set_ylabel("degree $d_n$")
         title = r"$\lambda$: dynamical degree"
@@ -128,19 +129,19 @@ def _degree_label(growth: DegreeGrowth) -> str:
         if growth.looks_exponential:
             return rf"{name}: $\lambda \approx {float(growth.estimate or 0):.4g}$ (estimated)"
         n = len(growth.degrees) - 1
-        quotient = rf", $d_{{{n}}}^{{1/{n}}} = {float(growth.estimate):.4g}$" if growth.estimate else ""
-        return f"{name}: no recurrence found{quotient}"
-    parts = []
+        root_text = rf", $d_{{{n}}}^{{1/{n}}} = {float(growth.estimate):.4g}$" if growth.estimate else ""
+        return f"{name}: no recurrence found{root_text}"
+    phrases = []
     formula = growth.recurrence.closed_form if growth.recurrence is not None else None
     if formula and len(formula) <= _MAX_FORMULA and ";" not in formula:
-        parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
+        phrases.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
     elif growth.growth is not Growth.EXPONENTIAL:
-        parts.append(f"{growth.growth}")
+        phrases.append(f"{growth.growth}")
     if rate is not None:
         is_integer = rate.minimal_polynomial.degree() == 1
         number = rate.digits if is_integer else rf"{float(rate.digits):.5f}\ldots"
-        parts.append(rf"$\lambda = {number}$")
-    return f"{name}: {', '.join(parts) or str(growth.growth)}"
+        phrases.append(rf"$\lambda = {number}$")
+    return f"{name}: {', '.join(phrases) or str(growth.growth)}"
 
 
 def plot_heights(
@@ -157,55 +158,55 @@ def plot_heights(
     curves = height_curves(survey) if isinstance(survey, HeightSurvey) else tuple(survey)
     if not curves:
         raise InputError("found no orbit, expected at least one")
-    every_eps = list(dict.fromkeys(curve.eps for curve in curves))
-    if len(every_eps) > len(COLORS):
-        raise InputError(f"found {len(every_eps)} values of eps, expected at most {len(COLORS)} in one picture")
+    eps_values = list(dict.fromkeys(curve.eps for curve in curves))
+    if len(eps_values) > len(COLORS):
+        raise InputError(f"found {len(eps_values)} values of eps, expected at most {len(COLORS)} in one picture")
     kinds = {curve.kind for curve in curves}
-    longest = max(curve.steps[-1] for curve in curves)
-    grows = kinds & {Growth.QUADRATIC, Growth.LINEAR} and longest >= 8
-    scale = _scale(scale, "log" if Growth.EXPONENTIAL in kinds else "loglog" if grows else "linear")
+    last_step = max(curve.steps[-1] for curve in curves)
+    has_power_growth = kinds & {Growth.QUADRATIC, Growth.LINEAR} and last_step >= 8
+    scale = _checked_scale(scale, "log" if Growth.EXPONENTIAL in kinds else "loglog" if has_power_growth else "linear")
     style = style or Style()
     with drawing(style):
         figure = new_figure(
-            style, _ASPECT + legend_height([label_number(eps) for eps in every_eps], style, max_columns=1)
+            style, _ASPECT + legend_height([label_number(eps) for eps in eps_values], style, max_columns=1)
         )
         axes = figure.subplots()
-        _step_axis(axes, scale, longest)
+        _format_step_axis(axes, scale, last_step)
         axes.set_yscale("linear" if scale == "linear" else "log")
-        for k, eps in enumerate(every_eps):
-            some, from_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
-            size = 3.2 if len(some) <= 3 and max(len(curve.steps) for curve in some) <= 80 else 2
+        for k, eps in enumerate(eps_values):
+            eps_curves, starts_at_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
+            mark_size = 3.2 if len(eps_curves) <= 3 and max(len(curve.steps) for curve in eps_curves) <= 80 else 2
             line: dict[str, Any] = {"color": COLORS[k], "linestyle": LINES[k], "linewidth": 0.7}
             # Hollow marks, so that the line of the fit remains visible.
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
-            for curve in some:
-                rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
-                if (
-                    len(rows) > _MARKS
-                ):  # _MARKS marks, evenly spaced along the axis, including the first and the last step
-                    steps = curve.steps[rows].astype(np.float64)
-                    spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
-                    rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
-                points = curve.steps[rows], curve.bits[rows]
-                axes.plot(*points, color=COLORS[k], linestyle="none", markersize=size, **mark)
+            for curve in eps_curves:
+                indices = np.flatnonzero(curve.steps >= (1 if starts_at_one else 0))
+                if len(indices) > _MARKS:
+                    # Only _MARKS marks, evenly spaced along the axis, including the first and the last step.
+                    steps = curve.steps[indices].astype(np.float64)
+                    spaced = (np.geomspace if starts_at_one else np.linspace)(steps[0], steps[-1], _MARKS)
+                    indices = indices[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
+                points = curve.steps[indices], curve.bits[indices]
+                axes.plot(*points, color=COLORS[k], linestyle="none", markersize=mark_size, **mark)
                 if (fit := fit_of(curve)) is not None:
-                    last = curve.steps[-1]
-                    n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
+                    end_step = curve.steps[-1]
+                    n = np.geomspace(1, max(1, end_step), 200) if starts_at_one else np.linspace(0, end_step, 200)
                     axes.plot(n, fit(n), zorder=1.5, **line)
             # The legend: eps, the time step, and the kinds of growth.
             label = rf"$\varepsilon = {label_number(eps)}$ (time step {label_number(2 * eps)})"
-            label = label if some[0].has_eps else "heights"
-            several = list(dict.fromkeys(curve.kind for curve in some))
-            constants = [c for c in (curve.constant for curve in some) if c is not None]
-            ratios = [r for r in (curve.ratio for curve in some) if r is not None]
-            if len(several) > 1:
-                label += ": " + ", ".join(f"{sum(curve.kind is kind for curve in some)} {kind}" for kind in several)
-            elif several[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
-                power = "n^2" if several[0] is Growth.QUADRATIC else "n"
+            label = label if eps_curves[0].has_eps else "heights"
+            eps_kinds = list(dict.fromkeys(curve.kind for curve in eps_curves))
+            constants = [c for c in (curve.constant for curve in eps_curves) if c is not None]
+            ratios = [r for r in (curve.ratio for curve in eps_curves) if r is not None]
+            if len(eps_kinds) > 1:
+                counts = Counter(curve.kind for curve in eps_curves)
+                label += ": " + ", ".join(f"{count} {kind}" for kind, count in counts.items())
+            elif eps_kinds[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
+                power = "n^2" if eps_kinds[0] is Growth.QUADRATIC else "n"
                 label += rf": $h_n \sim c\,{power}$, $c$ = {_range_of(constants)}"
             else:
-                is_known = several[0] is Growth.EXPONENTIAL and ratios
-                label += f": exponential, factor {_range_of(ratios)}" if is_known else f": {several[0]}"
+                is_known = eps_kinds[0] is Growth.EXPONENTIAL and ratios
+                label += f": exponential, factor {_range_of(ratios)}" if is_known else f": {eps_kinds[0]}"
             axes.plot([], [], label=label, markersize=3.2, **line, **mark)
         if scale == "linear":
             axes.set_ylim(bottom=0)
@@ -220,32 +221,32 @@ def _range_of(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _scale(requested: str | None, default: str) -> str:
+def _checked_scale(requested: str | None, default: str) -> str:
     if requested is not None and requested not in SCALES:
         raise InputError(f"found the scale {requested[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
     return requested or default
 
 
-def _step_axis(axes: Axes, scale: str, longest: int) -> None:
+def _format_step_axis(axes: Axes, scale: str, last_step: int) -> None:
     """Format the horizontal axis: integer steps, on a logarithmic scale from 1 on."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
-    if longest <= 1:
+    if last_step <= 1:
         axes.set_xlim(-0.5, 1.5)
     if scale != "loglog":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
         return
     axes.set_xscale("log")
-    axes.set_xlim(0.9, 1.1 * max(longest, 2))
-    if longest <= 2000:
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if longest <= 200 else (1,)))
+    axes.set_xlim(0.9, 1.1 * max(last_step, 2))
+    if last_step <= 2000:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if last_step <= 200 else (1,)))
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 _MAX_ORBITS, _MAX_TERMS = 2000, 10_000
-_LARGEST = 10**15  # bound for degrees, steps and bits: larger numbers in a record are refused
-_UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError)
+_MAX_INTEGER = 10**15  # bound for degrees, steps and bits: larger numbers in a record are refused
+_READ_ERRORS = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError)
 
 
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
@@ -267,8 +268,8 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             raise InputError("no degrees, or all of them 0")
         patterns = enclosure = None
         if (data := record.get("singularities")) is not None:
-            known = data.get("generating_function") or {}
-            series = tuple(tuple(int(c) for c in known[part]) for part in ("numerator", "denominator") if known)
+            fraction = data.get("generating_function") or {}
+            series = tuple(tuple(map(int, fraction[part])) for part in ("numerator", "denominator") if fraction)
             if series and not (max(map(len, series)) <= _MAX_TERMS and series[1][:1] == (1,)):
                 raise InputError("no generating function with a short denominator that begins with 1")
             lengths = tuple(int(length) for length in data["lengths"])
@@ -291,7 +292,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             enclosure=enclosure,
         )
         return printable(str(record["system"])), growth
-    except _UNREADABLE as error:
+    except _READ_ERRORS as error:
         raise InputError(
             f"{where}: found degrees that cannot be read ({error}), expected the output of 'degrees --json'"
         ) from error
@@ -362,7 +363,7 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
             curves.append(
                 HeightCurve(parse_number(orbit["eps"]), *numbers, kind, constant, ratio, str(orbit["status"]))
             )
-    except _UNREADABLE as error:
+    except _READ_ERRORS as error:
         raise InputError(
             f"{where}: found an orbit that cannot be read ({error}), expected the output of 'heights --json'"
         ) from error
@@ -370,7 +371,7 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
 
 
 def _integer(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _MAX_INTEGER:
         raise InputError(f"found {str(value)[:40]!r}, expected a degree or a number of steps or bits")
     return value
 
@@ -385,19 +386,19 @@ def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
     if curve.kind is Growth.EXPONENTIAL and curve.ratio is not None:
         ratio = curve.ratio
 
-        def exponential(at: Any) -> Any:
+        def exponential(step: Any) -> Any:
             with np.errstate(all="ignore"):
-                return curve.bits[-1] * ratio ** (np.asarray(at, dtype=np.float64) - n[-1])
+                return curve.bits[-1] * ratio ** (np.asarray(step, dtype=np.float64) - n[-1])
 
         return exponential
     if c is None or curve.kind not in (Growth.QUADRATIC, Growth.LINEAR) or len(n) < 3:
         return None
     power = 2 if curve.kind is Growth.QUADRATIC else 1
-    lower = np.polynomial.Polynomial.fit(n, curve.bits - c * n**power, power - 1)
+    lower_terms = np.polynomial.Polynomial.fit(n, curve.bits - c * n**power, power - 1)
 
-    def law(at: Any) -> Any:
-        at = np.asarray(at, dtype=np.float64)
-        value = c * at**power + lower(at)
+    def power_law(step: Any) -> Any:
+        step = np.asarray(step, dtype=np.float64)
+        value = c * step**power + lower_terms(step)
         return np.where(value > 0, value, np.nan)
 
-    return law
+    return power_law

@@ -22,7 +22,7 @@ from kahanmaps.plots.comparison.compare import Comparison
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.plots.portraits.portrait import portrait_of
-from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, walked
+from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, follow_orbits
 from kahanmaps.plots.style import Style
 
 if TYPE_CHECKING:
@@ -40,14 +40,14 @@ class Plot(AttributeHints):
 
     def __call__(self, value: Any, *arguments: Any, **options: Any) -> Axes:
         """Draw the result of one of the functions below, an orbit, or the portrait of a system."""
-        kinds: dict[type, Any] = {
+        methods: dict[type, Any] = {
             DegreeGrowth: self.degrees,
             HeightSurvey: self.heights,
             Scan: self.scan,
             Comparison: self.compare,
             Trajectory: self.orbit,
         }
-        axes: Axes = kinds.get(type(value), self.portrait)(value, *arguments, **options)
+        axes: Axes = methods.get(type(value), self.portrait)(value, *arguments, **options)
         return axes
 
     def degrees(self, growth: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
@@ -182,7 +182,7 @@ class Plot(AttributeHints):
         """Plot the points of an orbit, a result of `km.orbit`, in the coordinates with indices `x` and `y`."""
         _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(trajectory)[:, None]
-        return _drawn(
+        return _draw_trajectories(
             Trajectories(trajectory.variables, points, np.array([point.step for point in trajectory])), (x, y)
         )
 
@@ -243,16 +243,16 @@ def plot_orbits(
     if starts is None:
         starts = automatic_starts(real_approximation.system, value, axes)
     x = start_rows(starts, real_approximation.variables)
-    return _drawn(walked(ensemble_for(real_approximation.map, value, x, steps), steps), axes)
+    return _draw_trajectories(follow_orbits(ensemble_for(real_approximation.map, value, x, steps), steps), axes)
 
 
-def _drawn(trajectories: Trajectories, axes: Sequence[int]) -> Axes:
+def _draw_trajectories(trajectories: Trajectories, axes: Sequence[int]) -> Axes:
     from kahanmaps.plots.portraits.portrait import plot_portrait
 
     if not all(0 <= k < len(trajectories.variables) for k in axes):
         raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(trajectories.variables)}")
-    shown = [point_function(trajectories.variables[k], trajectories.variables) for k in axes]
-    return _axes(plot_portrait(portrait_of(trajectories, shown), Style()))
+    axis_functions = [point_function(trajectories.variables[k], trajectories.variables) for k in axes]
+    return _axes(plot_portrait(portrait_of(trajectories, axis_functions), Style()))
 
 
 plot = Plot()

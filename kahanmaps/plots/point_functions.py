@@ -16,10 +16,10 @@ from kahanmaps.display.latex import latex_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 from kahanmaps.maps.floats.float_orbit import FLOATS
-from kahanmaps.plots.figures import label_of, plain
+from kahanmaps.plots.figures import escape_dollars, label_of
 
 ZERO = fmpq(0)
-_SHORT = 60  # maximal number of characters of a formula along an axis
+_MAX_FORMULA = 60  # maximal number of characters of a formula along an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +74,14 @@ class PointFunction:
         if is_name(self.name) or not self.function.denominator.is_one():
             return label_of(self.name)
         formula = latex_polynomial(self.function.numerator)
-        return f"${formula}$" if len(formula) <= _SHORT and "mathrm" not in formula else plain(self.name)
+        return f"${formula}$" if len(formula) <= _MAX_FORMULA and "mathrm" not in formula else escape_dollars(self.name)
 
     def _value(self, polynomial: fmpq_mpoly, points: FloatArray) -> FloatArray:
         coordinates = [*np.moveaxis(points, -1, 0), to_float(self.eps)]
         value = np.asarray(evaluate(polynomial, FLOATS, coordinates), dtype=np.float64)
-        filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
-        filled[np.isnan(points).any(axis=-1)] = np.nan  # constant functions, too, have no value at missing points
-        return filled
+        values: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
+        values[np.isnan(points).any(axis=-1)] = np.nan  # constant functions, too, have no value at missing points
+        return values
 
 
 def point_function(
@@ -89,26 +89,26 @@ def point_function(
     variables: Sequence[str],
     eps: fmpq | None = None,
     parameters: Mapping[str, fmpq] | None = None,
-    named: Mapping[str, RationalFunction] | None = None,
+    known_functions: Mapping[str, RationalFunction] | None = None,
 ) -> PointFunction:
-    """Return the function given by `text`: one of `named`, or an expression in the variables, eps and the parameters.
+    """Return the function given by `text`: a known function, or an expression in the variables, eps and parameters.
 
-    `named` are rational functions of the variables and eps, in this order. Without `eps` (exact, half the time step),
-    expressions that contain eps are refused. Raises InputError for invalid text.
+    `known_functions` maps names to rational functions of the variables and eps, in this order. Without `eps` (exact,
+    half the time step), expressions that contain eps are refused. Raises InputError for invalid text.
 
     >>> point_function("(x - eps)/y", ["x", "y"], fmpq(1, 2))(np.array([2.5, 4.0]))
     array(0.5)
     """
     names = (*variables, "eps")
-    function = (named or {}).get(text)
+    function = (known_functions or {}).get(text)
     if function is None:
         if is_name(text) and text not in (*names, *(parameters or {})):
-            integrals = f"; integrals are named {', '.join(named)}" if named else ""
+            integrals = f"; integrals are named {', '.join(known_functions)}" if known_functions else ""
             raise InputError(
                 f"found the name {text}, expected one of {', '.join((*names, *(parameters or {})))}{integrals}"
             )
         function = parse_rational_function(text, names, dict(parameters or {}))
-    uses_eps = any(int(part.degrees()[-1]) > 0 for part in (function.numerator, function.denominator))
+    uses_eps = any(int(polynomial.degrees()[-1]) > 0 for polynomial in (function.numerator, function.denominator))
     if uses_eps and eps is None:
         raise InputError(f"{text}: found eps in it, and no value of eps: give --eps")
     return PointFunction(text, function, ZERO if eps is None else eps)

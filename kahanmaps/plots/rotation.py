@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _ASPECT = 0.62
 _SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
-_LEAST, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
+_MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
 _MAX_POINTS = 10_000
 
 
@@ -60,14 +60,14 @@ def plot_rotation(
     map_over, integrals, normal_form = file.at(eps), file.integrals, file.normal_form
     require_rational(map_over)
     if against is not None and against not in integrals:
-        known = ", ".join(integrals) or "it declares none"
-        raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {known}")
+        names = ", ".join(integrals) or "it declares none"
+        raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {names}")
     ends = [[QQ.convert(x) for x in map_over.point(end)] for end in (first, last)]
     rows: dict[str, list[tuple[float, float, float, int, int]]] = {}
     for k in range(points):
         position = fmpq(k, points - 1)
         start = [a + position * (b - a) for a, b in zip(*ends, strict=True)]
-        at = position if against is None else integrals[against].value(QQ, (*start, map_over.eps))
+        abscissa = position if against is None else integrals[against].value(QQ, (*start, map_over.eps))
         rotations: dict[str, Rotation] = {}
         try:
             if not isinstance(normal_form, NoNormalForm):
@@ -76,10 +76,10 @@ def plot_rotation(
                 rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
         except (PrecisionLost, UnknownCurve, InputError):  # the orbit is finite, ends, or lies on no known curve
             continue
-        for root, rotation in rotations.items() if at is not None else ():
+        for root, rotation in rotations.items() if abscissa is not None else ():
             if len(rotation.numbers) == 1:
                 flow = math.nan if rotation.flow is None else float(rotation.flow.mid()) % 1
-                x, rho = float(at.p) / float(at.q), float(rotation.number.mid())
+                x, rho = float(abscissa.p) / float(abscissa.q), float(rotation.number.mid())
                 rows.setdefault(root, []).append((x, rho, min(flow, 1 - flow), rotation.steps, k))
     if not rows:
         raise InputError(
@@ -90,9 +90,9 @@ def plot_rotation(
         raise InputError(f"found {len(rows)} real roots of chi, expected at most {len(COLORS)} in one picture")
     style = style or Style()
     legend: list[tuple[str, Any]] = []
-    for k, (root, values) in enumerate(rows.items()):
+    for k, (root, root_rows) in enumerate(rows.items()):
         at_root = f", $t = {root}$" if root else ""
-        for steps in sorted({row[3] for row in values}):
+        for steps in sorted({row[3] for row in root_rows}):
             name = {1: "map", 2: "its second iterate"}.get(steps, f"its iterate {steps}")
             legend.append((name + at_root, {"color": COLORS[k], "linestyle": LINES[min(steps - 1, 1)]}))
         if root:
@@ -101,15 +101,15 @@ def plot_rotation(
         height = legend_height([name for name, _ in legend], style, max_columns=2)
         figure = new_figure(style, _ASPECT + height)
         axes = figure.subplots()
-        for k, values in enumerate(rows.values()):
-            table = np.array(values)
+        for k, root_rows in enumerate(rows.values()):
+            table = np.array(root_rows)
             # No line crosses an omitted level, or joins levels with different numbers of components.
             breaks = 1 + np.flatnonzero((np.diff(table[:, 4]) > 1) | (np.diff(table[:, 3]) != 0))
-            for part in np.split(table, breaks):
-                line = LINES[min(int(part[0, 3]) - 1, 1)]
-                axes.plot(part[:, 0], part[:, 1], marker="." * (len(part) == 1), color=COLORS[k], linestyle=line)
-                folds = 1 + np.flatnonzero(np.abs(np.diff(part[:, 2])) > 0.25)
-                for piece in np.split(part, folds):
+            for branch in np.split(table, breaks):
+                line = LINES[min(int(branch[0, 3]) - 1, 1)]
+                axes.plot(branch[:, 0], branch[:, 1], marker="." * (len(branch) == 1), color=COLORS[k], linestyle=line)
+                folds = 1 + np.flatnonzero(np.abs(np.diff(branch[:, 2])) > 0.25)
+                for piece in np.split(branch, folds):
                     axes.plot(piece[:, 0], piece[:, 2], color=COLORS[k], linewidth=0.6, linestyle=":", zorder=1.5)
         for name, properties in legend:
             axes.plot([], [], label=name, **properties)
@@ -120,8 +120,8 @@ def plot_rotation(
             axes.set_xlim(0, 1)
         for value in _resonances(low, high):
             axes.axhline(float(value), color="0.75", linewidth=0.4, zorder=1)
-            beside: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
-            axes.annotate(str(value), (1, float(value)), (2, 0), **beside)
+            text_options: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
+            axes.annotate(str(value), (1, float(value)), (2, 0), **text_options)
         axes.set_xlabel("position on the segment of initial points" if against is None else label_of(against))
         eps = rf", $\varepsilon = {label_number(map_over.eps)}$" if file.map.has_eps else ""
         axes.set_ylabel(rf"rotation number $\rho${eps}")
@@ -131,12 +131,12 @@ def plot_rotation(
 
 def _resonances(low: float, high: float) -> list[Fraction]:
     """Return fractions p/q between two numbers, spaced, by increasing q: three, or all up to twice the least q."""
-    marked: list[Fraction] = []
+    resonances: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
-        if len(marked) >= _LEAST and q > 2 * marked[0].denominator:
+        if len(resonances) >= _MIN_RESONANCES and q > 2 * resonances[0].denominator:
             break
         for p in range(math.ceil(low * q), math.floor(high * q) + 1):
             value = Fraction(p, q)
-            if low < value < high and all(abs(value - other) >= _SPACING * (high - low) for other in marked):
-                marked.append(value)
-    return marked
+            if low < value < high and all(abs(value - r) >= _SPACING * (high - low) for r in resonances):
+                resonances.append(value)
+    return resonances

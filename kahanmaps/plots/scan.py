@@ -26,7 +26,7 @@ from kahanmaps.plots.figures import (
     write_beside,
 )
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.windows import Window, inside, window_of
+from kahanmaps.plots.portraits.windows import Window, is_inside, window_of
 from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
-_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
+_EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
 _CONDITION_SIZE = 0.8  # font size of conditions, relative to the font size of other text
-_PLACES, _DOTS = 12, 300  # parts of a curve: for the positions of its condition, and to find labels that it crosses
-_INNER = 0.85  # the axes as a fraction of the width and height of the picture
-_USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
+_POSITIONS, _SAMPLES = 12, 300  # points of a curve: for its condition, and to find labels that it crosses
+_AXES_SHARE = 0.85  # the axes as a fraction of the width and height of the picture
+_DEFAULT_WINDOW: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
 def plot_scan(
@@ -59,40 +59,38 @@ def plot_scan(
     if len(scan.over) != 2:
         raise InputError(f"found a scan over {', '.join(scan.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
-    kinds: dict[str, list[Component]] = {}  # growth -> components with this growth, the slowest growth first
-    for _, some in scan.classes:
-        growth = growth_on(some)
-        kinds.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(some)
+    growths: dict[str, list[Component]] = {}  # growth -> components with this growth, the slowest growth first
+    for _, components in scan.classes:
+        growth = growth_on(components)
+        growths.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(components)
     if modulo is not None:
-        known = {component.prime: component for component in scan.sweeps if component.complete}
-        if modulo not in known:
-            tried = ", ".join(map(str, known)) or "none were tried"
-            raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
+        sweeps = {component.prime: component for component in scan.sweeps if component.complete}
+        if modulo not in sweeps:
+            primes = ", ".join(map(str, sweeps)) or "none were tried"
+            raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {primes}")
         # The special members, each with the growth of a component that contains the member and has its degrees.
-        unassigned = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
+        unassigned = {degrees: list(points) for degrees, points in sweeps[modulo].classes.items()}
         special = []
-        for kind, some in kinds.items():
-            dots, texts = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
-            for component in some:
-                before = unassigned.get(component.degrees, [])
-                unassigned[component.degrees] = points_outside(before, [component], modulo) if before else []
-                on = sorted(set(before) - set(unassigned[component.degrees]))
-                dots += on
-                texts += [(component.text, [on[len(on) // 2]])] if on and kind != _MANY else []
-            special.append(_Kind(kind, dots, [], texts))
-        if left := [point for points in unassigned.values() for point in points]:
-            special.append(_Kind("on no component", left, [], []))
+        for name, components in growths.items():
+            dots, captions = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
+            for component in components:
+                candidates = unassigned.get(component.degrees, [])
+                unassigned[component.degrees] = points_outside(candidates, [component], modulo) if candidates else []
+                members = sorted(set(candidates) - set(unassigned[component.degrees]))
+                dots += members
+                captions += [(component.text, [members[len(members) // 2]])] if members and name != _EXPONENTIAL else []
+            special.append(_ColorGroup(name, dots, [], captions))
+        if unassigned_points := [point for points in unassigned.values() for point in points]:
+            special.append(_ColorGroup("on no component", unassigned_points, [], []))
         return _draw(scan, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
-    points = {
-        kind: [_place(component) for component in some if component.is_rational_point] for kind, some in kinds.items()
-    }
+    points = {name: [_position(c) for c in growths[name] if c.is_rational_point] for name in growths}
     if window is None:
-        every = [place for some in points.values() for place in some]
-        window = window_of(np.array(every)) if len(every) > 1 else _USUAL
-    drawn, context = [], ring(["u", "v", "eps"])
-    for kind, some in kinds.items():
+        all_points = [place for components in points.values() for place in components]
+        window = window_of(np.array(all_points)) if len(all_points) > 1 else _DEFAULT_WINDOW
+    groups, context = [], ring(["u", "v", "eps"])
+    for name, components in growths.items():
         curves = []
-        for component in some:
+        for component in components:
             if component.dimension != 1:
                 continue
             equation = component.equations[0].compose(*context.gens()[:2], ctx=context)
@@ -100,23 +98,21 @@ def plot_scan(
             if pieces := level_curves(function, (0, 1), 2, [0.0], window)[0]:
                 curves.append((component.text, pieces))
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
-        labels = [(component.text, [_place(component)]) for component in some if component.is_rational_point]
-        for (
-            text,
-            pieces,
-        ) in curves:  # the label is on the longest piece, preferably off its middle, where curves rarely cross
+        labels = [(component.text, [_position(component)]) for component in components if component.is_rational_point]
+        for text, pieces in curves:
+            # The label is on the longest piece, preferably off its middle, where curves rarely cross.
             longest = max(pieces, key=len)
-            ends = _resampled(longest, _PLACES + 1)
-            parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
-            nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[parts])  # vertices of the curve
+            ends = _resampled(longest, _POSITIONS + 1)
+            indices = sorted(range(1, _POSITIONS), key=lambda k: abs(4 * k - 3 * _POSITIONS))
+            nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[indices])  # vertices of the curve
             labels.append((text, [tuple(map(float, point)) for point in nearest]))
         every_piece = [piece for _, pieces in curves for piece in pieces]
-        drawn.append(_Kind(kind, points[kind], every_piece, labels if kind != _MANY else []))
-    return _draw(scan, style, drawn, window, "")
+        groups.append(_ColorGroup(name, points[name], every_piece, labels if name != _EXPONENTIAL else []))
+    return _draw(scan, style, groups, window, "")
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _ColorGroup:
     """The objects of one color: points, pieces of curves, and conditions with possible label positions."""
 
     name: str
@@ -125,82 +121,84 @@ class _Kind:
     labels: Sequence[tuple[str, Sequence[tuple[float, ...]]]]
 
 
-def _draw(scan: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:
+def _draw(scan: Scan, style: Style, groups: list[_ColorGroup], window: Window, label_suffix: str) -> Figure:
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
-    names = [kind.name for kind in kinds if kind.curves or any(inside(np.array(kind.points, dtype=float), window))]
+    points = [np.array(group.points, dtype=float) for group in groups]
+    names = [g.name for g, x in zip(groups, points, strict=True) if g.curves or any(is_inside(x, window))]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(names, style))
         axes = figure.subplots()
         handles = []
-        for k, kind in enumerate(kinds):
+        for k, group in enumerate(groups):
             color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
-            width = 0.5 if kind.name == _MANY else 1.2
+            width = 0.5 if group.name == _EXPONENTIAL else 1.2
             axes.add_collection(
-                LineCollection(kind.curves, colors=color, linestyles=[LINES[k % len(LINES)]], linewidths=width),
+                LineCollection(group.curves, colors=color, linestyles=[LINES[k % len(LINES)]], linewidths=width),
                 autolim=False,
             )
-            columns = np.array(kind.points, dtype=float).reshape(-1, 2).T
-            size = style.font_size / (4 if beside_name or kind.name == _MANY else 2)
+            columns = np.array(group.points, dtype=float).reshape(-1, 2).T
+            size = style.font_size / (4 if label_suffix or group.name == _EXPONENTIAL else 2)
             axes.plot(*columns, mark, color=color, markersize=size, zorder=10 - k)
-            if kind.name in names:
-                shown: dict[str, Any] = {
-                    "marker": mark if kind.points else "",
-                    "linestyle": LINES[k % len(LINES)] if kind.curves else "",
+            if group.name in names:
+                marker_style: dict[str, Any] = {
+                    "marker": mark if group.points else "",
+                    "linestyle": LINES[k % len(LINES)] if group.curves else "",
                 }
-                handles.append(Line2D([], [], color=color, markersize=size, linewidth=width, **shown))
-        _write(axes, kinds, window, style)
+                handles.append(Line2D([], [], color=color, markersize=size, linewidth=width, **marker_style))
+        _write_labels(axes, groups, window, style)
         axes.set(xlim=window[0], ylim=window[1])
-        axes.set(xlabel=label_of(scan.over[0]) + beside_name, ylabel=label_of(scan.over[1]) + beside_name)
+        axes.set(xlabel=label_of(scan.over[0]) + label_suffix, ylabel=label_of(scan.over[1]) + label_suffix)
         if handles:
             legend_above(figure, handles, names, style)
     return figure
 
 
-def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
+def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: Style) -> None:
     """Write conditions next to their curves, then next to points, if they fit; labels may cover points.
 
     Points with the fastest growth that is not exponential are labelled first. Among the positions at which a label
     fits, the position crossed by the fewest curves is chosen.
     """
     em = _CONDITION_SIZE * style.font_size
-    across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))
-    labels = [(*entry, COLORS[k % len(COLORS)]) for k, kind in enumerate(kinds) for entry in kind.labels]
-    labels.sort(key=lambda entry: (" = " not in entry[0], -COLORS.index(entry[2])))
+    em_x, em_y = (em / (72 * _AXES_SHARE * inches) for inches in style.inches(_ASPECT))
+    labels = [(*item, COLORS[k % len(COLORS)]) for k, group in enumerate(groups) for item in group.labels]
+    labels.sort(key=lambda item: (" = " not in item[0], -COLORS.index(item[2])))
 
-    def scaled(place: Sequence[float]) -> tuple[float, ...]:
-        return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
+    def scaled(position: Sequence[float]) -> tuple[float, ...]:
+        return tuple((c - low) / (end - low) for c, (low, end) in zip(position, window, strict=True))
 
-    marks = []
-    for x, y in (scaled(place) for kind in kinds for place in kind.points):
-        marks.append((x - 0.35 * across, x + 0.35 * across, y - 0.35 * high, y + 0.35 * high))
-    lines = np.array([scaled(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
-    taken: list[tuple[float, ...]] = []
-    for text, places, color in labels:
+    mark_boxes = []
+    for x, y in (scaled(position) for group in groups for position in group.points):
+        mark_boxes.append((x - 0.35 * em_x, x + 0.35 * em_x, y - 0.35 * em_y, y + 0.35 * em_y))
+    samples = np.array([scaled(x) for group in groups for piece in group.curves for x in _resampled(piece, _SAMPLES)])
+    boxes: list[tuple[float, ...]] = []
+    for text, positions, color in labels:
         label, is_curve = label_of(text), " = " in text
-        wide = LETTER_WIDTH * letter_count(label) * across
+        width = LETTER_WIDTH * letter_count(label) * em_x
         candidates: list[Any] = []
-        for place, side, up in product(places, (1, -1), (1, -1)):
-            x, y = scaled(place)
-            low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.6 * high
-            box = (low, low + wide, bottom, bottom + 1.2 * high)
-            covered = sum(_overlap(box, entry) for entry in marks)
+        for position, side, up in product(positions, (1, -1), (1, -1)):
+            x, y = scaled(position)
+            low, bottom = x + (0.4 * em_x if side > 0 else -0.4 * em_x - width), y + up * 0.7 * em_y - 0.6 * em_y
+            box = (low, low + width, bottom, bottom + 1.2 * em_y)
+            covered_count = sum(_overlap(box, item) for item in mark_boxes)
             if (
                 min(box) < 0
                 or max(box) > 1
-                or any(_overlap(box, entry) for entry in taken)
-                or (covered and not is_curve)
+                or any(_overlap(box, item) for item in boxes)
+                or (covered_count and not is_curve)
             ):
                 continue
-            held = (lines.reshape(-1, 2) > (box[0], box[2])) & (lines.reshape(-1, 2) < (box[1], box[3]))
-            candidates.append((covered, int(held.all(axis=1).sum()), len(candidates), place, side, up, box))
+            is_in_box = (samples.reshape(-1, 2) > (box[0], box[2])) & (samples.reshape(-1, 2) < (box[1], box[3]))
+            crossings = int(is_in_box.all(axis=1).sum())
+            candidates.append((covered_count, crossings, len(candidates), position, side, up, box))
         if candidates:
-            *_, place, side, up, box = min(candidates, key=lambda entry: entry[:3])
-            taken.append(box)
-            where = {"ha": "left" if side > 0 else "right", "va": "center"}
+            *_, position, side, up, box = min(candidates, key=lambda item: item[:3])
+            boxes.append(box)
+            alignment = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)
-            write_beside(axes, label, place, offset, halo=2.5, size=em, color=color, zorder=20, **where)
+            write_beside(axes, label, position, offset, halo=2.5, size=em, color=color, zorder=20, **alignment)
 
 
 def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
@@ -209,10 +207,10 @@ def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
-    at = np.linspace(0, lengths[-1], count)
-    return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)
+    arc_lengths = np.linspace(0, lengths[-1], count)
+    return np.stack([np.interp(arc_lengths, lengths, column) for column in piece.T], axis=-1)
 
 
-def _place(component: Component) -> tuple[float, float]:
+def _position(component: Component) -> tuple[float, float]:
     first, second = (component.values or {}).values()
     return float(first.p) / float(first.q), float(second.p) / float(second.q)

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 UP, DOWN, BOTH = "up", "down", "both"
 _NODES = 6  # interpolation nodes: three points on either side of the hyperplane
-_NEWTON = 12
-_TRUSTED = 0.1  # largest difference of interpolation with four and with six nodes, in steps
+_NEWTON_STEPS = 12
+_MAX_DIFFERENCE = 0.1  # largest difference of interpolation with four and with six nodes, in steps
 _ASPECT = 0.75
 
 
@@ -51,8 +51,8 @@ class Section:
         """Return two variables along which the crossings spread most, none of them constant on the hyperplane."""
         powers = [sum(column) for column in zip(*hyperplane.function.numerator.monoms(), strict=True)]
         dim = self.points.shape[1]
-        free = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
-        return tuple(free[k] for k in fullest_axes(self.points[:, free], 2))
+        free_indices = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
+        return tuple(free_indices[k] for k in fullest_axes(self.points[:, free_indices], 2))
 
 
 def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
@@ -75,8 +75,8 @@ def curves_on(
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
-    restricted = (restricted_to(requested_axis(file, eps, name), hyperplane, plane) for name in file.integrals)
-    return [function for function in restricted if function is not None]
+    restrictions = (restrict(requested_axis(file, eps, name), hyperplane, plane) for name in file.integrals)
+    return [function for function in restrictions if function is not None]
 
 
 def section_of(
@@ -102,16 +102,16 @@ def section_of(
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
     crossings_by_orbit: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
-    skipped, last = 0, np.empty((0, ensemble.n, ensemble.system.dim))
-    for portion in ensemble.records(steps, 1, progress=progress):
-        points = np.concatenate([last, portion])
-        last = points[-(_NODES - 1) :]
+    skipped, last_points = 0, np.empty((0, ensemble.n, ensemble.system.dim))
+    for chunk in ensemble.records(steps, 1, progress=progress):
+        points = np.concatenate([last_points, chunk])
+        last_points = points[-(_NODES - 1) :]
         values = hyperplane(points)
         for k in range(ensemble.n):
-            crossings, left_out = crossings_of(points[:, k], values[:, k], direction)
+            crossings, omitted = crossings_of(points[:, k], values[:, k], direction)
             crossings_by_orbit[k].append(crossings)
-            skipped += left_out
-    return Section(tuple(np.concatenate(pieces) for pieces in crossings_by_orbit), skipped)
+            skipped += omitted
+    return Section(tuple(np.concatenate(chunks) for chunks in crossings_by_orbit), skipped)
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
@@ -130,45 +130,45 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     """
     signs = np.sign(values)
     up, down = (signs[:-1] < 0) & (signs[1:] >= 0), (signs[:-1] > 0) & (signs[1:] <= 0)
-    crossed = {UP: up, DOWN: down, BOTH: up | down}[direction]
-    before = np.flatnonzero(crossed)
-    before = before[(before >= _NODES // 2 - 1) & (before + _NODES // 2 < len(points))]
-    window = before[:, None] + np.arange(1 - _NODES // 2, _NODES // 2 + 1)
-    finite = np.isfinite(values[window]).all(axis=1)
-    before, window = before[finite], window[finite]
-    nearby, heights = points[window], values[window]
+    is_crossed = {UP: up, DOWN: down, BOTH: up | down}[direction]
+    indices = np.flatnonzero(is_crossed)
+    indices = indices[(indices >= _NODES // 2 - 1) & (indices + _NODES // 2 < len(points))]
+    node_rows = indices[:, None] + np.arange(1 - _NODES // 2, _NODES // 2 + 1)
+    is_finite = np.isfinite(values[node_rows]).all(axis=1)
+    indices, node_rows = indices[is_finite], node_rows[is_finite]
+    node_points, node_values = points[node_rows], values[node_rows]
 
-    def zero(nodes: slice) -> FloatArray:
+    def interpolate_zero(nodes: slice) -> FloatArray:
         """Return the crossings by interpolation at a subset of the six nodes."""
-        places = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
-        polynomials = np.linalg.inv(np.vander(places, increasing=True))  # maps values at the nodes to coefficients
-        along = heights[:, nodes] @ polynomials.T
-        powers = np.arange(len(places))
-        low, high = np.zeros(len(along)), np.ones(len(along))
-        t = np.clip(values[before] / (values[before] - values[before + 1]), 0, 1)
-        rising = values[before] < values[before + 1]
-        for _ in range(_NEWTON):  # Newton's method, restricted to an interval with a change of sign
-            value = (along * t[:, None] ** powers).sum(axis=1)
-            slope = (along[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
+        node_steps = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
+        inverse = np.linalg.inv(np.vander(node_steps, increasing=True))  # maps values at the nodes to coefficients
+        coefficients = node_values[:, nodes] @ inverse.T
+        powers = np.arange(len(node_steps))
+        low, high = np.zeros(len(coefficients)), np.ones(len(coefficients))
+        t = np.clip(values[indices] / (values[indices] - values[indices + 1]), 0, 1)
+        rising = values[indices] < values[indices + 1]
+        for _ in range(_NEWTON_STEPS):  # Newton's method, restricted to an interval with a change of sign
+            value = (coefficients * t[:, None] ** powers).sum(axis=1)
+            slope = (coefficients[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
             is_below = (value < 0) == rising
             low, high = np.where(is_below, t, low), np.where(is_below, high, t)
-            step = t - value / slope
-            t = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-        at: FloatArray = np.einsum("nk,kj,njd->nd", t[:, None] ** powers, polynomials, nearby[:, nodes])
-        return at
+            newton = t - value / slope
+            t = np.where((newton >= low) & (newton <= high), newton, (low + high) / 2)
+        crossings: FloatArray = np.einsum("nk,kj,njd->nd", t[:, None] ** powers, inverse, node_points[:, nodes])
+        return crossings
 
     with np.errstate(all="ignore"):
-        fine, coarse = zero(slice(None)), zero(slice(1, _NODES - 1))
-        steps = np.linalg.norm(points[before + 1] - points[before], axis=1)
-        trusted = np.linalg.norm(fine - coarse, axis=1) <= _TRUSTED * steps
+        fine_points, coarse_points = interpolate_zero(slice(None)), interpolate_zero(slice(1, _NODES - 1))
+        step_lengths = np.linalg.norm(points[indices + 1] - points[indices], axis=1)
+        is_trusted = np.linalg.norm(fine_points - coarse_points, axis=1) <= _MAX_DIFFERENCE * step_lengths
         # A function that moves away from 0 on both sides of a change of sign has a pole there.
         middle = _NODES // 2
-        approach, departure = np.diff(np.abs(heights), axis=1)[:, [middle - 2, middle]].T
-        trusted &= (approach < 0) | (departure > 0)
-    return fine[trusted], int((~trusted).sum())
+        approach, departure = np.diff(np.abs(node_values), axis=1)[:, [middle - 2, middle]].T
+        is_trusted &= (approach < 0) | (departure > 0)
+    return fine_points[is_trusted], int((~is_trusted).sum())
 
 
-def restricted_to(function: PointFunction, hyperplane: PointFunction, plane: Sequence[int]) -> PointFunction | None:
+def restrict(function: PointFunction, hyperplane: PointFunction, plane: Sequence[int]) -> PointFunction | None:
     """Return the restriction of a function to a hyperplane in two variables; None if it depends on other variables."""
     affine = hyperplane.function.numerator
     names = function.function.names
@@ -180,11 +180,11 @@ def restricted_to(function: PointFunction, hyperplane: PointFunction, plane: Seq
         if not slope.is_zero():
             generators[k] = generators[k] - affine / slope.leading_coefficient()
             break
-    sides = (function.function.numerator, function.function.denominator)
-    parts = [part.compose(*generators, ctx=context) for part in sides]
-    if any(int(part.degrees()[k]) > 0 for part in parts for k in range(dim) if k not in plane) or parts[1].is_zero():
+    polynomials = (function.function.numerator, function.function.denominator)
+    fraction = [p.compose(*generators, ctx=context) for p in polynomials]
+    if any(int(p.degrees()[k]) > 0 for p in fraction for k in range(dim) if k not in plane) or fraction[1].is_zero():
         return None
-    return PointFunction(function.name, RationalFunction.reduced(*parts), function.eps)
+    return PointFunction(function.name, RationalFunction.reduced(*fraction), function.eps)
 
 
 def plot_section(
@@ -202,25 +202,25 @@ def plot_section(
         section: the crossings.
         axes: two functions of the point.
         style: sizes and fonts of the picture.
-        curves: integrals as functions of the variables along the axes, as `restricted_to` returns them; their levels
+        curves: integrals as functions of the variables along the axes, as `restrict` returns them; their levels
             through the first crossing of each orbit are drawn.
         window: the part of the plane; None for all crossings.
         equal: whether both axes have the same unit.
 
     Raises InputError if there are no crossings.
     """
-    shown = [np.stack([axis(points) for axis in axes], axis=-1) for points in section.crossings]
+    projections = [np.stack([axis(points) for axis in axes], axis=-1) for points in section.crossings]
     count = len(section.points)
     if not count:
         raise InputError("found no crossing of the hyperplane, expected at least one: use more steps or another plane")
-    window = window or window_of(np.concatenate(shown))
+    window = window or window_of(np.concatenate(projections))
     style = style or Style()
     with drawing(style):
         import matplotlib as mpl
         from matplotlib.collections import LineCollection
 
         figure = new_figure(style, _ASPECT)
-        drawn: Any = figure.subplots()
+        plot_axes: Any = figure.subplots()
         handles: dict[str, Any] = {}
         for k, function in enumerate(curves):
             levels = levels_through(function, np.concatenate([points[:1] for points in section.crossings]))
@@ -229,19 +229,20 @@ def plot_section(
             curves_by_level = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
             pieces = [piece for level in curves_by_level for piece in level]
             if pieces:
-                look: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5, "linestyles": LINES[k % len(LINES)]}
-                drawn.add_collection(LineCollection(pieces, zorder=1, **look), autolim=False)
-                (handles[f"levels of {function.name}"],) = drawn.plot(
+                line = LINES[k % len(LINES)]
+                collection = LineCollection(pieces, zorder=1, colors="#999999", linewidths=0.5, linestyles=line)
+                plot_axes.add_collection(collection, autolim=False)
+                (handles[f"levels of {function.name}"],) = plot_axes.plot(
                     [], [], color="#999999", linewidth=0.5, linestyle=LINES[k % len(LINES)]
                 )
-        few = len(shown) <= len(COLORS)
-        shades = COLORS if few else mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, len(shown)))
-        for k, points in enumerate(shown):
-            draw_points(drawn, *points.T, color=shades[k], zorder=2, total=count)
-        for side, axis, limits in zip("xy", axes, window, strict=True):
-            drawn.set(**{f"{side}label": axis.label, f"{side}lim": limits})
+        has_few_orbits = len(projections) <= len(COLORS)
+        colors = COLORS if has_few_orbits else mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, len(projections)))
+        for k, points in enumerate(projections):
+            draw_points(plot_axes, *points.T, color=colors[k], zorder=2, total=count)
+        for letter, axis, limits in zip("xy", axes, window, strict=True):
+            plot_axes.set(**{f"{letter}label": axis.label, f"{letter}lim": limits})
         if equal:
-            drawn.set_aspect("equal", adjustable="box")
+            plot_axes.set_aspect("equal", adjustable="box")
         if handles:
             legend_above(figure, list(handles.values()), list(handles), style)
     return figure

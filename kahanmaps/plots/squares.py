@@ -17,15 +17,15 @@ import numpy as np
 from flint import arb, fmpq
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.files import SystemFile, match_variables
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure
 from kahanmaps.maps.floats.float_conversion import to_floats
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats
-from kahanmaps.plots.figures import drawing, label_of, new_figure, plain, wrapped, write_beside
-from kahanmaps.plots.portraits.windows import outside, window_of
+from kahanmaps.plots.figures import drawing, escape_dollars, label_of, new_figure, wrap_text, write_beside
+from kahanmaps.plots.portraits.windows import count_outside, window_of
 from kahanmaps.plots.style import COLORS, Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -75,7 +75,7 @@ class Squares:
     def compared(self) -> list[tuple[Point, Point]]:
         """The pairs of corresponding points of the two lattices, if both exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
-        pairs = (pair for row, other in rows for pair in zip(row[1:], other[1:], strict=True))
+        pairs = (pair for row, other_row in rows for pair in zip(row[1:], other_row[1:], strict=True))
         return [(p, q) for p, q in pairs if p is not None and q is not None]
 
     @property
@@ -117,9 +117,9 @@ def squares(
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     phi_f, phi_g = as_map(pair.f).at(eps), as_map(pair.g).at(eps)
     x = phi_f.point(start)
-    missing: list[str] = []
+    problems: list[str] = []
 
-    def orbit(phi: Map, first: Point | None, name: str) -> list[Point | None]:
+    def compute_orbit(phi: Map, first: Point | None, name: str) -> list[Point | None]:
         points = [first]
         for k in range(steps):
             progress(f"{name}, step {k + 1} of {steps}")
@@ -128,18 +128,18 @@ def squares(
                 try:
                     image = tuple(phi.step(points[-1]))
                 except SingularStep:
-                    missing.append(f"{name}: the map is not defined at a point on the way")
+                    problems.append(f"{name}: the map is not defined at a point on the way")
             if image and max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
-                missing.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
+                problems.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
                 image = None
             points.append(image)
         return points
 
-    along_f, along_g = orbit(phi_f, x, "Phi_f"), orbit(phi_g, x, "Phi_g")
-    g_after_f = tuple(tuple(orbit(phi_g, point, f"Phi_g after {i} times Phi_f")) for i, point in enumerate(along_f))
-    columns = [orbit(phi_f, point, f"Phi_f after {j} times Phi_g") for j, point in enumerate(along_g)]
+    along_f, along_g = compute_orbit(phi_f, x, "Phi_f"), compute_orbit(phi_g, x, "Phi_g")
+    rows = [compute_orbit(phi_g, point, f"Phi_g after {i} times Phi_f") for i, point in enumerate(along_f)]
+    columns = [compute_orbit(phi_f, point, f"Phi_f after {j} times Phi_g") for j, point in enumerate(along_g)]
     f_after_g = tuple(tuple(column[i] for column in columns) for i in range(steps + 1))
-    return Squares(pair, g_after_f, f_after_g, missing[0] if missing else "")
+    return Squares(pair, tuple(map(tuple, rows)), f_after_g, problems[0] if problems else "")
 
 
 def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
@@ -173,7 +173,7 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
     """Return the pair of two systems of equal dimension; with `eps2` the second system is scaled by eps2/eps."""
     g: QuadraticSystem | MapFamily
-    g, note = matched(file, other)
+    g, note = match_variables(file, other)
     if eps2 is not None:
         if not other.is_quadratic or not isinstance(g, KahanFamily):
             raise InputError(f"found eps2 with {other.map.kind}, expected it with a quadratic vector field")
@@ -184,9 +184,9 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
     return MapPair(file.map, g, ("f", "g"), note)
 
 
-_F, _G, _GAP = COLORS[1], COLORS[5], COLORS[0]
+_F_COLOR, _G_COLOR, _GAP_COLOR = COLORS[1], COLORS[5], COLORS[0]
 _LARGEST = 1e150  # squares of larger numbers would overflow
-_SEEN = 0.06  # fraction of the width of a panel: a smaller gap is magnified
+_VISIBLE_GAP = 0.06  # fraction of the width of a panel: a smaller gap is magnified
 
 
 def plot_squares(
@@ -201,23 +201,23 @@ def plot_squares(
     for an initial point too large to be plotted.
     """
     dim = squares_of_pairs[0].pair.f.dim
-    if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
+    if not all(np.isfinite(_to_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
         raise InputError(f"found an initial point with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
-    chosen = widest_axes(squares_of_pairs) if axes is None else axes
-    if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
-        raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
+    shown_axes = widest_axes(squares_of_pairs) if axes is None else axes
+    if len(shown_axes) != 2 or not all(0 <= k < dim for k in shown_axes):
+        raise InputError(f"found the variables {shown_axes}, expected two numbers from 0 to {dim - 1}")
     with drawing(style):
         from matplotlib.lines import Line2D
 
-        letter = style.font_size * 2.54 / 72
-        side = style.width / max(len(squares_of_pairs), 1.25) - 4.2 * letter
-        figure = new_figure(style, (side + 10 * letter) / style.width)
+        letter_size = style.font_size * 2.54 / 72
+        panel_width = style.width / max(len(squares_of_pairs), 1.25) - 4.2 * letter_size
+        figure = new_figure(style, (panel_width + 10 * letter_size) / style.width)
         for k, panel in enumerate(figure.subplots(1, len(squares_of_pairs), squeeze=False).ravel()):
             caption = captions[k] if k < len(captions) else ""
-            _draw(panel, squares_of_pairs[k], chosen, caption, letter / side, style)
+            _draw_panel(panel, squares_of_pairs[k], shown_axes, caption, letter_size / panel_width, style)
         handles = [
-            Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
-            Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
+            Line2D([], [], color=_F_COLOR, marker="o", markersize=3, label=r"$\Phi_f$"),
+            Line2D([], [], color=_G_COLOR, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
@@ -232,7 +232,7 @@ def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
     def score(pair: tuple[int, int]) -> float:
         widths = []
         for squares in squares_of_pairs:
-            table = _table(squares.g_after_f)
+            table = _to_table(squares.g_after_f)
             x, fx, gx = table[0, 0], table[-1, 0], table[0, -1]
             sides = np.stack([fx - x, gx - x])
             size = np.nanmax(np.abs(sides), initial=0.0)
@@ -240,112 +240,110 @@ def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
                 continue
             widths.append(np.linalg.svd(sides[:, pair] / size, compute_uv=False)[-1])
             if squares.closes is False:
-                gaps = np.abs(table - _table(squares.f_after_g))
+                gaps = np.abs(table - _to_table(squares.f_after_g))
                 widths.append(np.nanmax(gaps[..., pair], initial=0.0) / np.nanmax(gaps, initial=0.0))
         return float(min(widths, default=0.0))
 
     return max(combinations(range(dim), 2), key=score)
 
 
-def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, letter: float, style: Style) -> None:
-    """Draw one panel; `letter` is the font size in units of the side of the panel."""
-    g_last, f_last = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
-    all_points = np.concatenate([g_last.reshape(-1, 2), f_last.reshape(-1, 2)])
+def _draw_panel(axes: Axes, squares: Squares, plane: tuple[int, int], caption: str, em: float, style: Style) -> None:
+    """Draw one panel; `em` is the font size in units of the side of the panel."""
+    gf, fg = _to_table(squares.g_after_f)[..., plane], _to_table(squares.f_after_g)[..., plane]
+    all_points = np.concatenate([gf.reshape(-1, 2), fg.reshape(-1, 2)])
     all_points = all_points[np.isfinite(all_points).all(axis=1)]
     # Margins on each side, in units of the range of the points: space for the names of corners, more in small panels.
     if squares.steps > 1:
-        window = np.array(window_of(all_points, g_last[0, 0][None]))
-        needed = np.array([[1.3 * letter], [1.7 * letter]])
-        margins = np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed)))
+        window = np.array(window_of(all_points, gf[0, 0][None]))
+        space = np.array([[1.3 * em], [1.7 * em]])
+        margins = np.maximum(0.12, space / (1 - 2 * np.minimum(0.36, space)))
     else:  # one step: all five points are shown
         window = np.array([all_points.min(axis=0), all_points.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
-        needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
-        margins = np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed))
+        space = np.minimum(0.36, np.array([[3.2 * em], [2.5 * em]]))
+        margins = np.maximum([[0.42], [0.36]], space / (1 - 2 * space))
     window = window + margins * np.diff(window, axis=1) * np.array([-1, 1])
     axes.set_box_aspect(1)
     variables = squares.pair.f.variables
-    axes.set(
-        xlim=window[0], ylim=window[1], xlabel=label_of(variables[chosen[0]]), ylabel=label_of(variables[chosen[1]])
-    )
+    axes.set(xlim=window[0], ylim=window[1], xlabel=label_of(variables[plane[0]]), ylabel=label_of(variables[plane[1]]))
     axes.locator_params(nbins=5)
     if caption:
         equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-        title = plain(wrapped(equations, style.font_size / letter, style.font_size))
+        title = escape_dollars(wrap_text(equations, style.font_size / em, style.font_size))
         title = re.sub(r"\b([fg])(?=[:\xa0])", r"$\1$", title)
     else:
         f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
         title = f"$f = {f}$,  $g = {g}$"
-    beyond = outside(all_points, tuple(map(tuple, window)))
-    note = f"\n{beyond} of {len(all_points)} points outside" if beyond else ""
+    outside_count = count_outside(all_points, tuple(map(tuple, window)))
+    note = f"\n{outside_count} of {len(all_points)} points outside" if outside_count else ""
     axes.set_title(f"{title}\n{squares.verdict}{note}")
-    _draw_lattices(axes, g_last, f_last)
-    gap = (f_last[-1, -1] - g_last[-1, -1]) / np.diff(window, axis=1)[:, 0]
-    is_small = bool(np.hypot(*gap) < _SEEN)
+    _draw_lattices(axes, gf, fg)
+    gap = (fg[-1, -1] - gf[-1, -1]) / np.diff(window, axis=1)[:, 0]
+    is_small = bool(np.hypot(*gap) < _VISIBLE_GAP)
     if squares.steps == 1:
-        corners = [(g_last[0, 0], "$x$", ""), (g_last[1, 0], r"$\Phi_f x$", ""), (g_last[0, 1], r"$\Phi_g x$", "")]
+        corners = [(gf[0, 0], "$x$", ""), (gf[1, 0], r"$\Phi_f x$", ""), (gf[0, 1], r"$\Phi_g x$", "")]
         if squares.closes or (squares.closes is False and is_small):
             sign = "=" if squares.closes else r"\neq"
-            corners.append((g_last[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
+            corners.append((gf[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
         else:  # the names of the last two corners are side by side
-            sides = ("right", "left") if g_last[1, 1, 0] < f_last[1, 1, 0] else ("left", "right")
-            corners += [(g_last[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (f_last[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
-        middle = np.nanmean(np.stack([point for point, _, _ in corners]), axis=0)
+            sides = ("right", "left") if gf[1, 1, 0] < fg[1, 1, 0] else ("left", "right")
+            corners += [(gf[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (fg[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
+        center = np.nanmean(np.stack([point for point, _, _ in corners]), axis=0)
         for point, text, side in corners:
-            _label(axes, point, text, middle, letter, side)
+            _write_label(axes, point, text, center, em, side)
     else:
-        _label(axes, g_last[0, 0], "$x$", np.nanmean(all_points, axis=0), letter)
+        _write_label(axes, gf[0, 0], "$x$", np.nanmean(all_points, axis=0), em)
     if squares.closes is False and is_small and np.any(gap != 0):
-        _magnify(axes, g_last, f_last, all_points, window, style)
+        _magnify(axes, gf, fg, all_points, window, style)
 
 
-def _draw_lattices(axes: Axes, g_last: Floats, f_last: Floats) -> None:
+def _draw_lattices(axes: Axes, gf: Floats, fg: Floats) -> None:
     """Draw arrows with rings at the ends of arrows of g and dots at the ends of arrows of f; gaps are dotted lines."""
     from matplotlib.patches import FancyArrowPatch
 
-    steps = len(g_last) - 1
+    steps = len(gf) - 1
     width, size = (1.1, 5.5) if steps == 1 else (0.8, 4.0) if steps <= 4 else (0.5, 2.6)
-    arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": width, "mutation_scale": 4 + 5 * width}
-    arrow |= {"shrinkA": 2, "shrinkB": 2.5, "zorder": 2}
+    style: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": width, "mutation_scale": 4 + 5 * width}
+    style |= {"shrinkA": 2, "shrinkB": 2.5, "zorder": 2}
     for i in range(steps + 1):
         for j in range(steps + 1):
-            arrows = [(g_last[i, j], g_last[i, j + 1], _G)] if j < steps else []
-            arrows += [(f_last[i, j], f_last[i + 1, j], _F)] if i < steps else []
+            arrows = [(gf[i, j], gf[i, j + 1], _G_COLOR)] if j < steps else []
+            arrows += [(fg[i, j], fg[i + 1, j], _F_COLOR)] if i < steps else []
             for start, end, color in arrows:
                 if np.isfinite([*start, *end]).all() and not np.array_equal(start, end):
-                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=color, **arrow))
-            if not np.array_equal(g_last[i, j], f_last[i, j], equal_nan=True):
-                ends = np.stack([g_last[i, j], f_last[i, j]])
-                axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
-    ring: dict[str, Any] = {"linestyle": "none", "marker": "o", "zorder": 3}
-    rings, dots = g_last.reshape(-1, 2), f_last.reshape(-1, 2)
-    axes.plot(*rings.T, color=_G, markersize=size, markerfacecolor="white", markeredgewidth=0.8, **ring)
-    axes.plot(*dots.T, color=_F, markersize=0.5 * size, markeredgewidth=0, **{**ring, "zorder": 4})
+                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=color, **style))
+            if not np.array_equal(gf[i, j], fg[i, j], equal_nan=True):
+                ends = np.stack([gf[i, j], fg[i, j]])
+                axes.plot(ends[:, 0], ends[:, 1], color=_GAP_COLOR, linestyle=":", linewidth=0.9, zorder=2)
+    marker: dict[str, Any] = {"linestyle": "none", "marker": "o", "zorder": 3}
+    rings, dots = gf.reshape(-1, 2), fg.reshape(-1, 2)
+    axes.plot(*rings.T, color=_G_COLOR, markersize=size, markerfacecolor="white", markeredgewidth=0.8, **marker)
+    axes.plot(*dots.T, color=_F_COLOR, markersize=0.5 * size, markeredgewidth=0, **{**marker, "zorder": 4})
 
 
-def _magnify(axes: Axes, g_last: Floats, f_last: Floats, all_points: Floats, window: Floats, style: Style) -> None:
+def _magnify(axes: Axes, gf: Floats, fg: Floats, all_points: Floats, window: Floats, style: Style) -> None:
     """Draw the last two corners, magnified so that they are distinguishable, in the emptiest corner of the panel."""
     lengths = np.diff(window, axis=1)[:, 0]
-    inside = (all_points - window[:, 0]) / lengths
-    if len(g_last) == 2:  # the panel also contains the name of the last corner
-        corner = (g_last[-1, -1] - window[:, 0]) / lengths
+    relative_points = (all_points - window[:, 0]) / lengths
+    if len(gf) == 2:  # the panel also contains the name of the last corner
+        corner = (gf[-1, -1] - window[:, 0]) / lengths
         inwards, down = -np.sign(corner - 0.5)
-        name = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
-        inside = np.concatenate([inside, np.array(name)])
-    places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
-    x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
+        label_points = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
+        relative_points = np.concatenate([relative_points, np.array(label_points)])
+    corners = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
+    x, y = max(corners, key=lambda corner: np.hypot(*(relative_points - np.array(corner) - 0.16).T).min())
     inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
-    ends = np.stack([g_last[-1, -1], f_last[-1, -1]])
-    half = 1.1 * (np.abs(ends[1] - ends[0]) / lengths).max() * lengths
-    inset.set_xlim(ends[:, 0].mean() - half[0], ends[:, 0].mean() + half[0])
-    inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
+    ends = np.stack([gf[-1, -1], fg[-1, -1]])
+    half_widths = 1.1 * (np.abs(ends[1] - ends[0]) / lengths).max() * lengths
+    inset.set_xlim(ends[:, 0].mean() - half_widths[0], ends[:, 0].mean() + half_widths[0])
+    inset.set_ylim(ends[:, 1].mean() - half_widths[1], ends[:, 1].mean() + half_widths[1])
     inset.set_xticks([])
     inset.set_yticks([])
-    factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$"
-    how: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
-    write_beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
-    _draw_lattices(inset, g_last[-2:, -2:], f_last[-2:, -2:])
-    inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
+    factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half_widths[0]))}$"
+    options: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
+    write_beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **options)
+    _draw_lattices(inset, gf[-2:, -2:], fg[-2:, -2:])
+    inset.plot(*ends.T, color=_GAP_COLOR, linestyle=":", linewidth=0.9, zorder=2)
 
 
 def _in_two_digits(number: float) -> str:
@@ -354,7 +352,7 @@ def _in_two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
 
 
-def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
+def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float, side: str = "") -> None:
     """Write a text beside a point, away from the middle of all points; a long text above or below, shifted inside.
 
     `side` is the alignment of a long name beside which another long name is written.
@@ -363,25 +361,25 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
         return
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
     low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
-    away = (point - middle) / length
-    away = away / (np.hypot(*away) or 1)
+    outward = (point - center) / length
+    outward = outward / (np.hypot(*outward) or 1)
     x, y = point
-    maps = text.count("Phi")
-    if maps > 1:
-        width = 1.6 * letter * maps
-        aligned = side or "center"
-        before = {"left": 0.0, "center": width / 2, "right": width}[aligned]
-        across = (x - low[0]) / length[0]
-        x = low[0] + length[0] * min(max(across, before + 0.02), max(before, 0.98 - width + before))
-        offset = 0.0, 9.0 if away[1] >= 0 else -9.0
+    count = text.count("Phi")
+    if count > 1:
+        width = 1.6 * em * count
+        ha = side or "center"
+        left_part = {"left": 0.0, "center": width / 2, "right": width}[ha]
+        share = (x - low[0]) / length[0]
+        x = low[0] + length[0] * min(max(share, left_part + 0.02), max(left_part, 0.98 - width + left_part))
+        offset = 0.0, 9.0 if outward[1] >= 0 else -9.0
     else:
-        aligned = "center" if abs(away[0]) < 0.4 else "left" if away[0] > 0 else "right"
-        offset = 7 * away[0], 7 * away[1]
-    raised = "center" if abs(away[1]) < 0.4 and maps < 2 else "bottom" if away[1] >= 0 else "top"
-    write_beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
+        ha = "center" if abs(outward[0]) < 0.4 else "left" if outward[0] > 0 else "right"
+        offset = 7 * outward[0], 7 * outward[1]
+    va = "center" if abs(outward[1]) < 0.4 and count < 2 else "bottom" if outward[1] >= 0 else "top"
+    write_beside(axes, text, (float(x), float(y)), offset, 2, ha=ha, va=va, zorder=5)
 
 
-def _table(lattice: Lattice) -> Floats:
+def _to_table(lattice: Lattice) -> Floats:
     """Return the points as floating-point numbers; nan for missing points and for points that are too large."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])

@@ -42,7 +42,7 @@ class Style:
     dpi: int = 300
 
     def __post_init__(self) -> None:
-        for what, value, low, high in (
+        for description, value, low, high in (
             ("a width of {} cm", self.width, 2, 200),
             ("a height of {} cm", self.height, 2, 200),
             ("a font size of {} pt", self.font_size, 3, 72),
@@ -50,8 +50,8 @@ class Style:
         ):
             if value is not None and not low <= value <= high:
                 # An integer may exceed the range of floating-point numbers.
-                given = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
-                raise InputError(f"found {what.format(given)}, expected {low} to {high}")
+                given_text = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
+                raise InputError(f"found {description.format(given_text)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
@@ -61,10 +61,10 @@ class Style:
 
     def require_pixels(self, width: float, height: float) -> None:
         """Raise InputError if a picture of this size in inches, at `dpi` dots per inch, would not fit into memory."""
-        given = width * height * self.dpi**2
-        if given > _MAX_PIXELS:
+        pixel_count = width * height * self.dpi**2
+        if pixel_count > _MAX_PIXELS:
             raise InputError(
-                f"found {given:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
+                f"found {pixel_count:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
                 f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: use fewer dots per "
                 f"inch than {self.dpi}"
             )

@@ -34,12 +34,12 @@ def explore_sections(analysis: Analysis) -> list[Section]:
 
     Raises InputError if the map has too many variables or terms for a browser.
     """
-    data, final = explore_data(analysis), analysis.conclusion
-    names, reach, eps = data["variables"], data["reach"], data["eps"]
-    sliders = [(f"x{k}", name, -reach, reach, data["start"][k], "any") for k, name in enumerate(names)]
+    data, conclusion = explore_data(analysis), analysis.conclusion
+    names, bound, eps = data["variables"], data["reach"], data["eps"]
+    sliders = [(f"x{k}", name, -bound, bound, data["start"][k], "any") for k, name in enumerate(names)]
     if data["has_eps"]:
-        largest = max(_LARGEST_EPS, 2 * abs(eps))
-        sliders.insert(0, ("eps", "eps", -largest if eps < 0 else 0, largest, eps, "any"))
+        max_eps = max(_LARGEST_EPS, 2 * abs(eps))
+        sliders.insert(0, ("eps", "eps", -max_eps if eps < 0 else 0, max_eps, eps, "any"))
     sliders.append(("steps", "steps", 10, _MAX_STEPS, _DEFAULT_STEPS, "10"))
     scope = "for every eps" if analysis.eps is None else f"at eps = {format_number(analysis.eps)} only"
     integrals = analysis.integrals.integrals if analysis.integrals is not None else ()
@@ -49,7 +49,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
         "sliders": sliders,
         "eps_moves": data["eps_moves"],
         "verdict": f"The verdict{f', {scope}' if analysis.file.map.has_eps else ''}",
-        "conclusion": (final.kind, final.sentence),
+        "conclusion": (conclusion.kind, conclusion.sentence),
         "integrals": [
             (
                 Html(markup.verdict(str(integral.verdict.value))),
@@ -80,19 +80,19 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
     if file.hamiltonian is not None and "H" not in {name for name, *_ in functions}:
         H = file.hamiltonian.H
         functions.append(("H", RationalFunction(H, H.context().constant(1)), "of the flow"))
-    plotted = []
+    plotted_functions = []
     for name, function, certainty in functions:
         sides = [_terms(part, names, file.parameters) for part in (function.numerator, function.denominator)]
         if sum(map(len, sides)) <= _MAX_TERMS:
             text = format_rational_function(function)
-            plotted.append(
+            plotted_functions.append(
                 {"name": name, "text": text, "word": certainty, "numerator": sides[0], "denominator": sides[1]}
             )
     if file.is_quadratic:  # the middle one of the initial points of a portrait, whose orbits are bounded
         starts = automatic_starts(file.system, DEFAULT_EPS if analysis.eps is None else analysis.eps)
-        start, reach = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
+        start, bound = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
     else:
-        start, reach = to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(n)]), 3.0
+        start, bound = to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(n)]), 3.0
     return {
         "variables": list(file.variables),
         "rows": rows,
@@ -100,8 +100,8 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
         "eps": to_float(DEFAULT_EPS if analysis.eps is None else analysis.eps),
         "eps_moves": analysis.eps is None,
         "start": [float(f"{value:.4g}") for value in start],
-        "reach": reach,
-        "functions": plotted,
+        "reach": bound,
+        "functions": plotted_functions,
     }
 
 
@@ -110,8 +110,8 @@ def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, 
     own_names = names_of(polynomial)
     terms = []
     for powers, coefficient in polynomial.terms():
-        power = dict(zip(own_names, powers, strict=True))
+        exponents = dict(zip(own_names, powers, strict=True))
         for name in set(own_names) - set(names):
-            coefficient *= values[name] ** int(power[name])
-        terms.append([to_float(coefficient), *(int(power.get(name, 0)) for name in names)])
+            coefficient *= values[name] ** int(exponents[name])
+        terms.append([to_float(coefficient), *(int(exponents.get(name, 0)) for name in names)])
     return terms

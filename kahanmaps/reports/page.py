@@ -89,7 +89,7 @@ def page(
         lead=lead,
         sections=[section for section in sections if section],
         remake=remake,
-        system_file="" if file is None else Html(markup.escape(markup.shortened(file.to_toml(), _MAX_SYSTEM))),
+        system_file="" if file is None else Html(markup.escape(markup.abbreviate(file.to_toml(), _MAX_SYSTEM))),
         script=Html(script),
         script_hash=f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}" if script else "",
         version=__version__,
@@ -123,10 +123,10 @@ def page_template() -> Any:
         needed = "a report needs Jinja2 and latex2mathml"
         raise InputError(f"{needed} ({error}): pip install 'kahanmaps[report]'") from error
 
-    def shown(value: Any) -> Any:
-        return value if hasattr(value, "__html__") else printable(markup.shortened(value, CHARACTERS))
+    def printable_value(value: Any) -> Any:
+        return value if hasattr(value, "__html__") else printable(markup.abbreviate(value, CHARACTERS))
 
-    environment = Environment(autoescape=True, finalize=shown, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(autoescape=True, finalize=printable_value, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string((resources.files("kahanmaps.reports") / "page.html").read_text(encoding="utf-8"))
 
 
@@ -139,12 +139,12 @@ def mathml(latex: str) -> str:
     from latex2mathml.converter import convert
 
     # A name of several letters would look like a product: set it upright, with spaces around it.
-    prepared = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
-    prepared = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", prepared)
-    for command, other in _TEXT_COMMANDS.items():
-        prepared = prepared.replace(command, other)
+    source = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
+    source = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", source)
+    for command, replacement in _TEXT_COMMANDS.items():
+        source = source.replace(command, replacement)
     try:
-        text = convert(prepared)
+        text = convert(source)
         is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
     except Exception:  # an exception of latex2mathml, KeyError, IndexError or ParseError
         is_known = False
@@ -157,7 +157,7 @@ def mathml(latex: str) -> str:
 
 def text(words: object) -> Html:
     """Return text as HTML, shortened if it is too long for a page."""
-    return Html(markup.escape(markup.shortened(words, CHARACTERS)))
+    return Html(markup.escape(markup.abbreviate(words, CHARACTERS)))
 
 
 def wide(table: str) -> Html:
@@ -176,7 +176,7 @@ def system_section(file: SystemFile) -> Section:
         pieces.append(Html(f"<p>with {text(values)}</p>"))
     if file.hamiltonian is not None:
         kind = "the standard J" if file.hamiltonian.is_standard else "a constant J of the file"
-        shown = formula(file.hamiltonian.H, "H", CHARACTERS)
+        H_html = formula(file.hamiltonian.H, "H", CHARACTERS)
         flow = typeset(r"\dot{x} = J \nabla H", False)
-        pieces.append(Html(f"<p>{flow} with {kind}, {shown}</p>"))
+        pieces.append(Html(f"<p>{flow} with {kind}, {H_html}</p>"))
     return Section("system", "The system", pieces=pieces)

@@ -21,7 +21,7 @@ from kahanmaps.plots.figures import require_matplotlib, svg_text
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts, plane_flow
 from kahanmaps.plots.portraits.portrait import plot_portrait, portrait_of
-from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, follow_orbits
 from kahanmaps.plots.style import Style
 
 if TYPE_CHECKING:
@@ -97,20 +97,18 @@ class Pictures:
                 starts = automatic_starts(real_approximation.system, eps_value)
             else:
                 starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
-            orbits = walked(ensemble_for(real_approximation.map, eps_value, starts, _STEPS), _STEPS)
+            orbits = follow_orbits(ensemble_for(real_approximation.map, eps_value, starts, _STEPS), _STEPS)
             functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
-            drawn_portrait = portrait_of(orbits, functions)
+            portrait = portrait_of(orbits, functions)
             if is_field:
-                drawn_portrait = replace(
-                    drawn_portrait, flow=plane_flow(real_approximation.system, range(file.dim), drawn_portrait.window)
+                portrait = replace(
+                    portrait, flow=plane_flow(real_approximation.system, range(file.dim), portrait.window)
                 )
             for reason, count in orbits.ended.items():
                 remarks.append(f"{count} of {counted(orbits.orbits, 'orbit')} ended early: {reason}.")
-            if drawn_portrait.left_out:
-                remarks.append(
-                    f"{drawn_portrait.left_out} of {orbits.points[..., 0].size} points lie outside the window."
-                )
-            return plot_portrait(drawn_portrait, style)
+            if portrait.left_out:
+                remarks.append(f"{portrait.left_out} of {orbits.points[..., 0].size} points lie outside the window.")
+            return plot_portrait(portrait, style)
 
         axis_names = " and ".join(axes)
         sentence = f"{eps_suffix(eps_value, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,12 +34,11 @@ if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
     from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 
-_LIMITS = checks.DisplayLimits(
-    CHARACTERS, CHARACTERS, CHARACTERS, 100
-)  # long enough for complete witnesses, which a reader can check
-_PARSED = 4_000  # maximal length of a relation that is typeset as a formula
+# Long enough for complete witnesses, which a reader can check.
+_LIMITS = checks.DisplayLimits(CHARACTERS, CHARACTERS, CHARACTERS, 100)
+_MAX_RELATION = 4_000  # maximal length of a relation that is typeset as a formula
 _PAPER = "petrera-suris-2016"
-_EXPLAINED = (
+_LEGEND = (
     "Proved: exactly, for every eps or the one that is named. Supported: held at random points over GF(p), with a "
     "bound for the error, or along an orbit. Refuted: there is a witness. A control, and a misprint as it is printed, "
     "are expected to be refuted, and do not count. Each line unfolds to its evidence."
@@ -103,11 +103,11 @@ def report_html(
         if not reports or not all(isinstance(report, Report) for report in reports):
             kinds = ", ".join(sorted({type(report).__name__ for report in reports})) or "nothing"
             raise InputError(f"found {kinds}, expected an Analysis, a Report or several of them")
-        first = reports[0]
-        lead = ", ".join(filter(None, (checks.systems_sentence(first), checks.eps_sentence(first))))
-        name = str(first.context.get("system", "")) if file is None else _title(file)
-        heading = "The paper, statement by statement" if first.check == "verify" else "Checks"
-        default_title, seed = f"{heading}: {name}", first.context.get("seed")
+        first_report = reports[0]
+        lead = ", ".join(filter(None, (checks.systems_sentence(first_report), checks.eps_sentence(first_report))))
+        name = str(first_report.context.get("system", "")) if file is None else _title(file)
+        heading = "The paper, statement by statement" if first_report.check == "verify" else "Checks"
+        default_title, seed = f"{heading}: {name}", first_report.context.get("seed")
         sections = _claims_sections(reports, file, left_out, page_pictures)
     if page_pictures.note:
         sections.append(Section("pictures", "Pictures", paragraphs=[page_pictures.note]))
@@ -166,18 +166,38 @@ def _title(file: SystemFile) -> str:
 
 
 def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
-    file, final = analysis.file, analysis.conclusion
+    file, conclusion = analysis.file, analysis.conclusion
     arguments = " in x and eps" if file.map.has_eps else ""
     explanation = (
         f"Proved and supported: formulas, as identities{arguments}. Measured: modulo primes and along orbits, "
         "which is evidence. The number of integrals and the growth are separate findings."
     )
-    conclusion = Html(f"<strong>{text(final.kind)}</strong>"), final.sentence
-    sections = [Section("verdict", "Verdict", conclusion, [explanation]), system_section(file), _catalogue(file)]
+    heading = Html(f"<strong>{text(conclusion.kind)}</strong>"), conclusion.sentence
+    sections = [Section("verdict", "Verdict", heading, [explanation]), system_section(file), _catalogue_section(file)]
     formulas = formulas_of(analysis)
+    growth, survey, label = analysis.degrees, analysis.heights, file.label
     for name, lines in analysis.sections:
         statements = [(Html(markup.verdict(line.status)), formulas.get(line.text, line.text)) for line in lines]
-        pieces, folded = _pictures_and_tables(analysis, name, pictures)
+        # The pictures and folded tables that follow the statements.
+        figures: list[str] = []
+        folded: list[tuple[str, Html]] = []
+        for run in analysis.singularities if name == "singularities" else ():
+            at_eps = f" at eps = {format_number(run.eps)}" if file.map.has_eps else ""
+            folded.append((f"Hypersurfaces{at_eps}", wide(result_html(run, file.map))))
+        if name == "growth" and growth is not None:
+            first_degrees = ", ".join(map(str, growth.degrees[:8]))
+            alt = f"Degrees of the iterates against their number, from {first_degrees}: {growth.growth_text}"
+            caption = "Degrees of the iterates"
+            caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
+            figures.append(pictures.draw("degrees", caption, alt, partial(plot_degrees, {label: growth})))
+            rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
+            folded.append(("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))))
+        if name == "growth" and survey is not None and survey.orbits:
+            alt = f"Heights of exact orbits in bits against the step: {survey.text}"
+            caption = "Heights of exact orbits, and the growth that was fitted."
+            figures.append(pictures.draw("heights", caption, alt, partial(plot_heights, survey)))
+            folded.append(("Orbits whose heights were measured", wide(result_html(survey))))
+        pieces = [Html(figure) for figure in figures if figure]
         title = name[0].upper() + name[1:]
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
@@ -186,7 +206,7 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
     return [*sections, Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
 
 
-def _catalogue(file: SystemFile) -> Section:
+def _catalogue_section(file: SystemFile) -> Section:
     claims = [
         formula(function, name or "I", CHARACTERS)
         for name, function in {**file.integrals, **file.integrals_in_iterates}.items()
@@ -195,52 +215,22 @@ def _catalogue(file: SystemFile) -> Section:
         claims.append(formula(file.density, "phi", CHARACTERS))
     convention = file.catalog.get("convention", "")
     facts = file.catalog.get("facts", [])
-    sources = markup.listed(text(source(key)) for key in file.catalog.get("sources", []))
+    sources = markup.bullet_list(text(source(key)) for key in file.catalog.get("sources", []))
     pieces = [Html(f"<h3>Sources</h3>\n{sources}")] if file.catalog.get("sources") else []
     title = f"What {'the catalogue' if file.catalog else 'the file'} says"
     if not (facts or claims or convention or pieces):
         return Section("known", title)
-    first = Html(
+    remark = Html(
         '<span class="soft">The analysis below has not read this: it was given the right-hand sides only.</span>'
     )
     return Section(
         "known",
         title,
-        paragraphs=[first, *[f"Step: {convention}"] * bool(convention)],
+        paragraphs=[remark, *[f"Step: {convention}"] * bool(convention)],
         items=facts,
         pieces=pieces,
-        folded=[(f"Its claims: {counted(len(claims), 'formula')}", Html(markup.listed(claims)))] if claims else [],
+        folded=[(f"Its claims: {counted(len(claims), 'formula')}", Html(markup.bullet_list(claims)))] if claims else [],
     )
-
-
-def _pictures_and_tables(
-    analysis: Analysis, name: str, pictures: Pictures
-) -> tuple[list[Html], list[tuple[str, Html]]]:
-    """Return the pictures and folded tables that follow the statements of a section."""
-    figures: list[str] = []
-    folded: list[tuple[str, Html]] = []
-    if name == "singularities":
-        at_eps = " at eps = {}" if analysis.file.map.has_eps else ""
-        for run in analysis.singularities:
-            folded.append(
-                (f"Hypersurfaces{at_eps.format(format_number(run.eps))}", wide(result_html(run, analysis.file.map)))
-            )
-    growth, survey = analysis.degrees, analysis.heights
-    if name == "growth" and growth is not None:
-        first = ", ".join(map(str, growth.degrees[:8]))
-        alt = f"Degrees of the iterates against their number, from {first}: {growth.growth_text}"
-        caption = "Degrees of the iterates"
-        caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
-        label = analysis.file.label
-        figures.append(pictures.draw("degrees", caption, alt, lambda style: plot_degrees({label: growth}, style)))
-        rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
-        folded.append(("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))))
-    if name == "growth" and survey is not None and survey.orbits:
-        alt = f"Heights of exact orbits in bits against the step: {survey.text}"
-        caption = "Heights of exact orbits, and the growth that was fitted."
-        figures.append(pictures.draw("heights", caption, alt, lambda style: plot_heights(survey, style)))
-        folded.append(("Orbits whose heights were measured", wide(result_html(survey))))
-    return [Html(figure) for figure in figures if figure], folded
 
 
 def formulas_of(analysis: Analysis) -> dict[str, Html]:
@@ -248,15 +238,15 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
     html_by_text: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
-        because = checks.because(statement.evidence, _LIMITS)
-        return f"<details><summary>evidence</summary>{because}</details>"
+        text_of_evidence = checks.because(statement.evidence, _LIMITS)
+        return f"<details><summary>evidence</summary>{text_of_evidence}</details>"
 
     for integral in analysis.integrals.integrals if analysis.integrals is not None else ():
         html = formula(integral.function, integral.name, CHARACTERS)
         origin_and_evidence = f'<span class="soft">{text(integral.origin)}</span>\n{evidence(integral)}'
         html_by_text[f"{integral.name} = {integral.text}  [{integral.origin}]"] = f"{html}<br/>{origin_and_evidence}"
     for relation in analysis.relations:
-        if html := _relation(relation, (*relation.names, *analysis.file.variables, "eps")):
+        if html := _relation_html(relation, (*relation.names, *analysis.file.variables, "eps")):
             html_by_text[f"along orbits {relation.text}"] = f"along orbits {html}"
     for density in analysis.densities.densities if analysis.densities is not None else ():
         html = formula(density.function, "phi", CHARACTERS)
@@ -275,15 +265,15 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
         html = f"Hamiltonian with {kind}, {formula(hamiltonian.H, 'H', CHARACTERS)}"
         html_by_text[f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}"] = html
     for field in analysis.commuting.nontrivial if analysis.commuting is not None else ():
-        parts = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
+        equations = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
         statement = "commutes with the Kahan maps of g and -g"
-        html_by_text[f"{statement}, g = ({', '.join(field.rhs)})"] = f"{statement},<br/>\n{parts}"
+        html_by_text[f"{statement}, g = ({', '.join(field.rhs)})"] = f"{statement},<br/>\n{equations}"
     return {text: Html(html) for text, html in html_by_text.items()}
 
 
-def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
+def _relation_html(relation: SparseRelation, names: tuple[str, ...]) -> str:
     """Return P = 0 as HTML with terms in the order of the relation's text; empty if it is unparsable or too long."""
-    if len(relation.text) > _PARSED:
+    if len(relation.text) > _MAX_RELATION:
         return ""
     text = ""
     for monomial, coefficient in relation.terms:
@@ -304,12 +294,12 @@ def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
 def _claims_sections(
     reports: Sequence[Report], file: SystemFile | None, left_out: Sequence[str], pictures: Pictures
 ) -> list[Section]:
-    first = reports[0]
-    is_paper = len(reports) == 1 and first.check == "verify"
+    first_report = reports[0]
+    is_paper = len(reports) == 1 and first_report.check == "verify"
     if is_paper:
         groups = [
             (f"section-{findings[0].place.get('section', 'none')}", name or "Together", findings)
-            for name, findings in checks.sections_of(first.findings).items()
+            for name, findings in checks.sections_of(first_report.findings).items()
         ]
     else:
         groups = [(f"check-{_slug(r.check)}", f"Check: {r.check}", list(r.findings)) for r in reports]
@@ -320,22 +310,22 @@ def _claims_sections(
     verdict = Html(markup.verdict(combined(report.verdict for report in reports)))
     counts = checks.counts([finding for report in reports for finding in report.findings])
     table = wide(markup.table(["part", "claims"], rows))
-    sections = [Section("verdict", "Verdict", (verdict, counts), [_EXPLAINED], pieces=[table])]
+    sections = [Section("verdict", "Verdict", (verdict, counts), [_LEGEND], pieces=[table])]
     if file is not None:
-        eps = first.context.get("eps")
+        eps = first_report.context.get("eps")
         draw = pictures.portrait if file.member is None else pictures.invariant_curves
         picture = draw(file, None if eps in (None, "every") else str(eps))
         sections += [system_section(file), Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
     ids: Counter[str] = Counter()
     for section_id, name, findings in groups:
-        sections.append(Section(section_id, name, claims=[_claim(finding, ids) for finding in findings]))
+        sections.append(Section(section_id, name, claims=[_claim_data(finding, ids) for finding in findings]))
     notes = [note for report in reports for note in (checks.ending_sentence(report), *report.notes)]
     sections.append(Section("notes", "Notes", items=[note for note in (*notes, *left_out) if note]))
-    paper = [source(_PAPER)] if first.check == "verify" else []
+    paper = [source(_PAPER)] if first_report.check == "verify" else []
     return [*sections, Section("sources", "Source", paragraphs=paper)]
 
 
-def _claim(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
+def _claim_data(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
     """Return the data of a line that unfolds to its evidence; it is open if the claim is refuted unexpectedly.
 
     `ids` counts the keys on the page, to make ids unique: a claim and its controls have the same key.
@@ -352,7 +342,7 @@ def _claim(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
         "verdict": Html(checks.verdict_html(finding)),
         "place": location,
         "words": finding.claim.removeprefix(f"{location}: "),
-        "rows": [(label, Html(what)) for label, what in checks.evidence_rows(finding, _LIMITS)],
+        "rows": [(label, Html(html)) for label, html in checks.evidence_rows(finding, _LIMITS)],
     }
 
 

@@ -49,8 +49,8 @@ class CubicHamiltonian(LatexDisplay):
     J: fmpq_mat
 
     def __repr__(self) -> str:
-        kind = "" if self.is_standard else "another "
-        return f"CubicHamiltonian({shorten(format_polynomial(self.H), 100)}; {kind or 'standard '}J)"
+        kind = "standard" if self.is_standard else "another"
+        return f"CubicHamiltonian({shorten(format_polynomial(self.H), 100)}; {kind} J)"
 
     def __post_init__(self) -> None:
         n = len(names_of(self.H))
@@ -102,13 +102,13 @@ class CubicHamiltonian(LatexDisplay):
         not depend, so that grad H has the same value at all solutions.
         """
         n, zero = self.dim, (0,) * self.dim
-        affine = [component.derivative(j) for i, component in enumerate(self.gradient) for j in range(i + 1)]
-        rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in affine]
+        hessian_entries = [component.derivative(j) for i, component in enumerate(self.gradient) for j in range(i + 1)]
+        rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in hessian_entries]
         # c = 0 if it is a solution: all entries without pivot but the last are zero in this vector.
-        last = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
-        if last is None or any(evaluate(component, QQ, last[:n]) != 0 for component in self.gradient):
+        solution = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
+        if solution is None or any(evaluate(component, QQ, solution[:n]) != 0 for component in self.gradient):
             return None
-        return last[:n]
+        return solution[:n]
 
     def about(self, point: Sequence[fmpq]) -> CubicHamiltonian:
         """Return the system in coordinates with this point as origin: H(point + x) - H(point)."""

@@ -57,8 +57,8 @@ class PolynomialField:
         [x*y, x]
         """
         context = function.context()
-        images = context.gens()[: self.dim + len(self.symbols)]
-        derivatives = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
+        gens = context.gens()[: self.dim + len(self.symbols)]
+        derivatives = (p.compose(*gens, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
         return sum(derivatives, context.constant(0))
 
     def __eq__(self, other: object) -> bool:

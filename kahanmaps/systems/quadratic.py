@@ -43,7 +43,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     False
     """
 
-    _over: dict[Field, SystemOver] = field(default_factory=dict, init=False, repr=False)
+    _systems_by_field: dict[Field, SystemOver] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rhs", tuple(self.rhs))
@@ -85,7 +85,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return all(sum(m[: self.dim]) == 2 for polynomial in self.rhs for m in polynomial.monoms())
 
     @property
-    def _numbers(self) -> SystemOver:
+    def _over_rationals(self) -> SystemOver:
         """The system over Q. Raises InputError if there are symbols."""
         if self.symbols:
             raise InputError(f"found the symbols {', '.join(self.symbols)} in the coefficients, expected numbers")
@@ -94,24 +94,24 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     @cached_property
     def Q(self) -> tuple[fmpq_mat, ...]:
         """The symmetric matrices of the quadratic forms; only for systems without symbols."""
-        n, entries = self.dim, (self._numbers.tensor / 2).entries()
+        n, entries = self.dim, (self._over_rationals.tensor / 2).entries()
         return tuple(fmpq_mat(n, n, entries[i * n * n : (i + 1) * n * n]) for i in range(n))
 
     @cached_property
     def B(self) -> fmpq_mat:
         """The matrix of the linear part; only for systems without symbols."""
-        linear: fmpq_mat = self._numbers.B
-        return linear
+        matrix: fmpq_mat = self._over_rationals.B
+        return matrix
 
     @cached_property
     def c(self) -> tuple[fmpq, ...]:
         """The constant terms; only for systems without symbols."""
-        return tuple(self._numbers.c.entries())
+        return tuple(self._over_rationals.c.entries())
 
     def scaled(self, factor: Any) -> QuadraticSystem:
         """Return the system x' = factor f(x). Its Kahan map at eps is the Kahan map of f at factor * eps."""
-        by = rational(factor)
-        return QuadraticSystem(tuple(polynomial * by for polynomial in self.rhs), self.symbols)
+        multiplier = rational(factor)
+        return QuadraticSystem(tuple(polynomial * multiplier for polynomial in self.rhs), self.symbols)
 
     def transformed(self, matrix: fmpq_mat) -> QuadraticSystem:
         """Return the system x' = C f(x) for a constant matrix C = `matrix`."""
@@ -171,11 +171,11 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         """
         if self.symbols:
             return SystemOver.of(field_of_numbers, self, values)
-        system = self._over.get(field_of_numbers)
+        system = self._systems_by_field.get(field_of_numbers)
         if system is None:
-            if len(self._over) >= 8:  # systems modulo random primes are not needed for long
-                self._over.clear()
-            system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
+            if len(self._systems_by_field) >= 8:  # systems modulo random primes are not needed for long
+                self._systems_by_field.clear()
+            system = self._systems_by_field[field_of_numbers] = SystemOver.of(field_of_numbers, self)
         return system
 
     @cached_property
@@ -219,10 +219,10 @@ class SystemOver:
         Raises BadPrime if the prime divides the denominator of a coefficient.
         """
         n, zero = system.dim, field.zero
-        tensor, linear, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
+        tensor, linear_entries, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
 
-        def add(entries: list[Any], at: int, value: Any) -> None:
-            entries[at] = value if entries[at] is zero else entries[at] + value
+        def add(entries: list[Any], index: int, value: Any) -> None:
+            entries[index] = value if entries[index] is zero else entries[index] + value
 
         with field.working():
             for i, polynomial in enumerate(system.rhs):
@@ -232,20 +232,20 @@ class SystemOver:
                     # Twice x_j^2/2 is integral: f'' is defined modulo 2, though Q is not.
                     is_square = len(indices) == 2 and indices[0] == indices[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
-                    for exponent, at in zip(monomial[n:], values, strict=True):
+                    for exponent, symbol_value in zip(monomial[n:], values, strict=True):
                         for _ in range(exponent):  # in python-flint 0.9.0 a power of a ball around 0 is nan
-                            value = value * at
+                            value = value * symbol_value
                     if len(indices) == 2:
                         j, k = indices
                         add(tensor, (i * n + j) * n + k, value)
                         if j != k:
                             add(tensor, (i * n + k) * n + j, value)
                     elif len(indices) == 1:
-                        add(linear, i * n + indices[0], value)
+                        add(linear_entries, i * n + indices[0], value)
                     else:
                         add(constants, i, value)
-            parts = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
-        return cls(field, *parts, None if system.symbols else system)
+            matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear_entries), field.column(constants)
+        return cls(field, *matrices, None if system.symbols else system)
 
     @property
     def dim(self) -> int:
@@ -262,10 +262,10 @@ class SystemOver:
     def hessian_times(self, vector: Sequence[Any]) -> Any:
         """Return the matrix f''(v), which satisfies f'(x + v) = f'(x) + f''(v)."""
         with self.field.working():
-            first, *others = (
+            first_term, *other_terms = (
                 derivative * self.field.convert(v) for derivative, v in zip(self._derivatives, vector, strict=True)
             )
-            return sum(others, first)
+            return sum(other_terms, first_term)
 
     @cached_property
     def _derivatives(self) -> list[Any]:
@@ -287,12 +287,11 @@ class SystemOver:
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
         """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's equation; not modulo 2."""
-        half = self.field.convert(fmpq(1, 2))
+        one_half = self.field.convert(fmpq(1, 2))
         column_x, column_y = self.field.column(x), self.field.column(y)
         with self.field.working():
-            return tuple(
-                (self.hessian_times(x) * column_y * half + self.B * (column_x + column_y) * half + self.c).entries()
-            )
+            mean = (column_x + column_y) * one_half
+            return tuple((self.hessian_times(x) * column_y * one_half + self.B * mean + self.c).entries())
 
 
 def as_system(value: Any) -> QuadraticSystem:

@@ -34,62 +34,63 @@ def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int
     """
     if len(start) != system.dim:
         raise InputError(f"found a point with {len(start)} coordinates, expected {system.dim}")
-    exact, end = [rational(entry) for entry in start], rational(time)
-    if all(value == 0 for value in system.over(QQ).value(exact)):
-        return [arb(entry) for entry in exact]
-    working = bits + 32
-    while working <= _MAX_BITS:
-        with RR(working).working():
-            x = _solution(system, [arb(entry) for entry in exact], end, working)
+    exact_start, end_time = [rational(entry) for entry in start], rational(time)
+    if all(value == 0 for value in system.over(QQ).value(exact_start)):
+        return [arb(entry) for entry in exact_start]
+    precision = bits + 32
+    while precision <= _MAX_BITS:
+        with RR(precision).working():
+            x = _integrate(system, [arb(entry) for entry in exact_start], end_time, precision)
             if x is None:
                 return None
             if max(ball.rad() for ball in x) <= max(abs(ball.mid()) for ball in x) * arb(2) ** -bits:
                 return x
-        working *= 2
+        precision *= 2
     return None
 
 
-def _solution(system: QuadraticSystem, x: list[arb], time: fmpq, bits: int) -> list[arb] | None:
+def _integrate(system: QuadraticSystem, x: list[arb], time: fmpq, bits: int) -> list[arb] | None:
     equations = []
     for polynomial in system.rhs:
         terms = []
         for monomial, coefficient in polynomial.terms():
             terms.append((arb(coefficient), [k for k, power in enumerate(monomial) for _ in range(int(power))]))
         equations.append(terms)
-    pairs = sorted({tuple(at) for terms in equations for _, at in terms if len(at) == 2})
+    index_pairs = sorted({tuple(indices) for terms in equations for _, indices in terms if len(indices) == 2})
     degree = bits // 2 + 1  # sufficient for r <= 1/4
-    for taken in range(_MAX_STEPS):
+    for step_count in range(_MAX_STEPS):
         size = max(abs(entry).upper() for entry in x)
         scales = [size, 4 * size, arb(1)] if size > 0 else [arb(1)]
         rates = [
-            max(sum(abs(c) * s ** (len(at) - 1) for c, at in terms) for terms in equations if terms) for s in scales
+            max(sum(abs(c) * s ** (len(indices) - 1) for c, indices in terms) for terms in equations if terms)
+            for s in scales
         ]
         rate, scale = min(((rate * (size / s + 1)).upper(), s) for rate, s in zip(rates, scales, strict=True))
-        parts = (4 * rate * abs(arb(time))).upper()
-        if not parts < _MAX_STEPS - taken:
+        required_steps = (4 * rate * abs(arb(time))).upper()
+        if not required_steps < _MAX_STEPS - step_count:
             return None
-        step = time / (1 + int(float(parts)))
+        step = time / (1 + int(float(required_steps)))
         coefficients = [[entry] for entry in x]
         for k in range(degree):
             products = {}
-            for i, j in pairs:
+            for i, j in index_pairs:
                 a, b = coefficients[i], coefficients[j]
-                half = sum((a[m] * b[k - m] for m in range(k + 1 if i != j else (k + 1) // 2)), arb(0))
-                products[i, j] = half if i != j else 2 * half + (a[k // 2] ** 2 if k % 2 == 0 else 0)
-            for terms, own in zip(equations, list(coefficients), strict=True):
+                partial_sum = sum((a[m] * b[k - m] for m in range(k + 1 if i != j else (k + 1) // 2)), arb(0))
+                products[i, j] = partial_sum if i != j else 2 * partial_sum + (a[k // 2] ** 2 if k % 2 == 0 else 0)
+            for terms, series in zip(equations, list(coefficients), strict=True):
                 total = arb(0)
-                for c, at in terms:
-                    if len(at) == 2:
-                        total += c * products[at[0], at[1]]
-                    elif at or not k:
-                        total += c * coefficients[at[0]][k] if at else c
-                own.append(total / (k + 1))
+                for c, indices in terms:
+                    if len(indices) == 2:
+                        total += c * products[indices[0], indices[1]]
+                    elif indices or not k:
+                        total += c * coefficients[indices[0]][k] if indices else c
+                series.append(total / (k + 1))
         r = (rate * abs(arb(step))).upper()
         remainder = arb(0, (scale * (size / scale + 1) * r ** (degree + 1) / (1 - r)).upper())
         x = []
-        for own in coefficients:
+        for series in coefficients:
             total = arb(0)
-            for entry in reversed(own):
+            for entry in reversed(series):
                 total = total * arb(step) + entry
             x.append(total + remainder)
         time -= step

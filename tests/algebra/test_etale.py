@@ -138,7 +138,7 @@ def long_elements(field: EtaleAlgebra, count: int) -> list:
 def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
     elements = long_elements(field, 4)
     quotients = [a / b for a in elements for b in elements]
-    monkeypatch.setattr("kahanmaps.algebra.etale._LONG", 10**9)
+    monkeypatch.setattr("kahanmaps.algebra.etale._LONG_BITS", 10**9)
     assert [a / b for a in elements for b in elements] == quotients
 
 
@@ -147,11 +147,11 @@ def test_both_ways_to_a_product_lead_to_the_same(field, monkeypatch):
     elements = [*long_elements(field, 3), field.convert(7**900)]
     products = [a * b for a in elements for b in elements]
     requested = []
-    product = etale._product
-    monkeypatch.setattr(etale, "_LONG_PRODUCT", 100)
-    monkeypatch.setattr(etale, "_product", lambda *both: requested.append(both) or product(*both))
+    product = etale._karatsuba_product
+    monkeypatch.setattr(etale, "_MIN_KARATSUBA_BITS", 100)
+    monkeypatch.setattr(etale, "_karatsuba_product", lambda *both: requested.append(both) or product(*both))
     assert [a * b for a in elements for b in elements] == products
     assert len(requested) == len(products)
-    monkeypatch.setattr(etale, "_MAX_COEFFICIENTS", field.degree - 1)  # with more coefficients FLINT is faster
+    monkeypatch.setattr(etale, "_MAX_KARATSUBA_TERMS", field.degree - 1)  # with more coefficients FLINT is faster
     assert elements[0] * elements[1] == products[1]
     assert len(requested) == len(products)

@@ -17,7 +17,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import CC, GF, RR, rational
-from kahanmaps.algebra.integers import common_part, divide_exactly, split_by_primes, without
+from kahanmaps.algebra.integers import common_part, coprime_part, divide_exactly, split_by_primes
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.errors import BadPrime, InexactNumber, PrecisionLost
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -164,7 +164,7 @@ def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
 def test_primes_are_taken_away_with_all_their_powers(value, primes):
     left, taken = split_by_primes(fmpz(value), fmpz(primes))
     assert left * taken == value
-    assert without(fmpz(value), fmpz(primes)) == left
+    assert coprime_part(fmpz(value), fmpz(primes)) == left
     assert taken > 0
     assert fmpz(primes).gcd(left) == 1
     assert (fmpz(primes) ** 30) % taken == 0

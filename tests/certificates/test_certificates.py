@@ -19,10 +19,10 @@ from kahanmaps.certificates.certificate import (
     _SEARCHES,
     CHECKERS,
     _claims_of,
-    _commuting,
+    _commuting_claims,
     _known_claims,
     _Planes,
-    _prepared,
+    _prepare,
     certificate,
     certificate_of,
 )
@@ -115,7 +115,7 @@ def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tm
 def claims_of(name: str, kind: str):
     """The claims with this name about the map of a system, or the first one that a search finds."""
     file = load(name)
-    formulas, data = _prepared(file, "gp")
+    formulas, data = _prepare(file, "gp")
     known = dict(_known_claims(formulas, _Planes(file, data)))
     return known[kind]() if kind in known else _claims_of(_SEARCHES[kind](file), data)[:1]
 
@@ -130,7 +130,8 @@ def changed(claim):
     if isinstance(claim, InvariantTensor):
         return replace(claim, upper={pair: P + (pair == (0, 1)) for pair, P in claim.upper.items()})
     if isinstance(claim, ChangedFunction):
-        return replace(claim, moved=(claim.moved[0] + claim.moved[0].context().gen(0), claim.moved[1]))
+        P, Q = claim.new_function
+        return replace(claim, new_function=(P + P.context().gen(0), Q))
     if isinstance(claim, ConservedFunction):
         return replace(claim, fraction=changed_products(claim.fraction))
     if isinstance(claim, DarbouxPolynomial):
@@ -185,7 +186,7 @@ def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed
 )
 def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(system, other, checker, tmp_path):
     file = load(system) if other == "associates" else System(system)
-    claims = _commuting(file, _prepared(file, checker)[1], other if other == "associates" else System(other))
+    claims = _commuting_claims(file, _prepare(file, checker)[1], other if other == "associates" else System(other))
     claims = [*[claim for claim in claims if not isinstance(claim, Chain)][:2], claims[-1]]
     assert run(checker, CHECKERS[checker](claims), tmp_path).returncode == 0
     chain = claims[-1]
@@ -205,7 +206,7 @@ def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(che
     text = result.certificate(checker)
     assert "equivalence: f is equivalent to weierstrass at g2 = 64 after (x, y) -> (4*x - 8, 4*y + 4)" in text
     assert run(checker, text, tmp_path).returncode == 0
-    (claim,) = _claims_of(result, _prepared(EQUIVALENT, checker)[1])
+    (claim,) = _claims_of(result, _prepare(EQUIVALENT, checker)[1])
     one = claim.image[0] ** 0
     shifted = replace(claim, image=(claim.image[0] + one, claim.image[1]))
     rows = claim.target.rows
@@ -248,7 +249,7 @@ def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
 def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     file = load("lyness", {"a": 1})
     assert run(checker, certificate(file, checker, period=5), tmp_path).returncode == 0
-    chain = periodic(_prepared(file, checker)[1], 5)
+    chain = periodic(_prepare(file, checker)[1], 5)
     wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
     values = (*chain.values[:2], wrong, *chain.values[3:])
     assert run(checker, CHECKERS[checker]([replace(chain, values=values)]), tmp_path).returncode != 0
@@ -298,7 +299,7 @@ def test_coq_accepts_positive_entropy_from_one_axiom(name, tmp_path):
 @pytest.mark.slow
 def test_coq_refuses_positive_entropy_with_one_number_changed(tmp_path):
     file = load("hietarinta_viallet")
-    data = _prepared(file, "rocq")[1]
+    data = _prepare(file, "rocq")[1]
     claim = positive_entropy(data, data.with_rows(file.map.inverse_rows), is_short=True)
     text, (first, *others) = CHECKERS["rocq"]([claim]), claim.forms[-1]
     wrong = [
@@ -353,7 +354,7 @@ def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_po
 
 
 def test_false_claims_of_each_kind_have_no_certificate():
-    _, data = _prepared(load("euler_top"), "gp")
+    _, data = _prepare(load("euler_top"), "gp")
     x = ring(data.names).gens()
     with pytest.raises(FalseClaim, match="T is no symmetry"):
         affine_symmetry(data, "T", fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), [fmpq(0)] * 3, False)
@@ -474,7 +475,7 @@ def test_maps_with_a_constant_determinant_have_certificates(x_dot, options, chec
 
 
 def test_a_density_that_is_not_invariant_has_no_certificate():
-    _, data = _prepared(load("lotka_volterra"), "gp")
+    _, data = _prepare(load("lotka_volterra"), "gp")
     with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
         invariant_volume(data, "volume", parse_rational_function("x", data.names))
 
@@ -568,7 +569,7 @@ def test_the_time_that_is_said_beforehand_is_that_of_coq_within_a_factor_of_3(na
 
 
 def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():
-    formulas, data = _prepared(load("repaired_icosahedral"), "gp")
+    formulas, data = _prepare(load("repaired_icosahedral"), "gp")
     lines, curve = conserved_function(data, "F", formulas.integrals["F"]).fraction.products
     assert [(factor.degree, factor.exponent) for factor in lines.factors] == [(1, 1), (1, 2), (1, 3)]
     assert [(factor.degree, factor.exponent) for factor in curve.factors] == [(6, 1)]
@@ -576,7 +577,7 @@ def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():
 
 def test_rows_of_the_equation_have_no_common_factor():
     # The second row of this composition of two involutions has one, which makes its determinant larger.
-    formulas, data = _prepared(load("qrt_asymmetric"), "gp")
+    formulas, data = _prepare(load("qrt_asymmetric"), "gp")
     assert [len(entry) for row in formulas.equation for entry in row] == [4, 0, 4, 0, 46, 54]
     assert [len(entry) for row in data.rows for entry in row] == [4, 0, 4, 0, 20, 27]
 

@@ -145,7 +145,7 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(is_long, monkeyp
         bounds = broken(control, specialize.bound_objects(result, None, 3))
         monkeypatch.setattr(examined, "bounds", lambda bounds=bounds: bounds)
         statement = ClaimAtPoints(examined, broken_claim)
-        needs, (equation, poles) = statement.needs, statement.bound
+        needs, (equation, poles) = statement.used_names, statement.bound
         functions = specialize.member_functions(result, sorted(needs - {"roots"}), None, 10**9, 3)
         for above, below in difference_sizes(broken_claim, broken(control, functions)):
             assert true_size(above)[0] <= equation.degree, (broken_claim.key, control)

@@ -205,9 +205,9 @@ def test_every_text_is_well_formed_once_it_is_escaped(text):
     [
         markup.table([HOSTILE], [["<b>1</b>"]], HOSTILE),
         markup.definitions([(HOSTILE, "1")]),
-        markup.titled(HOSTILE, "<p>1</p>", HOSTILE),
+        markup.block(HOSTILE, "<p>1</p>", HOSTILE),
         markup.verdict(HOSTILE),
-        markup.listed([markup.escape(HOSTILE)]),
+        markup.bullet_list([markup.escape(HOSTILE)]),
     ],
 )
 def test_no_text_becomes_an_element(html):
@@ -223,6 +223,6 @@ def test_a_verdict_is_a_word_with_a_mark_and_not_only_a_colour(word):
 
 
 def test_short_text_stays_and_long_text_says_its_length():
-    assert markup.shortened("x" * 60) == "x" * 60
-    assert markup.shortened("1" * 5000).endswith("(5000 characters)")
-    assert len(markup.shortened("1" * 5000)) < 90
+    assert markup.abbreviate("x" * 60) == "x" * 60
+    assert markup.abbreviate("1" * 5000).endswith("(5000 characters)")
+    assert len(markup.abbreviate("1" * 5000)) < 90

@@ -8,7 +8,7 @@ from flint import fmpq
 import kahanmaps as km
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.laboratory.growth.curves import Line, reduced
+from kahanmaps.laboratory.growth.curves import Line, reduce_map
 from kahanmaps.laboratory.laboratory import Laboratory
 
 ROTATIONS = "m' = q*(a*p + d) - e*p; p' = -q*m; q' = p*m"
@@ -52,7 +52,7 @@ CASES = [(text, dict(zip(names.split(), v, strict=True)), d) for text, names, so
 @pytest.mark.parametrize(("equations", "values", "expected"), CASES, ids=[f"{t[:4]} {v}" for t, v, _ in CASES])
 def test_degrees_at_special_members(equations, values, expected):
     rng = random.Random(1)
-    line = Line(reduced(km.System(equations, **values).map, None, rng), rng, Budget(), 10**6)
+    line = Line(reduce_map(km.System(equations, **values).map, None, rng), rng, Budget(), 10**6)
     count = 5 if "v'" in equations else 6
     degrees = []
     for n in range(count):

@@ -221,7 +221,7 @@ def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_n
     bad, good = jobs_of(1, leave=3), jobs_of(1, kind="other", sleep=1)  # nobody has printed a record meanwhile
     records = {record.key: record for record in done(workers, [*bad, *good])}
     assert (tmp_path / "tries").stat().st_size == TRIES + 1
-    assert (list(workers._again), workers._groups) == ([], {})  # nor is it tried again when it is told
+    assert (list(workers._retries), workers._groups) == ([], {})  # nor is it tried again when it is told
     lost = records[bad[0].task.key]
     assert (lost.outcome, lost.message) == (Outcome.LOST, "the worker's command ended with status 3")
     assert records[good[0].task.key].is_ok

@@ -83,7 +83,7 @@ def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
 @pytest.fixture
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Records are handed on as they come."""
-    monkeypatch.setattr("kahanmaps.experiments.running.run._SHARED", 0)
+    monkeypatch.setattr("kahanmaps.experiments.running.run._COLLECTION_FACTOR", 0)
 
 
 class Scripted:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
-from kahanmaps.laboratory.growth.curves import reduced
+from kahanmaps.laboratory.growth.curves import reduce_map
 from kahanmaps.laboratory.growth.degree_bounds import (
     bound_dynamical_degree,
     degree_above,
@@ -103,7 +103,7 @@ def test_printed_bounds_are_rounded_outward():
 
 def test_a_map_that_is_not_birational_is_refused(monkeypatch):
     rng = random.Random(1)
-    good = reduced(load("mcmillan").map, None, rng)
+    good = reduce_map(load("mcmillan").map, None, rng)
     assert is_birational(good, rng)
     kahan = as_map(QuadraticSystem.from_text(["x", "y"], ["x", "y^2"]))
     assert not is_birational(kahan.at(GF(PRIME).convert(fmpq(-1)), GF(PRIME)), rng)  # into a line

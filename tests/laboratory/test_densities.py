@@ -90,16 +90,16 @@ def test_the_check_by_definition_refutes_a_wrong_density():
 
 def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypatch):
     saddle = system("x y", "x", "-y")  # det(I - eps f') = 1 - eps^2
-    assert module._hamiltonian_density(Laboratory(saddle, (), fmpq(1))) is None
-    result = module._hamiltonian_density(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
+    assert module._find_hamiltonian_density(Laboratory(saddle, (), fmpq(1))) is None
+    result = module._find_hamiltonian_density(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
     assert (result.verdict, result.function.denominator) == (Certainty.PROVED, 1)
     point = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7))
     determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in (point, (fmpq(0),) * 4)]
     values = [result.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
     assert values[0] * determinants[1] == values[1] * determinants[0] != 0
-    assert module._hamiltonian_density(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
+    assert module._find_hamiltonian_density(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
     monkeypatch.setattr(module, "determinant_polynomial", lambda _: None)
-    assert module._hamiltonian_density(Laboratory(load("henon_heiles"), (), fmpq(1, 2))) is None
+    assert module._find_hamiltonian_density(Laboratory(load("henon_heiles"), (), fmpq(1, 2))) is None
 
 
 def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(monkeypatch):

@@ -9,7 +9,7 @@ from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.laboratory import is_kept_by_flow
+from kahanmaps.laboratory.laboratory import flow_preserves
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
@@ -120,7 +120,7 @@ def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
 def test_the_rate_of_what_depends_on_time_is_decided_by_multiplying_out(factor, kept):
     names = ["x", "y", "z", "eps"]
     I, c = (parse_rational_function(text, names) for text in ("x^2 - 20*z", factor))
-    assert is_kept_by_flow(lorenz("10", "28", "20").system, I, factor=c) is kept
+    assert flow_preserves(lorenz("10", "28", "20").system, I, factor=c) is kept
 
 
 @pytest.mark.parametrize("scale", [10**5, 10**150])

@@ -19,7 +19,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory import laboratory as module
-from kahanmaps.laboratory.laboratory import Laboratory, separated, verdict_on
+from kahanmaps.laboratory.laboratory import Laboratory, separate_planes, verdict_on
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -84,7 +84,7 @@ def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_boun
 
 
 PAPER = load("paper_m2").system
-THERE = separated(PAPER)
+THERE = separate_planes(PAPER)
 
 
 @given(points(4))
@@ -98,7 +98,7 @@ def test_the_map_is_the_same_in_both_coordinates(z):
 
 @pytest.mark.parametrize("name", ["paper_m3_irreducible", "clebsch_first_flow", "euler_top", "henon_heiles"])
 def test_without_planes_over_Q_there_are_no_such_coordinates(name):
-    assert separated(load(name).system) is None
+    assert separate_planes(load(name).system) is None
 
 
 def test_integrals_of_members_are_proved_where_their_planes_separate():

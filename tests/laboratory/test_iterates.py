@@ -14,7 +14,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import Independent
+from kahanmaps.laboratory.modular_points import IndependentGradients
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals
 from kahanmaps.laboratory.preserve.iterates import integrals_in_iterates, verdict_on_ratio
 
@@ -32,7 +32,7 @@ def searched(file, count=6, symbols=()):
     """The laboratory, the integrals in x and those in iterates that do not depend on the affine ones."""
     laboratory = Laboratory(file, symbols)
     map_ = laboratory.maps[0]
-    known = Independent(map_)
+    known = IndependentGradients(map_)
     known.rows = [[int(entry) % map_.prime for entry in v] for v in affine_integrals(laboratory.system)]
     plain, ratios, _ = integrals_in_iterates(laboratory, count, known, Budget())
     return laboratory, len(known.rows), [function for function, *_ in plain], [ratio for ratio, _ in ratios]

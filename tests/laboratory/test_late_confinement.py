@@ -21,7 +21,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.following import StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
     BUDGET_SPENT,
     CONFINED,
@@ -31,7 +31,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     HypersurfaceForm,
     outcome_of,
 )
-from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
+from kahanmaps.laboratory.singular.singularities import Patterns, _merge_patterns, patterns_of, singularities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -215,7 +215,7 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
     form = HypersurfaceForm(x**2 - 2 * z**2, False, None)
     for seed, units in enumerate((1e6, 1e6, 1e6, 1e6, 0)):
-        limits = Range(4, 4, 4, Budget(units), 4)
+        limits = StepLimits(4, 4, 4, Budget(units), 4)
         outcome = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
         if units == 0:
             assert (outcome.status, outcome.note) == (UNDECIDED, BUDGET_SPENT)
@@ -251,4 +251,4 @@ def test_patterns_are_the_fates_of_what_is_contracted(hypersurfaces, expected):
     for status, settled_at, *more in hypersurfaces:
         multiplicity, followed, note = (*more, *(1, 100, "")[len(more) :])
         known.append(Hypersurface("x - 1", 1, False, multiplicity, status, 1, None, (), (), note, followed, settled_at))
-    assert replace(_patterns(1, known), series=()) == expected
+    assert replace(_merge_patterns(1, known), series=()) == expected

@@ -13,7 +13,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
+from kahanmaps.laboratory.laboratory import Laboratory, flow_preserves
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
@@ -55,7 +55,7 @@ def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept)
     assert [limit.conserved.holds for limit in result.limits] == kept
     assert (result.other_integrals, result.lost, result.without_limit) == ((), 0, 0)
     system = load(name).system
-    assert all(is_kept_by_flow(system, limit.leading) for limit in result.limits)
+    assert all(flow_preserves(system, limit.leading) for limit in result.limits)
 
 
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass"])
@@ -170,5 +170,5 @@ def test_a_polarised_map_may_lose_an_integral():
     comparison = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
     assert [integral.text for integral in comparison.other_integrals] == ["x*y^2*(x + y)^3/(x - y + 1)"]
     assert (comparison.limits, comparison.lost) == ((), 1)
-    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, comparison.other_integrals[0].function)
-    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, comparison.other_integrals[0].function)
+    assert flow_preserves(Laboratory(polarised(*FOUR_LINES), flow=True).field, comparison.other_integrals[0].function)
+    assert not flow_preserves(Laboratory(polarised(*DUFFING), flow=True).field, comparison.other_integrals[0].function)

@@ -92,7 +92,7 @@ def test_the_genus_stays_under_birational_maps(text):
 
 
 def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
-    monkeypatch.setattr(module._Reduced, "_add_simple", lambda *_, **__: None)
+    monkeypatch.setattr(module._ModularPlane, "_add_simple", lambda *_, **__: None)
     assert pencil_of("I", integral("x*y"), None) is None
 
 

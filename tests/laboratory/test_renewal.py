@@ -19,8 +19,8 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.following import OrbitData, Range
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed_hypersurfaces
+from kahanmaps.laboratory.singular.following import OrbitData, StepLimits
 from kahanmaps.laboratory.singular.singularities import Patterns, default_eps, patterns
 from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
 from kahanmaps.maps.explicit import explicit_map
@@ -158,15 +158,15 @@ def explicit(*image):
 
 def test_unknown_orders_that_are_needed_derive_nothing():
     costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
-    assert needed([costly, attracted]) == [0, 1]
-    assert needed([costly, replace(attracted, eventually_in=(1,))]) is None
-    assert needed([costly, replace(attracted, eventually_in=(0,))]) is None
-    assert needed([costly, replace(attracted, rows=((0, 0, 2),), eventually_in=(1,))]) == [0]
+    assert needed_hypersurfaces([costly, attracted]) == [0, 1]
+    assert needed_hypersurfaces([costly, replace(attracted, eventually_in=(1,))]) is None
+    assert needed_hypersurfaces([costly, replace(attracted, eventually_in=(0,))]) is None
+    assert needed_hypersurfaces([costly, replace(attracted, rows=((0, 0, 2),), eventually_in=(1,))]) == [0]
     # Through a return as well: the first becomes the third, which costs and is met by the second.
     returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), continues_as=(2, 2))
     chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
-    assert needed(chain) == [0, 1, 2]
-    assert needed([*chain[:2], replace(chain[2], eventually_in=(0,))]) is None
+    assert needed_hypersurfaces(chain) == [0, 1, 2]
+    assert needed_hypersurfaces([*chain[:2], replace(chain[2], eventually_in=(0,))]) is None
     with pytest.raises(ValueError, match="expected known multiplicities"):
         degree_series([2], [(1, costly), (1, replace(attracted, eventually_in=(0,)))])
     # What is not needed does not count.
@@ -189,7 +189,7 @@ def word(*letters, power=1):
 
 def followed(map_, terms, eps=None):
     """The word of a composition, and its degrees as its maps give them, followed one by one."""
-    limits = Range(12, 60, 40, Budget(), 40)
+    limits = StepLimits(12, 60, 40, Budget(), 40)
     result, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     series = degree_series(result.degrees, pairs, [h.stage for h in hypersurfaces])
@@ -220,7 +220,7 @@ def test_words_give_the_measured_degrees(letters, power, terms, expected):
 def test_a_hypersurface_of_another_map_gives_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
-    limits = Range(12, 60, 40, Budget(), 40)
+    limits = StepLimits(12, 60, 40, Budget(), 40)
     result, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     right, wrong = (

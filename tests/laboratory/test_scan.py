@@ -21,7 +21,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.scan import scan as scan_module
 from kahanmaps.laboratory.scan.lift import lift_conjugate_points, lift_hypersurfaces, lift_linear
-from kahanmaps.laboratory.scan.members import Scanned
+from kahanmaps.laboratory.scan.members import ScannedFamily
 from kahanmaps.laboratory.scan.modular_components import find_components
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirm, _continues_as, scan
@@ -76,7 +76,7 @@ def test_everything_is_confirmed_and_nothing_is_left(three_lines):
 
 def test_a_wrong_condition_is_not_confirmed():
     file = parse_system(THREE_LINES)
-    family = Scanned(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
+    family = ScannedFamily(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
@@ -183,9 +183,9 @@ def test_a_curve_that_is_missed_is_said_to_be_one():
     assert "as many as a curve has, so one may have been missed" in scanned.text
 
 
-@pytest.mark.parametrize("stage", ["_confirm", "_measure_growth", "symmetries", "conditions"])
+@pytest.mark.parametrize("stage", ["_confirm", "degree_growth", "symmetries", "conditions"])
 def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
-    def stop(*_):
+    def stop(*_, **__):
         raise TimeLimit
 
     monkeypatch.setattr(scan_module, stage, stop)
@@ -193,7 +193,7 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
     left_out = {
         "conditions": "all conditions for",
         "_confirm": "the confirmation of",
-        "_measure_growth": "the growth on",
+        "degree_growth": "the growth on",
         "symmetries": "changes of parameters",
     }
     known = list(left_out)

@@ -123,7 +123,7 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     model = spaces(first.prime, (*first.values, first.eps), numbers, order)
     branches = find_branches(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
     assert branches is not None
-    assert branches.place == (1, 1)
+    assert branches.position == (1, 1)
     ordered = [
         branches.in_order(spaces(m.prime, (*m.values, m.eps), numbers, order + 5), m) for m in (first, first, second)
     ]

@@ -166,7 +166,7 @@ def test_steps_by_elimination_are_those_by_minors(name, monkeypatch):
     for critical in (
         critical_points(here.equations, None, rng)[0] + critical_points(here.equations, here.inverse.equations, rng)[0]
     ):
-        tangents = outcomes._tangents(critical.point, critical.gradient, field)
+        tangents = outcomes._tangent_vectors(critical.point, critical.gradient, field)
         direction = [rng.randrange(PRIME) for _ in critical.point]
         for moved in (tangents, ()):
             messages = []

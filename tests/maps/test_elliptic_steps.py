@@ -23,7 +23,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
-from kahanmaps.maps.orbits.relations.sections import _of_multiples, forms
+from kahanmaps.maps.orbits.relations.sections import _sections_of_multiples, forms
 from kahanmaps.maps.somos import around, first_terms
 
 BITS = 10_000
@@ -71,7 +71,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees)
     assert orbit.relations is not None
     search = elliptic._Search(map_over.factors, expected[0], stride)
     assert search.numbers() is not None
-    assert [search.sections[place].degree for place in search.new] == degrees
+    assert [search.sections[place].degree for place in search.new_groups] == degrees
 
 
 @pytest.mark.parametrize("name", ["euler_top", "planar_cubic_hamiltonian", "todd", "mcmillan"])
@@ -110,7 +110,7 @@ def sequences(name, stride=None):
 def test_a_wrong_number_is_refuted(name):
     map_over, search, numbers = sequences(name)
     start = begin(map_over)
-    assert elliptic._is_proved(start, search, elliptic._Exact(search, numbers).steps(map_over))
+    assert elliptic._is_proved(start, search, elliptic._ExactCurves(search, numbers).steps(map_over))
     for place, entry in numbers.items():
         coefficients = list(entry.coefficients)
         coefficients[0] += 1
@@ -122,7 +122,7 @@ def test_a_wrong_number_is_refuted(name):
         ):
             wrong = {**numbers, place: changed}
             try:
-                steps = elliptic._Exact(search, wrong).steps(map_over)
+                steps = elliptic._ExactCurves(search, wrong).steps(map_over)
             except ArithmeticError:  # for instance that two curves differ
                 continue
             assert not elliptic._is_proved(start, search, steps)
@@ -136,7 +136,7 @@ def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
     # The equation is of degree 3 + 3 for cubics; 2 * 2 + 2, for the new coordinate in the old ones, and 2 for a double
     # cover: one step more has to agree, after the first ones that are compared.
     map_over, search, numbers = sequences(name, stride)
-    steps = elliptic._Exact(search, numbers).steps(map_over)
+    steps = elliptic._ExactCurves(search, numbers).steps(map_over)
 
     class Wrong(elliptic_steps.EllipticSteps):
         def at(self, number):
@@ -151,17 +151,17 @@ def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
     map_over, search, numbers = sequences("weierstrass")
     points = single_steps(map_over, begin(map_over), 30)
-    bad = elliptic._Exact(search, numbers).steps(map_over)._groups[0][0]._primes
+    bad = elliptic._ExactCurves(search, numbers).steps(map_over)._groups[0][0]._primes
     at, q = next((n, q) for n in range(8, 31) for q in range(50, 500) if points[n].denominator % q == 0 != bad % q)
     X, Y = points[at].numerators
     rows = fmpq_mat(3, 3, numbers[0, 0].coefficients)
     changed = fmpq_mat([[Y, -X, 0], [0, q, 0], [0, 0, 1]]) * rows
     changed = {(0, 0): numbers[0, 0]._replace(coefficients=tuple(changed.entries()))}
     expected = [lowest([Y * x - X * y, q * y], z) for (x, y), z in ((p.numerators, p.denominator) for p in points)]
-    steps = elliptic._Exact(search, changed).steps(map_over)
+    steps = elliptic._ExactCurves(search, changed).steps(map_over)
     assert [steps.at(n) for n in range(4, 31)] == expected[4:]
     monkeypatch.setattr(elliptic, "common_primes", lambda *_: fmpq(1))
-    steps = elliptic._Exact(search, changed).steps(map_over)
+    steps = elliptic._ExactCurves(search, changed).steps(map_over)
     assert steps.at(at) != expected[at]
     assert steps.at(at).rationals() == expected[at].rationals()
 
@@ -257,7 +257,8 @@ def test_curves_of_any_degree(degree, size):
 def test_sections_of_multiples_are_a_basis_and_belong_to_their_degree(degree):
     W, U = (around(WARD[0], 20), around(WARD[1], 20, WARD[0]))
     rows = [
-        [*forms(degree + 1, W, U, n), *(U[n] * entry for entry in _of_multiples(degree, W, n))] for n in range(2, 18)
+        [*forms(degree + 1, W, U, n), *(U[n] * entry for entry in _sections_of_multiples(degree, W, n))]
+        for n in range(2, 18)
     ]
     assert len(rows[0]) == 2 * degree + 1
     assert fmpq_mat(rows).rank() == degree + 1

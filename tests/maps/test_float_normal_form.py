@@ -28,7 +28,7 @@ from kahanmaps.family.random_members import random_member, random_member_with_ch
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
-from kahanmaps.maps.floats.planar_blocks import _sine, _Unclear, planar_blocks
+from kahanmaps.maps.floats.planar_blocks import _InsufficientPrecision, _sine_of_angle, planar_blocks
 from kahanmaps.maps.floats.starts import starts_in_box
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
@@ -57,10 +57,10 @@ def test_lines_at_right_angles_are_not_parallel():
     for radius in (0, 1e-30):
         entry, small = acb(1), acb(arb(0, radius))
         right, parallel = ([entry, small], [small, entry]), ([entry, small], [entry, small])
-        assert _sine(right, [[entry, small], [small, entry]]) == pytest.approx(1, abs=1e-15)
-        assert _sine(parallel, [[entry, small], [small, entry]]) == 0
-    with pytest.raises(_Unclear):
-        _sine(([entry, entry], [acb(arb(0, 1)), acb(arb(0, 1))]), [[entry, entry], [entry, entry]])
+        assert _sine_of_angle(right, [[entry, small], [small, entry]]) == pytest.approx(1, abs=1e-15)
+        assert _sine_of_angle(parallel, [[entry, small], [small, entry]]) == 0
+    with pytest.raises(_InsufficientPrecision):
+        _sine_of_angle(([entry, entry], [acb(arb(0, 1)), acb(arb(0, 1))]), [[entry, entry], [entry, entry]])
 
 
 def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:

@@ -313,9 +313,9 @@ def test_on_a_smooth_level_it_is_a_multiple_of_the_translation(field, amount):
 @pytest.mark.parametrize("wrong", ["gamma", "digits"])
 def test_with_another_gamma_or_other_digits_the_point_is_another(wrong, monkeypatch):
     block, start = next(iter(planes(Finite(10007), 1, 1)))
-    by_curve, digits = translation._by_curve, translation._digits
+    by_curve, digits = translation._point_by_curve, translation._digits
     if wrong == "gamma":
-        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *others: by_curve(P, gamma + 1, *others))
+        monkeypatch.setattr(translation, "_point_by_curve", lambda P, gamma, *others: by_curve(P, gamma + 1, *others))
     else:
         monkeypatch.setattr(translation, "_digits", lambda n: digits(n + 1))
     assert not same_point(translated(block, start, 50), stepped(block, start, 50)[50])

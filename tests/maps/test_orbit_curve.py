@@ -182,7 +182,7 @@ def test_for_very_small_eps_the_rotation_number_is_proportional_to_eps():
 
 
 def test_coefficients_that_are_too_long_are_undecided_with_a_hint(monkeypatch):
-    monkeypatch.setattr("kahanmaps.maps.orbits.relations.orbit_curve._BITS", 1000)
+    monkeypatch.setattr("kahanmaps.maps.orbits.relations.orbit_curve._MAX_BITS", 1000)
     with pytest.raises(UnknownCurve, match=r"seems to lie on an elliptic curve.*fewer digits"):
         km.geometry("euler_top", SPATIAL, "1/1000003")
 

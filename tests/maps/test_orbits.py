@@ -416,5 +416,5 @@ def test_portions_of_a_float_orbit_give_the_same_file_as_its_points(tmp_path, mo
         writer.header(trajectory.header())
         for point in trajectory:
             writer.point(point.step, point.text, [])
-        writer.end(*trajectory._ended(trajectory.end))
+        writer.end(*trajectory._end_with_float_data(trajectory.end))
     assert (tmp_path / f"a.{form}").read_bytes() == (tmp_path / f"b.{form}").read_bytes()

@@ -133,10 +133,10 @@ def test_some_control_refutes_a_claim_for_m_1(claim):
 
 def test_a_control_leaves_the_unbroken_objects_as_they_were():
     o = point("m=2, split")
-    before = (o.A, o.J, o.third, o.eps, o.roots, o.step_eps, o.minus, o.method)
+    before = (o.A, o.J, o.d3H, o.eps, o.roots, o.step_eps, o.B_at_root, o.method)
     for control in CONTROLS:
         broken(control, o)
-    assert (o.A, o.J, o.third, o.eps, o.roots, o.step_eps, o.minus, o.method) == before
+    assert (o.A, o.J, o.d3H, o.eps, o.roots, o.step_eps, o.B_at_root, o.method) == before
 
 
 # Letter -> what gives it, for every index i of a root.
@@ -162,8 +162,8 @@ def test_a_letter_of_the_library_is_that_of_the_formulas(name, letter):
     result = member(name)
     roots = specialize.rational_roots(result)
     library = specialize.point_over(result, QQ, roots, fmpq(1, 7), random.Random(name), 3)
-    formulas = library.changed(base=None, known_chi=None, draw=library.vector)
-    other = formulas.changed(third=library.third * fmpq(2), roots=roots[::-1], draw=library.vector)
+    formulas = library.replace(base=None, known_chi=None, draw=library.vector)
+    other = formulas.replace(d3H=library.d3H * fmpq(2), roots=roots[::-1], draw=library.vector)
     ours, theirs, wrong = ([values(LETTERS[letter](o, i)) for i in o.each] for o in (library, formulas, other))
     assert ours == theirs
     assert ours != wrong

@@ -155,7 +155,7 @@ def test_every_control_is_refuted_at_a_witness(name):
 
 def test_a_claim_that_no_control_refutes_is_reported(monkeypatch):
     # The control "eps" without its effect: the claim that only it refutes is no check any more.
-    monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.changed()))
+    monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.replace()))
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(6,), controls=True))
     assert verify_module.NOTE_ON_PROOFS not in report.notes
     assert verify_module.NOTE_ON_PROOFS in verify(file("m=2, split"), options=SIXTH).notes

@@ -16,8 +16,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.classical import METHODS, SEPARABLE
 from kahanmaps.maps.floats.float_orbit import FloatOrbit
-from kahanmaps.plots.comparison.compare import _Bins, _edges, compare, small_start
-from kahanmaps.plots.comparison.functions import OfTheImage, functions_of, known_functions, requested_functions
+from kahanmaps.plots.comparison.compare import _bin_edges, _Bins, compare, small_start
+from kahanmaps.plots.comparison.functions import TwoPointFunction, functions_of, known_functions, requested_functions
 from kahanmaps.plots.comparison.plot_compare import clipped_from, plot_comparison
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -220,7 +220,7 @@ def test_integrals_with_the_image_in_them_have_their_exact_values():
     points[1] = np.nan
     hamiltonian, member = file.hamiltonian, file.member
     for integral in (ModifiedHamiltonian(hamiltonian), CommutantIntegral(hamiltonian, member.A, 1)):
-        function = OfTheImage(integral, EPS, "I")
+        function = TwoPointFunction(integral, EPS, "I")
         value = integral.value(QQ, EPS, start)
         assert function.at(start) == value
         result = function(points)
@@ -292,11 +292,11 @@ def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted()
 @pytest.mark.parametrize("portion", [1, 7, 1000, 5000])
 def test_the_largest_of_every_bin_is_kept_however_errors_come(linear, portion):
     errors = np.random.default_rng(1).random((3000, 2))
-    bins = _Bins(_edges(3000, linear))
+    bins = _Bins(_bin_edges(3000, linear))
     for first in range(0, 3000, portion):
         bins.add(first + 1, errors[first : first + portion])
     curve = bins.curve("kahan", "E")
-    edges = _edges(3000, linear)
+    edges = _bin_edges(3000, linear)
     expected = [errors[low:high].max() for low, high in pairwise(edges)]
     assert curve.errors.tolist() == expected
     assert errors.max(axis=1)[curve.steps - 1].tolist() == expected

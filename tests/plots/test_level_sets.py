@@ -13,7 +13,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import ExpressionError, InputError
 from kahanmaps.plots.curves.level_sets import level_curves, levels_through
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, follow_orbits
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
 STARTS = np.array([[-0.5, 0.0], [-0.3, 0.4]])
@@ -22,7 +22,7 @@ STARTS = np.array([[-0.5, 0.0], [-0.3, 0.4]])
 @pytest.fixture(scope="module")
 def weierstrass():
     file = load("weierstrass", {})
-    return file, walked(ensemble_for(file.system, "1/5", STARTS, 200), 200).points
+    return file, follow_orbits(ensemble_for(file.system, "1/5", STARTS, 200), 200).points
 
 
 def distances(points, curves):
@@ -33,7 +33,7 @@ def distances(points, curves):
 
 def test_the_integral_has_its_level_at_every_vertex(weierstrass):
     file, _ = weierstrass
-    function = point_function("modified_H", file.variables, fmpq(1, 5), named=file.integrals)
+    function = point_function("modified_H", file.variables, fmpq(1, 5), known_functions=file.integrals)
     levels = levels_through(function, STARTS)
     curves = level_curves(function, (0, 1), 2, levels, ((-1.5, 1.0), (-2.0, 2.0)))
     for level, pieces in zip(levels, curves, strict=True):
@@ -46,7 +46,7 @@ def test_the_integral_has_its_level_at_every_vertex(weierstrass):
 @pytest.mark.parametrize(("text", "is_kept"), [("modified_H", True), ("-2*x^3 + y^2/2 + 2*x", False)])
 def test_orbits_lie_on_the_curves_of_the_integral_and_leave_those_of_the_energy_of_the_flow(weierstrass, text, is_kept):
     file, points = weierstrass
-    function = point_function(text, file.variables, fmpq(1, 5), named=file.integrals)
+    function = point_function(text, file.variables, fmpq(1, 5), known_functions=file.integrals)
     curves = level_curves(function, (0, 1), 2, levels_through(function, STARTS), ((-1.5, 1.0), (-2.0, 2.0)))
     mesh = 4 / 300  # vertices are at most that far apart along the curve
     farthest = distances(points, curves).max()
@@ -100,9 +100,9 @@ def test_a_value_beyond_the_range_of_doubles_is_missing_without_a_warning():
 
 def test_a_name_is_that_of_an_integral_or_unknown():
     named = {"I1": parse_rational_function("x*y/eps", ["x", "y", "eps"])}
-    assert point_function("I1", ["x", "y"], fmpq(1, 2), named=named)(np.array([2.0, 3.0])) == 12
+    assert point_function("I1", ["x", "y"], fmpq(1, 2), known_functions=named)(np.array([2.0, 3.0])) == 12
     with pytest.raises(InputError, match=r"found the name H, expected one of x, y, eps; integrals are named I1"):
-        point_function("H", ["x", "y"], named=named)
+        point_function("H", ["x", "y"], known_functions=named)
 
 
 def test_text_is_parsed_and_nothing_else_and_eps_needs_a_value():

@@ -14,7 +14,7 @@ from kahanmaps.plots.curves.plane_cubics import (
     ZERO,
     PlaneCubic,
     symmetric_coordinates,
-    transformed,
+    transform_cubic,
 )
 from kahanmaps.plots.curves.plot_invariant_curves import Disc, Rectangle
 
@@ -134,7 +134,7 @@ def test_the_cubic_becomes_symmetric_and_areas_and_values_are_kept(coefficients,
         block = PlanarBlock(*map(arb, coefficients))
         result, matrix = symmetric_coordinates(block)
         f, g, k, l = matrix.entries()
-        a, b, c, d = new = transformed(block, matrix)
+        a, b, c, d = new = transform_cubic(block, matrix)
         assert result == shape
         assert float(f * l - g * k) == pytest.approx(1)
         if sign is not None:

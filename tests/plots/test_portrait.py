@@ -13,8 +13,8 @@ from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import COUNT, automatic_starts, equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
-from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, walked
-from kahanmaps.plots.portraits.windows import fullest_axes, outside, window_of
+from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, follow_orbits
+from kahanmaps.plots.portraits.windows import count_outside, fullest_axes, window_of
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -25,7 +25,7 @@ LOTKA_VOLTERRA = load("lotka_volterra", {}).system
 
 def orbits(count, steps=20):
     starts = np.stack([np.ones(count), 1.5 + np.arange(count) / count], axis=1)
-    return walked(ensemble_for(LOTKA_VOLTERRA, "1/20", starts, steps), steps)
+    return follow_orbits(ensemble_for(LOTKA_VOLTERRA, "1/20", starts, steps), steps)
 
 
 def trajectories(points):
@@ -49,7 +49,7 @@ def test_points_at_a_pole_of_an_axis_or_of_the_color_are_left_out_and_counted():
 
 
 def test_orbits_that_ended_are_not_called_undefined():
-    result = walked(ensemble_for(QuadraticSystem.from_text(["x"], ["x^2"]), "1", np.array([[0.5], [3.0]]), 2), 2)
+    result = follow_orbits(ensemble_for(QuadraticSystem.from_text(["x"], ["x^2"]), "1", np.array([[0.5], [3.0]]), 2), 2)
     # (x~ - x)/2 = x x~ has a pole at x = 1/2
     assert result.ended == {"met a singular matrix I - eps f'": 1}
     assert portrait_of(result, ["step", point_function("x", "x")]).undefined == 0
@@ -57,9 +57,9 @@ def test_orbits_that_ended_are_not_called_undefined():
 
 def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahans_orbit_does_not():
     start, (x, y) = np.array([[1.0, 2.0]]), (1.0, 2.0)
-    euler = walked(MethodEnsemble(LOTKA_VOLTERRA, "1/20", start, "euler"), 100).points
+    euler = follow_orbits(MethodEnsemble(LOTKA_VOLTERRA, "1/20", start, "euler"), 100).points
     np.testing.assert_allclose(euler[1, 0], [x + 0.1 * x * (1 - y), y + 0.1 * y * (x - 1)])
-    kahan = walked(ensemble_for(LOTKA_VOLTERRA, "1/20", start, 2000), 2000).points
+    kahan = follow_orbits(ensemble_for(LOTKA_VOLTERRA, "1/20", start, 2000), 2000).points
     spiral, closed = (points.sum(axis=2) - np.log(points).sum(axis=2) for points in (euler, kahan))
     assert spiral[-1, 0] > spiral[0, 0] + 0.1
     assert np.ptp(closed) < 0.005  # O(eps^2), for ever
@@ -84,7 +84,7 @@ def test_points_outside_the_window_do_not_spoil_the_colors():
 
 def test_points_outside_the_window_are_not_drawn_in_space():
     top = load("euler_top", {}).system
-    result = walked(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
+    result = follow_orbits(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
     axes = [point_function(name, top.variables) for name in top.variables]
     shown = portrait_of(result, axes, window=((0, 2), (-2, 2), (-2, 2)))
     (line, *_) = plot_portrait(shown, STYLE).axes[0].lines
@@ -145,14 +145,14 @@ def test_points_that_are_together_are_all_inside_and_missing_ones_change_nothing
     window = window_of(CIRCLE)
     missing = np.concatenate([CIRCLE, [[np.nan, np.nan]]])
     assert window_of(missing) == window
-    assert outside(missing, window) == 0
+    assert count_outside(missing, window) == 0
 
 
 def test_a_few_points_far_away_are_left_out_and_counted():
     points = np.concatenate([CIRCLE, [[1e9, 0.0], [0.0, -1e12]]])
     window = window_of(points)
     assert all(high - low < 6 for low, high in window)
-    assert outside(points, window) == 2
+    assert count_outside(points, window) == 2
 
 
 def test_starts_stay_in_sight_where_the_orbit_soon_rests():
@@ -231,7 +231,7 @@ def test_a_solution_passes_what_is_a_pole_in_time_and_ends_after_its_time():
 def test_orbits_from_chosen_starts_stay_and_move_and_are_the_same_every_time(name):
     system = load(name, {}).system
     starts = automatic_starts(system, "1/20")
-    points = walked(ensemble_for(system, "1/20", starts, 300), 300).points
+    points = follow_orbits(ensemble_for(system, "1/20", starts, 300), 300).points
     assert starts.shape == (COUNT, system.dim)
     assert np.abs(points).max() < 20
     assert (np.ptp(points, axis=0).max(axis=1) > 1e-3).all()

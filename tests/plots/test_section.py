@@ -6,7 +6,7 @@ import pytest
 from kahanmaps import FloatEnsemble, InputError, load
 from kahanmaps.plots.comparison.functions import requested_axis
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.section import crossings_of, hyperplane_of, plot_section, restricted_to, section_of
+from kahanmaps.plots.section import crossings_of, hyperplane_of, plot_section, restrict, section_of
 
 TOP = load("euler_top")
 NAMES = ["x1", "x2", "x3"]
@@ -60,15 +60,15 @@ def test_portions_of_an_orbit_are_joined():
 
 def test_an_integral_is_restricted_to_the_hyperplane():
     plane = point_function("x1 - 2*x2 - 1", NAMES)
-    restricted = restricted_to(point_function("x1^2 + x3", NAMES), plane, (1, 2))
+    restricted = restrict(point_function("x1^2 + x3", NAMES), plane, (1, 2))
     assert restricted(np.array([7.0, 2.0, 3.0])) == 28
-    assert restricted_to(point_function("x1^2 + x3", NAMES), plane, (0, 1)) is None
+    assert restrict(point_function("x1^2 + x3", NAMES), plane, (0, 1)) is None
 
 
 def test_the_level_curves_lead_through_the_crossings():
     found = section("1/20")
     axes = [point_function(name, NAMES) for name in ("x2", "x3")]
-    integral = restricted_to(requested_axis(TOP, TOP.at("1/20").eps, "F1"), point_function("x1 - 1/10", NAMES), (1, 2))
+    integral = restrict(requested_axis(TOP, TOP.at("1/20").eps, "F1"), point_function("x1 - 1/10", NAMES), (1, 2))
     figure = plot_section(found, axes, curves=[integral])
     (lines,) = figure.axes[0].collections
     vertices = np.concatenate([path.vertices for path in lines.get_paths()])

@@ -39,12 +39,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
     SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
-    has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; integrals and densities in
-    closed form with their proofs; which integrals of the flow the map conserves, deforms or loses; genus and base
-    points of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their recurrence;
-    heights; symmetries and reversing symmetries; commuting systems; singularity confinement; and whether the system
-    belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps
-    all results hold for every eps.
+    has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; formulas of integrals and
+    densities with their proofs; which integrals of the flow the map conserves, deforms or loses; genus and base points
+    of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their recurrence; heights;
+    symmetries and reversing symmetries; commuting systems; singularity confinement; and whether the system belongs to
+    the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps all
+    results hold for every eps.
 
     Each statement begins with its status. Formulas are "proved" or "supported" as identities in x and eps. A growth of
     degrees is "derived" if it follows from the measured singularity patterns. What was computed modulo primes or along
@@ -57,9 +57,9 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         raise click.UsageError("give --markdown or --json, one of the two")
     require_every_eps(options)
     symbols, eps = symbols_and_eps(options)
-    arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+    arguments = {"symbols": symbols, "eps": eps, **opt.pick(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
-    report = _Report(as_json or markdown)
+    report = _ReportPrinter(as_json or markdown)
     with SearchProgress({**options, "quiet": quiet}) as search:
         report.progress = search
         try:
@@ -85,9 +85,9 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         print_raw("\n".join([*lines, result.work]))
     else:
         report.print_new(result.sections)
-        final = result.conclusion
+        verdict = result.conclusion
         print_stdout("\nverdict", style="bold")
-        print_stdout(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+        print_stdout(verdict.sentence if on_terminal() else f"{verdict.kind}\t{verdict.sentence}", style="bold")
         print_stdout(result.work)
     if search.is_over:
         return 3
@@ -98,13 +98,13 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     return write_certificate({**options, "quiet": quiet}, file.name, result.certificate, status)
 
 
-class _Report:
+class _ReportPrinter:
     """Prints each section of the report as soon as it is final; `is_silent` (other output formats) turns it off."""
 
     def __init__(self, is_silent: bool) -> None:
         self.result: lib.Analysis | None = None
         self.progress: SearchProgress | None = None
-        self._is_silent, self._printed = is_silent, 0
+        self._is_silent, self._printed_count = is_silent, 0
 
     def __call__(self, result: lib.Analysis) -> None:
         is_first, self.result = self.result is None, result
@@ -116,11 +116,11 @@ class _Report:
 
     def print_new(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         """Print the sections that have not been printed yet."""
-        if self.progress is not None and len(sections) > self._printed:
+        if self.progress is not None and len(sections) > self._printed_count:
             self.progress.clear()
-        for name, lines in sections[self._printed :]:
+        for name, lines in sections[self._printed_count :]:
             print_stdout(f"\n{name}", style="bold")
             for line in lines:
                 print_stdout(f"{line.status}\t{formula(line.text)}")
-        self._printed = max(self._printed, len(sections))
+        self._printed_count = max(self._printed_count, len(sections))
         sys.stdout.flush()

@@ -93,14 +93,14 @@ def command() -> None:
     help='Skip systems that cannot be read, and list them in the database (as on_error = "skip" in the spec).',
 )
 @click.option(
-    "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
+    "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more than N tasks (default 1000000)."
 )
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
     help="Use the workers of a dask scheduler that you trust: tls://host:port, tcp://host:port or its file.",
 )
-@click.option("--worker-python", metavar="PATH", help="Python of those workers (default: the path of this one).")
+@click.option("--worker-python", metavar="PATH", help="Path of Python on those workers (default: as here).")
 @click.option(
     "--group-seconds",
     type=click.FloatRange(0, 86400),
@@ -136,21 +136,21 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
         raise click.UsageError("give --jobs or --scheduler, not both: a cluster has its own number of workers")
     db = db or Path(str(spec)).with_suffix(".db").name
     if options["dry_run"]:
-        _dry_run(str(spec), db, options)
+        _print_dry_run(str(spec), db, options)
         return 0
-    return _run(spec, db, options)
+    return _run_tasks(spec, db, options)
 
 
-def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
+def _print_dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
     """Print the tasks that a run of the spec would start."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
-    chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
+    experiments = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     missing = None
     if os.path.exists(db):  # a dry run opens it read-only
         with lib.Store.open(db, readonly=True) as store:
-            done = {row.task.key for row in store.rows() if row.record is not None}
-        missing = len({task.key for experiment in chosen for task in experiment.tasks()} - done)
+            finished_keys = {row.task.key for row in store.rows() if row.record is not None}
+        missing = len({task.key for experiment in experiments for task in experiment.tasks()} - finished_keys)
     if options["as_json"]:
         data = [
             {
@@ -165,37 +165,38 @@ def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
                 ],
                 "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
             }
-            for experiment in chosen
+            for experiment in experiments
         ]
         print_json(
             {
                 **envelope("batch run --dry-run"),
                 "convention": lib.CONVENTION,
                 "spec": path,
-                "tasks": sum(experiment.size for experiment in chosen),
+                "tasks": sum(experiment.size for experiment in experiments),
                 "missing": missing,
                 "experiments": data,
             }
         )
         return
-    for experiment in chosen:
-        print_stdout(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
+    for experiment in experiments:
+        print_stdout(
+            f"{experiment.name}\t{experiment.kind.name}\t{_count_tasks(experiment.size)}\t{experiment.product}"
+        )
         for k in range(min(_TASKS_SHOWN, experiment.size)):
             task = experiment[k]
-            given_options = {name: value for name, value in task.options.items() if value is not None}
-            if "other" in given_options:
-                given_options["other"] = lib.system_words(given_options["other"])
-            print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given_options)}")
+            set_options = {name: value for name, value in task.options.items() if value is not None}
+            if "other" in set_options:
+                set_options["other"] = lib.system_words(set_options["other"])
+            print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(set_options)}")
         if experiment.size > _TASKS_SHOWN:
             print_stdout(f"\t... and {experiment.size - _TASKS_SHOWN} more")
         for system, reason in experiment.skipped:
             print_stdout(f"\tskipped\t{system}\t{reason}")
-    print_stdout(
-        _tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without a result")
-    )
+    total = _count_tasks(sum(experiment.size for experiment in experiments))
+    print_stdout(total if missing is None else f"{total}, {missing} of them without a result")
 
 
-def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
+def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Run the missing tasks; return the exit status."""
     limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
     spec = None if path is None else lib.read_spec(path, **limits)
@@ -216,14 +217,14 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 )
         for name, plan in planned.items():
             if not plan.is_resumed:
-                parts = [_tasks(plan.total)]
-                parts += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
-                parts += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
-                progress.print(f"{name}: {', '.join(parts)}")
-        todo = f"{_tasks(progress.todo)} to do, results go to {db}"
-        progress.print(todo if progress.todo else f"nothing to do: every task has a result in {db}")
+                phrases = [_count_tasks(plan.total)]
+                phrases += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
+                phrases += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
+                progress.print(f"{name}: {', '.join(phrases)}")
+        expected_count = f"{_count_tasks(progress.expected_count)} to do, results go to {db}"
+        progress.print(expected_count if progress.expected_count else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
-        if progress.todo:
+        if progress.expected_count:
             jobs = store.pending(**selection, retry_failed=options["retry_failed"])
             cluster = (options["scheduler"], options["worker_python"])
             processes = options["jobs"] or lib.processors()
@@ -235,7 +236,7 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                         if batch.was_interrupted and not is_announced:  # the handler may interrupt a line
                             is_announced = True
                             if executor.in_flight:
-                                running = _tasks(executor.in_flight)
+                                running = _count_tasks(executor.in_flight)
                                 progress.print(f"finishing {running} in flight (Ctrl-C again ends at once)")
                         if records:  # store them before the next job is submitted
                             store.add(records)
@@ -244,19 +245,19 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                             click.echo(json.dumps({"record": "result", **record.to_json()}))
                 was_interrupted = batch.was_interrupted
         missing = store.count_pending(**selection)
-        data = _status(store, names or ())
-    interrupted = was_interrupted and missing > 0
-    failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
+        data = _status_record(store, names or ())
+    is_interrupted = was_interrupted and missing > 0
+    failed_count = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
     if options["as_json"]:
-        more = {"command": "batch run", "spec": path, "done": dict(progress.outcomes), "missing": missing}
-        print_json({**data, **more, "interrupted": interrupted, "seconds": round(progress.seconds, 3)})
+        run_entries = {"command": "batch run", "spec": path, "done": dict(progress.outcomes), "missing": missing}
+        print_json({**data, **run_entries, "interrupted": is_interrupted, "seconds": round(progress.seconds, 3)})
     elif not options["as_jsonl"]:
         _print_status(data)
     if progress.done:
-        progress.print(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
+        progress.print(f"{_count_tasks(progress.done)} in {duration(progress.seconds)}")
     if progress.lost:
         progress.print(
-            f"{_tasks(progress.lost)} lost without a result: their worker was killed or could not be started "
+            f"{_count_tasks(progress.lost)} lost without a result: their worker was killed or could not be started "
             f"{lib.TRIES} times ({progress.why_lost})"
         )
     command_words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
@@ -268,26 +269,26 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         command_words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
     same_command = as_typed(command_words)
     if missing:
-        prefix = "interrupted: " if interrupted else ""
-        progress.print(f"{prefix}{_tasks(missing)} without a result yet; to continue: {same_command}")
-    if failed:
+        prefix = "interrupted: " if is_interrupted else ""
+        progress.print(f"{prefix}{_count_tasks(missing)} without a result yet; to continue: {same_command}")
+    if failed_count:
         why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-        progress.print(f"{_tasks(failed)} failed, why: {why}; to try again: {same_command} --retry-failed")
-    if interrupted:
+        progress.print(f"{_count_tasks(failed_count)} failed, why: {why}; to try again: {same_command} --retry-failed")
+    if is_interrupted:
         return 130
-    return 3 if failed or missing else 0
+    return 3 if failed_count or missing else 0
 
 
-def _tasks(number: int) -> str:
+def _count_tasks(number: int) -> str:
     return counted(number, "task")
 
 
 class BatchProgress(Progress):
-    """Progress of a batch; `todo` is the expected number of records."""
+    """Progress of a batch; `expected_count` is the expected number of records."""
 
-    def __init__(self, todo: int, quiet: bool) -> None:
+    def __init__(self, expected_count: int, quiet: bool) -> None:
         super().__init__(quiet)
-        self.todo = todo
+        self.expected_count = expected_count
         self.outcomes: Counter[str] = Counter()
         self.why_lost = ""  # message of the task that was lost last
         self._begin = time.monotonic()
@@ -314,12 +315,12 @@ class BatchProgress(Progress):
             if record.outcome == "lost":
                 self.why_lost = record.message
         rate = self.done / max(self.seconds, 1e-9)
-        bad = self.done - self.outcomes["ok"]
-        pieces = [f"{self.done} of {_tasks(self.todo)}", f"{rate:.3g} a second"]
-        if self.done and self.done < self.todo:
-            pieces.append(f"about {duration((self.todo - self.done) / rate)} left")
-        counts = {"running": in_flight, "failed": bad, "lost": self.lost}
-        self(", ".join([*pieces, *(f"{count} {word}" for word, count in counts.items() if count)]))
+        failed = self.done - self.outcomes["ok"]
+        phrases = [f"{self.done} of {_count_tasks(self.expected_count)}", f"{rate:.3g} a second"]
+        if self.done and self.done < self.expected_count:
+            phrases.append(f"about {duration((self.expected_count - self.done) / rate)} left")
+        counts = {"running": in_flight, "failed": failed, "lost": self.lost}
+        self(", ".join([*phrases, *(f"{count} {word}" for word, count in counts.items() if count)]))
 
     def print(self, text: str) -> None:
         """Print a message on its own line."""
@@ -342,14 +343,14 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
     It may be used while a batch is running.
     """
     with lib.Store.open(db, readonly=True) as store:
-        data = _status(store, only)
+        data = _status_record(store, only)
     if as_json:
         print_json(data)
     else:
         _print_status(data)
 
 
-def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
+def _status_record(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
     experiments = store.status()
     _require_experiments(only, [experiment.name for experiment in experiments])
     return {
@@ -371,12 +372,12 @@ def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
+def _require_experiments(only: Sequence[str], names: Sequence[str]) -> None:
     for name in only:
-        if name not in known:
-            hint = suggestion(name, known)
+        if name not in names:
+            hint = suggestion(name, names)
             raise lib.InputError(
-                f"there is no experiment {quoted(name)}, expected one of {', '.join(known) or 'none'}{hint}"
+                f"there is no experiment {quoted(name)}, expected one of {', '.join(names) or 'none'}{hint}"
             )
 
 
@@ -431,7 +432,7 @@ def show(key: str, db: str, as_json: bool) -> None:
                 print_json(data)
                 continue
             click.echo("\n" * (k > 0), nl=False)
-            lines = {
+            entries = {
                 "key": data["key"],
                 "task": data["task"],
                 "in": ", ".join(f"{place['experiment']} {place['number']}" for place in data["places"]) or "no plan",
@@ -440,14 +441,14 @@ def show(key: str, db: str, as_json: bool) -> None:
                 "outcome": "none yet",
             }
             if "outcome" in data:
-                lines["outcome"] = data["outcome"] + (f": {data['message']}" if data["message"] else "")
-                lines |= {name: data[name] for name in ("verdict", "stderr") if data[name]}
-                lines |= {f"result.{name}": value for name, value in (data["result"] or {}).items()}
+                entries["outcome"] = data["outcome"] + (f": {data['message']}" if data["message"] else "")
+                entries |= {name: data[name] for name in ("verdict", "stderr") if data[name]}
+                entries |= {f"result.{name}": value for name, value in (data["result"] or {}).items()}
                 memory = "" if data["peak_memory"] is None else f", {data['peak_memory'] / 1e6:.0f} MB at most"
-                lines["took"] = f"{data['seconds']:.3g} s{memory}, attempts: {data['attempts']}"
+                entries["took"] = f"{data['seconds']:.3g} s{memory}, attempts: {data['attempts']}"
                 versions = ", ".join(f"{name} {number}" for name, number in data["versions"].items())
-                lines["where"] = f"{data['host']}, {data['finished']}, {versions}"
-            for name, value in lines.items():
+                entries["where"] = f"{data['host']}, {data['finished']}, {versions}"
+            for name, value in entries.items():
                 text = value if isinstance(value, str) else json.dumps(value)
                 print_stdout(
                     f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t")
@@ -462,7 +463,7 @@ def show(key: str, db: str, as_json: bool) -> None:
     "--parquet", "form", flag_value="parquet", help="Write the table of --csv with types (needs pyarrow, -o)."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
-@click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions: the same in each run.")
+@click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions, which differ between runs.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
     """Export the results of a database in the order of the plan.
@@ -543,7 +544,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
       kahanmaps batch merge all.db part1.db part2.db
       kahanmaps batch merge A.db B.db
 
-    Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
+    Exit status: 0 done, 2 usage error, 3 some task has different results in two databases (those of TARGET are kept).
     """
     for source in sources:  # check all sources before an empty target is created
         lib.Store.open(source, readonly=True).close()

@@ -31,7 +31,7 @@ _CHECKERS = ("rocq", "gp", "sympy")  # as in kahanmaps.certificates.certificate,
     "all of these); or all that a search proves: integrals, density, poisson, darboux, symmetry, equivalence (to a "
     "system of the catalogue); or entropy: positive entropy of a planar map.",
 )
-@click.option("--all", "everything", is_flag=True, help="Certify all of these claims, also those of searches.")
+@click.option("--all", "everything", is_flag=True, help="Certify all these claims, including the results of searches.")
 @integral_option("Certify that this function of x and eps is an integral.", into="integrals")
 @click.option(
     "--commute",
@@ -73,8 +73,8 @@ def command(system: str | None, checker: str, output: str | None, as_json: bool,
     symmetry, and proves it by identities of polynomials, without kahanmaps. gp and python print true for each identity,
     and end with a status that is not 0 if one does not hold.
 
-    A line on standard error says how many claims and bytes it has, and estimates the seconds that the program takes to
-    check it. --json prints these numbers, and the text unless it goes to FILE.
+    A line on standard error says how many claims and bytes the certificate has, and estimates the seconds that the
+    program takes to check it. --json prints these numbers, and the text unless it goes to FILE.
 
     Exit status: 0 the certificate is written, 1 a claim is false, 2 usage error.
     """
@@ -86,11 +86,11 @@ def command(system: str | None, checker: str, output: str | None, as_json: bool,
         raise click.UsageError("give --commute or --equivalent, not both")
     if (options["by"] is None) != (options["equivalent"] is None):
         raise click.UsageError("--equivalent OTHER and --by EXPRS belong together")
-    other, loading = options["commute"] or options["equivalent"], {**options, "quiet": quiet}
+    other, load_options = options["commute"] or options["equivalent"], {**options, "quiet": quiet}
     if other in (None, "associates"):
-        file = load_system(system, loading)
+        file = load_system(system, load_options)
     else:
-        file, other = load_pair(system, other, loading)
+        file, other = load_pair(system, other, load_options)
     integrals = {name or f"I{k}": text for k, (name, text) in enumerate(options["integrals"], 1)}
     command_words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
     command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []

@@ -28,7 +28,7 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        is_swapped, measured = False, None
+        is_swapped, commutator = False, None
         require_every_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
@@ -36,25 +36,35 @@ def command(name: str) -> click.Command:
         with Progress(options["quiet"]) as progress:
             if check.is_of_pair:
                 pair, start = opt.load_with_start(options, partial(opt.load_pair, system, other), system, other)
-                file, second = pair
-                if is_swapped and second is not None:
-                    file, second = second, file
+                file, second_file = pair
+                if is_swapped and second_file is not None:
+                    file, second_file = second_file, file
                 if options["arithmetic"] == "float":
-                    measured = _measured_commutator(file, second, start, eps2, options)
+                    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
+                    if second_file is None or start is None or eps is None:
+                        raise click.UsageError(
+                            "--arithmetic float needs OTHER, --start X and --eps E (or --time-step H)"
+                        )
+                    initial_point = start.real_approximation() if isinstance(start, lib.AlgebraicPoint) else start
+                    f, g = file.real_approximation, second_file.real_approximation
+                    steps = 1000 if options["steps"] is None else options["steps"]
+                    eps_ratio = 1 if eps2 is None else eps2 / eps
+                    g_map = lib.match_variables(f, g)[0]
+                    commutator = lib.commutator(f.map, g_map, eps, initial_point, steps, eps_ratio)
                     options |= {"start": None, "steps": None}  # `start` and `steps` concern only the float orbit
                 settings = opt.settings_from(options, progress, options["start"] and start)
-                report = check(file, second, settings, eps2)
+                report = check(file, second_file, settings, eps2)
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
-                option, extra = check.claim, dict[str, bool]()
+                option, check_options = check.claim, dict[str, bool]()
                 if option is not None and option.many:
-                    extra["known"] = ("", "known") in claim
-                    claim = {name: option.read(file, text) for name, text in _named(claim, file)} or None
+                    check_options["known"] = ("", "known") in claim
+                    claim = {name: option.read(file, text) for name, text in _name_claims(claim, file)} or None
                 elif option is not None:
                     claim = option.read(file, claim) if claim else None
-                report = check(file, settings, claim, **extra)
-        status = print_report(report, options["as_json"], options["verbose"], options["quiet"], measured)
+                report = check(file, settings, claim, **check_options)
+        status = print_report(report, options["as_json"], options["verbose"], options["quiet"], commutator)
         return write_certificate(options, file.name, report.certificate, status)
 
     run = opt.check_options(certificate_option(run))
@@ -80,8 +90,8 @@ def command(name: str) -> click.Command:
         if check.claim is not None and check.claim.many:
             run = opt.integral_option(check.claim.help, check.claim.flag, "claim")(run)
         elif check.claim is not None:
-            metavar, of_path = check.claim.metavar, click.Path() if check.claim.metavar == "FILE" else None
-            run = click.option(check.claim.flag, "claim", type=of_path, metavar=metavar, help=check.claim.help)(run)
+            metavar, path_type = check.claim.metavar, click.Path() if check.claim.metavar == "FILE" else None
+            run = click.option(check.claim.flag, "claim", type=path_type, metavar=metavar, help=check.claim.help)(run)
         run = opt.system_options(run)
     kind = _PairCommand if check.is_of_pair else click.Command
     lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
@@ -92,19 +102,6 @@ def command(name: str) -> click.Command:
     return click_command
 
 
-def _measured_commutator(
-    file: lib.SystemFile, second: lib.SystemFile | None, start: Any, eps2: Any, options: dict[str, Any]
-) -> lib.Commutator:
-    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
-    if second is None or start is None or eps is None:
-        raise click.UsageError("--arithmetic float needs OTHER, --start X and --eps E (or --time-step H)")
-    if isinstance(start, lib.AlgebraicPoint):
-        start = start.real_approximation()
-    first, other = file.real_approximation, second.real_approximation
-    steps, ratio = options["steps"], 1 if eps2 is None else eps2 / eps
-    return lib.commutator(first.map, lib.matched(first, other)[0], eps, start, 1000 if steps is None else steps, ratio)
-
-
 class _PairCommand(click.Command):
     """A command with an argument SYSTEM and an inline system: f is the system that is typed first, g the other one.
 
@@ -113,25 +110,25 @@ class _PairCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         flags = ("--vars", "--rhs", "--image", "--inverse")
-        inline = next((k for k, word in enumerate(args) if word.partition("=")[0] in flags), len(args))
-        if inline < len(args):
-            before, _, _ = self.make_parser(ctx).parse_args(args[:inline])
-            ctx.meta[_ARGUMENT_IS_FIRST] = isinstance(before.get("system"), str)
+        inline_index = next((k for k, word in enumerate(args) if word.partition("=")[0] in flags), len(args))
+        if inline_index < len(args):
+            parsed, _, _ = self.make_parser(ctx).parse_args(args[:inline_index])
+            ctx.meta[_ARGUMENT_IS_FIRST] = isinstance(parsed.get("system"), str)
         return super().parse_args(ctx, args)
 
 
-def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
+def _name_claims(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
     """Return the claims as pairs of a name and a text, without the word "known".
 
     An integral of the file has its name in the file. Other claims without a name are called I1, I2, ..., skipping names
     in use.
     """
-    of_file = {**file.integrals, **file.integrals_in_iterates}
-    claims = [(name or text if text in of_file else name, text) for name, text in claims]
+    file_integrals = {**file.integrals, **file.integrals_in_iterates}
+    claims = [(name or text if text in file_integrals else name, text) for name, text in claims]
     claims = [claim for claim in claims if claim != ("", "known")]
-    taken = [name for name, _ in claims if name]
-    for name in taken:
-        if taken.count(name) > 1:
+    used_names = [name for name, _ in claims if name]
+    for name in used_names:
+        if used_names.count(name) > 1:
             raise click.UsageError(f"found two integrals of the name {name}, expected different names")
-    free = (f"I{k}" for k in count(1) if f"I{k}" not in {*taken, *file.integrals})
-    return [(name or next(free), text) for name, text in claims]
+    unused_names = (f"I{k}" for k in count(1) if f"I{k}" not in {*used_names, *file.integrals})
+    return [(name or next(unused_names), text) for name, text in claims]

@@ -19,14 +19,14 @@ from kahanmaps_cli.screen.terminal import print_stdout, print_table
 
 @click.command("compare")
 @comparison_options
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Affects only the speed, not the numbers.")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel; it affects only the speed.")
 @click.option("--timings", is_flag=True, help="Measure the seconds of each method (with compilation).")
 @click.option(
     "-o", "--output", type=OutputFile(), metavar="FILE", help="Write the measured curves to FILE.csv or FILE.parquet."
 )
 @opt.output_options
 def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **options: Any) -> int:
-    """Compare Kahan's method with others for SYSTEM: drift of integrals, errors, measured orders, work.
+    """Compare Kahan's method with other methods for SYSTEM: drift of integrals, errors, measured orders, work.
 
     \b
       kahanmaps compare henon_heiles --eps 1/20
@@ -37,13 +37,14 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
       kahanmaps compare "x' = x*(1-y); y' = y*(x-1)" --start 1,2 --eps 1/20
 
     drift is the largest relative error |I(x_n) - I(x_0)|/|I(x_0)| over all steps and initial points (absolute where
-    I(x_0) = 0). Integrals are those of the file, those that theorems give, or those that a quick search finds; one
-    whose limit for eps -> 0 is a constant is normalized. The limits are conserved by the flow, not by the Kahan map.
+    I(x_0) = 0). Integrals are those of the file, those that theorems give, or those that a quick search finds; an
+    integral whose limit for eps -> 0 is a constant is normalized. The limits are conserved by the flow, not by the
+    Kahan map.
 
-    error is that at a fixed time, against a Taylor solution in balls; measured is the order, as the slope between two
-    step sizes. Equations of implicit methods are solved by Newton's method to rounding; orbits in which it fails are
-    counted. symplectic-euler and stormer-verlet need a Hamiltonian T(p) + V(q). yoshida4, suzuki4 and yoshida6 are
-    compositions of Kahan's method, which is symmetric.
+    error is the error at a fixed time, compared with a Taylor solution in balls; measured is the order, the slope
+    between two step sizes. Equations of implicit methods are solved by Newton's method to rounding; orbits in which
+    this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian T(p) + V(q). yoshida4, suzuki4
+    and yoshida6 are compositions of Kahan's method, which is symmetric.
 
     FILE has the columns kind (drift or error), method, function, eps, step, value and evaluations of f.
 
@@ -59,15 +60,15 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
         if not quiet:
             print_stderr(f"{output}: {counted(len(result.rows()), 'row')}")
     if as_json:
-        more = {**lib.eps_record(result.eps), "seed": options["seed"], **result.to_json()}
-        print_json(record_of("compare", result.file, "float", **more))
+        entries = {**lib.eps_record(result.eps), "seed": options["seed"], **result.to_json()}
+        print_json(record_of("compare", result.file, "float", **entries))
     else:
         print_stdout(result.text.partition("\n")[0])
         for table in result.tables():
             print_table(table)
         for sentence in result.remarks():
             print_stdout(sentence)
-    early = early_messages(result)
-    for sentence in () if quiet else early:
+    messages = early_messages(result)
+    for sentence in () if quiet else messages:
         print_stderr(sentence)
-    return 3 if early else 0
+    return 3 if messages else 0

@@ -72,14 +72,14 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     write_text(text, f"{file.name} for {language}", output, quiet)
 
 
-def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
-    """Write a text to standard output, or to a file with a line on standard error; `what` is the kind of text."""
+def write_text(text: str, title: str, output: str | None, quiet: bool) -> None:
+    """Write a text to standard output, or to a file with a line on standard error; `title` is the kind of text."""
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
     lib.write_atomically(output, text.encode())
     if not quiet:
-        print_stderr(f"{output}: {what}, {counted(len(text.splitlines()), 'line')}")
+        print_stderr(f"{output}: {title}, {counted(len(text.splitlines()), 'line')}")
 
 
 def _split(text: str) -> list[str]:

@@ -39,7 +39,8 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
 
     All points of P^n over GF(P) are followed, or random points where there are more than two million (above dimension 6
-    the limit halves with each dimension). Without --eps two values are tried for each prime, as one may be special.
+    the limit halves with each dimension). Without --eps two values of eps are tried for each prime, as one may be
+    special.
 
     A point is indeterminate if the map is not defined there; common factors of the forms of the map are divided out
     first (up to dimension 6). A point is pre-indeterminate if its orbit reaches an indeterminate point, and preperiodic
@@ -61,12 +62,12 @@ def command(system: str | None, **options: Any) -> int:
         runs = []
         limits = {name: options[name] for name in ("samples", "steps") if options[name] is not None}
         for prime in dict.fromkeys(options["primes"]):
-            values = [*options["eps"], *(step / 2 for step in options["time_step"])] or lib.default_eps(prime)
-            for eps in values if file.map.has_eps else [1]:
+            eps_values = [*options["eps"], *(step / 2 for step in options["time_step"])] or lib.default_eps(prime)
+            for eps in eps_values if file.map.has_eps else [1]:
                 if not search.is_over:
                     runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=search))
-        results = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
-        line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(results, runs, strict=True))
+        outcomes = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
+        line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(outcomes, runs, strict=True))
 
         def print_text() -> None:
             map_name = "the Kahan map" if file.is_quadratic else file.map.kind
@@ -82,7 +83,7 @@ def command(system: str | None, **options: Any) -> int:
                 "cycles",
                 file,
                 "exact modulo primes",
-                **opt.given(options, "seed", "samples", steps_requested="steps"),
+                **opt.pick(options, "seed", "samples", steps_requested="steps"),
                 primes=list(dict.fromkeys(options["primes"])),
                 runs=[
                     {

@@ -14,7 +14,7 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-_SHOWN = 8  # maximal number of degrees in a line of a table
+_MAX_SHOWN = 8  # maximal number of degrees in a line of a table
 
 
 # These options are shared with `plot degrees`.
@@ -77,8 +77,8 @@ def command(system: str | None, **options: Any) -> int:
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         growth = measure(file, eps, options, search)
-        more = ", ..." if len(growth.degrees) > _SHOWN else ""
-        line = f"{', '.join(map(str, growth.degrees[:_SHOWN]))}{more}\t{growth.kind_text}"
+        ellipsis = ", ..." if len(growth.degrees) > _MAX_SHOWN else ""
+        line = f"{', '.join(map(str, growth.degrees[:_MAX_SHOWN]))}{ellipsis}\t{growth.kind_text}"
         undecided = ""
         if not is_done(growth, options["terms"]):
             undecided = f"undecided: {growth.unconfirmed}" if growth.unconfirmed else f"stopped early: {growth.message}"
@@ -98,7 +98,7 @@ def command(system: str | None, **options: Any) -> int:
                 "modulo the primes of the lines" if growth.primes else "exact",
                 time_step="generic" if time_step == "every" else time_step,
                 **search.work,
-                **opt.given(options, "max_degree", terms_requested="terms"),
+                **opt.pick(options, "max_degree", terms_requested="terms"),
                 **growth.to_json(),
             )
 
@@ -111,7 +111,7 @@ def measure(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
     """Return the degree growth that the options request."""
-    arguments = opt.given(options, "effort", "max_degree", "seed", max_terms="terms")
+    arguments = opt.pick(options, "effort", "max_degree", "seed", max_terms="terms")
     return lib.degree_growth(file.map, eps, **arguments, steps=options.get("steps"), progress=progress)
 
 

@@ -21,7 +21,7 @@ from kahanmaps_cli.signals import interruptible
 MAX_STEPS = 10**13  # more would take years
 FAILURES_SHOWN = 20
 _MIN_COMPILED_WORK = 5_000_000  # for less work numpy is faster than loading and compiling code
-_SAMPLES = 100  # steps at which integrals are evaluated, unless --every is given
+_MAX_SAMPLES = 100  # steps at which integrals are evaluated, unless --every is given
 _MAX_VALUES = 200_000  # maximal number of values of integrals
 
 
@@ -38,8 +38,8 @@ _MAX_VALUES = 200_000  # maximal number of values of integrals
     "'known' for all known integrals and H."
 )
 @click.option("--radius", type=ExactNumber(), metavar="R", help="Count the orbits that leave max |x_i| <= R.")
-@click.option("--method", type=click.Choice(("generic", "normal-form")), help="By default chosen automatically.")
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Affects only the speed, not the numbers.")
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Method (default: automatic).")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel; it affects only the speed.")
 @click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.output_options
@@ -56,27 +56,28 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble henon_heiles --grid q1=-1:1:40,q2=-1:1:40 \\
           --eps 1/20 --steps 500 --radius 100 --integral known
 
-    The drift of an orbit is the largest |I(x_n) - I(x_0)|; the table has its distribution over the completed orbits.
-    An orbit escapes at the first step with max |x_i| > R, and may return, since Kahan maps have poles.
+    The drift of an orbit is the largest |I(x_n) - I(x_0)|; the table has its distribution over the completed orbits. An
+    orbit escapes at the first step with max |x_i| > R, and may return later, since Kahan maps are unbounded near
+    indeterminacy points.
 
     FILE.npy is an array (records, orbits, dimension): record k holds the points after
     k*K steps, where K is the value of --every. It grows during the computation and is
     valid at all times, also after Ctrl-C. It contains NaN for orbits that ended early. Initial points in text files are
     exact numbers, separated by commas or blanks; # begins a comment, and the first line may name the columns.
 
-    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
     _require_consistent(system, options)
     file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
     eps_value = lib.rational(1) if eps is None else eps
-    named = [pair for pair in options["integrals"] if pair != ("", "known")]
-    claims: dict[str, Any] = lib.functions_along(file, named, in_floats=True)
+    requests = [pair for pair in options["integrals"] if pair != ("", "known")]
+    claims: dict[str, Any] = lib.functions_along(file, requests, in_floats=True)
     integrals: dict[str, Any] = {  # also for --backward: the inverse map has the same integrals
-        name: lib.PointFunction(name, claimed.function, eps_value) for name, claimed in claims.items()
+        name: lib.PointFunction(name, claim.function, eps_value) for name, claim in claims.items()
     }
-    if len(named) < len(options["integrals"]):
-        integrals |= {known.name: known for known in lib.known_functions(file.real_approximation, eps_value)}
+    if len(requests) < len(options["integrals"]):
+        integrals |= {function.name: function for function in lib.known_functions(file.real_approximation, eps_value)}
     file.map.at(eps_value)  # raises the same errors for eps as the command orbit
     starts = requested_starts(file, options)
     normal_form = lib.float_normal_form(file, options["method"])
@@ -98,34 +99,34 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     )
     method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
-        why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
-        print_stderr(f"method {method}: {why}; kernel {ensemble.kernel}")
+        reason = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
+        print_stderr(f"method {method}: {reason}; kernel {ensemble.kernel}")
     # Integrals are evaluated also if only the first and the last point are written.
     record_interval = every or max(1, steps)
     interval = record_interval
     if integrals and not every:
-        interval = max(1, -(-steps // max(1, min(_SAMPLES, _MAX_VALUES // len(starts)))))
+        interval = max(1, -(-steps // max(1, min(_MAX_SAMPLES, _MAX_VALUES // len(starts)))))
     file_of_points = None if output is None else lib.NpyFile(output, starts.shape, "<f8")
     with interruptible(ensemble.interrupt), Progress(quiet) as progress, file_of_points or nullcontext():
-        portions = ensemble.records(steps, interval, progress=lambda k: progress(f"step {k} of {steps}"))
-        for k, points in enumerate(portions):
+        chunks = ensemble.records(steps, interval, progress=lambda k: progress(f"step {k} of {steps}"))
+        for k, points in enumerate(chunks):
             if file_of_points is not None and (interval == record_interval or k == 0):
                 file_of_points.append(points)
         if file_of_points is not None and interval != record_interval and ensemble.step == steps:
             file_of_points.append(ensemble.x[None])
     records = 0 if file_of_points is None else file_of_points.rows
-    failed, near = (ensemble.failed_at >= 0).nonzero()[0].tolist(), ensemble.near_singular
-    near_orbits, near_at = near.nonzero()[0].tolist(), ensemble.near_singular_at
-    first = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
-    where = None if first is None else {"orbit": first, "step": int(near_at[first])}
+    failed_orbits, near_singular = (ensemble.failed_at >= 0).nonzero()[0].tolist(), ensemble.near_singular
+    near_orbits, near_at = near_singular.nonzero()[0].tolist(), ensemble.near_singular_at
+    first_orbit = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
+    first_near = None if first_orbit is None else {"orbit": first_orbit, "step": int(near_at[first_orbit])}
     # The largest drift of each integral over the completed orbits.
-    completed = (ensemble.failed_at < 0).nonzero()[0]
+    completed_orbits = (ensemble.failed_at < 0).nonzero()[0]
     statistics = ensemble.statistics()
-    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed)} for drift in ensemble.drift]
-    for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed) else (), strict=False):
-        worst = int(completed[drift.largest[completed].argmax()])
-        record_of_drift |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
-        record_of_drift["initial"] = json_number(drift.initial[worst])
+    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed_orbits)} for drift in ensemble.drift]
+    for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed_orbits) else (), strict=False):
+        worst_orbit = int(completed_orbits[drift.largest[completed_orbits].argmax()])
+        record_of_drift |= {"largest": lib.json_float(drift.largest[worst_orbit]), "orbit": worst_orbit}
+        record_of_drift["initial"] = json_number(drift.initial[worst_orbit])
         record_of_drift["distribution"] = {key: lib.json_float(x) for key, x in statistics[drift.name].items()}
     results = {
         "orbits": ensemble.n,
@@ -133,16 +134,16 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         "status": "interrupted" if ensemble.step < steps else "completed",
         "steps_taken": ensemble.step,
         "counts": {status: int((ensemble.status == status).sum()) for status in ("completed", "overflow", "singular")},
-        "failures": [{"orbit": orbit, **ensemble.end(orbit).to_json()} for orbit in failed[:FAILURES_SHOWN]],
-        "near_singular": {"steps": int(near.sum()), "orbits": len(near_orbits), "first": where},
+        "failures": [{"orbit": orbit, **ensemble.end(orbit).to_json()} for orbit in failed_orbits[:FAILURES_SHOWN]],
+        "near_singular": {"steps": int(near_singular.sum()), "orbits": len(near_orbits), "first": first_near},
         "drift": drifts,
     }
     if options["radius"] is not None:
-        escaped = ensemble.escaped_at >= 0
+        has_escaped = ensemble.escaped_at >= 0
         results["escaped"] = {
             "radius": lib.format_number(options["radius"]),
-            "orbits": int(escaped.sum()),
-            "completed": int((escaped & (ensemble.failed_at < 0)).sum()),
+            "orbits": int(has_escaped.sum()),
+            "completed": int((has_escaped & (ensemble.failed_at < 0)).sum()),
             "step": statistics["escape step"],
         }
     if as_json:
@@ -163,7 +164,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         )
         print_json(record)
     else:
-        _print(file, eps, options["backward"], ensemble.kernel, results)
+        _print_results(file, eps, options["backward"], ensemble.kernel, results)
     if not quiet and output is not None:
         print_stderr(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
     if not quiet and ensemble.step < steps:
@@ -185,14 +186,14 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results: dict[str, Any]) -> None:
+def _print_results(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results: dict[str, Any]) -> None:
     """Print tab-separated lines, aligned on a terminal."""
     print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
     rows = [("orbits", str(results["orbits"])), ("steps", str(results["steps_taken"])), ("kernel", kernel)]
     rows += [(status, str(number)) for status, number in results["counts"].items()]
     near = results["near_singular"]
-    where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
-    rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{where}"))
+    first = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
+    rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{first}"))
     for drift in results["drift"]:
         text = "no orbit was completed"
         if "largest" in drift:
@@ -202,8 +203,8 @@ def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results:
         rows.append(("drift", f"{drift['name']}\t{text}"))
     if "escaped" in results:
         escaped = results["escaped"]
-        where = f"{escaped['orbits']} of {counted(results['orbits'], 'orbit')}, |x| > {escaped['radius']}"
-        rows.append(("escaped", where + (f"; {escaped['completed']} of them completed" if escaped["orbits"] else "")))
+        text = f"{escaped['orbits']} of {counted(results['orbits'], 'orbit')}, |x| > {escaped['radius']}"
+        rows.append(("escaped", text + (f"; {escaped['completed']} of them completed" if escaped["orbits"] else "")))
     rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in results["failures"]]
     remaining = results["orbits"] - results["counts"]["completed"] - len(results["failures"])
     if remaining:
@@ -212,7 +213,7 @@ def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results:
         print_stdout(f"{name}\t{text}", 15)
     table = [(f"drift of {drift['name']}", drift.get("distribution")) for drift in results["drift"]]
     table += [("escape step", results["escaped"]["step"])] if "escaped" in results else []
-    shown = [(name, numbers) for name, numbers in table if numbers]
-    if shown and results["orbits"] > 1:
-        cells = [[name, *map(short_float, numbers.values())] for name, numbers in shown]
-        print_table([["distribution" if on_terminal() else "# distribution", *shown[0][1]], *cells])
+    distributions = [(name, numbers) for name, numbers in table if numbers]
+    if distributions and results["orbits"] > 1:
+        cells = [[name, *map(short_float, numbers.values())] for name, numbers in distributions]
+        print_table([["distribution" if on_terminal() else "# distribution", *distributions[0][1]], *cells])

@@ -33,7 +33,7 @@ draw_options: Callable[[F], F] = opt.stack(
         help="Bound for the random integer coefficients (default 1 with --generic or --chi, else 2).",
     ),
 )
-DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
+MEMBER_OPTIONS = ("m", "eigenvalues", "generic", "chi", "size")
 
 
 @click.group("family", cls=SuggestingGroup)
@@ -79,18 +79,18 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
             raise click.UsageError(f"found --signs {quoted(signs)}, expected 1 and -1 separated by commas")
         member = lib.FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
     file = lib.SystemFile.from_member(member, name or (file_name(Path(output).stem) if output else "member"))
-    _write(file, output)
+    _write_file(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
         print_stderr(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
 
 
-def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
+def random_member_file(options: dict[str, Any]) -> lib.SystemFile:
     """Return the random member given by the options as a system file; by default m = 3."""
-    drawn = {name: options[name] for name in DRAWN}
-    if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
-        drawn["m"] = 3
-    member = draw_member(**drawn, seed=options["seed"])
+    member_options = {name: options[name] for name in MEMBER_OPTIONS}
+    if member_options["m"] is None and member_options["eigenvalues"] is None and member_options["chi"] is None:
+        member_options["m"] = 3
+    member = draw_member(**member_options, seed=options["seed"])
     return lib.SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
 
 
@@ -134,20 +134,20 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
       kahanmaps family show hamiltonian.toml
       kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
-    For a SYSTEM of kind [hamiltonian] or [system] the command searches for a matrix A with A^T J = J A and
-    A Hess(H) = Hess(H) A^T that is not a multiple of I: such an A makes it a member.
+    For a SYSTEM of kind [hamiltonian] or [system] the command searches for a matrix A with A^T J = J A and A Hess(H) =
+    Hess(H) A^T that is not a multiple of I: such an A makes the system a member.
     """
     file = opt.load_system(system, options)
-    recognised, member = None, file.member
+    structure, member = None, file.member
     if member is None:
         hamiltonian = file.hamiltonian or lib.find_cubic_hamiltonian(file.system)
-        recognised = None if hamiltonian is None else lib.find_family_structure(hamiltonian)
-        if recognised is None:
+        structure = None if hamiltonian is None else lib.find_family_structure(hamiltonian)
+        if structure is None:
             raise lib.InputError(
                 f"{file.name} is of kind [{file.kind}], expected one of kind [family]; the search for a matrix A that "
                 f"makes it a member found none: {lib.why_not_member(hamiltonian)}"
             )
-        member = recognised.member
+        member = structure.member
     data: dict[str, Any] = {
         **envelope("family show"),
         "system": file.name,
@@ -162,9 +162,9 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         "signs": list(member.signs),
         "hamiltonians": [lib.format_polynomial(H) for H in member.chain],
     }
-    if recognised is not None:
+    if structure is not None:
         data["found"] = lib.attributes(
-            recognised, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard"
+            structure, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard"
         )
     form = lib.normal_form(member) if normal_form else None
     if form is not None:
@@ -180,12 +180,12 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         print_json(data)
         return
     print_stdout(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
-    if recognised is not None:
-        print_stdout(f"found by the search for A: {recognised.text}")
+    if structure is not None:
+        print_stdout(f"found by the search for A: {structure.text}")
     print_stdout(data["diagnosis"])
-    if recognised is not None and not recognised.is_standard:
+    if structure is not None and not structure.is_standard:
         print_stdout("x = T y, T =")
-        _print_matrix(recognised.T)
+        _print_matrix(structure.T)
     print_stdout("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
@@ -207,7 +207,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         for part in form.parts:
             root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
             print_stdout(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
-        point = "x" if recognised is None or recognised.is_standard else "y"
+        point = "x" if structure is None or structure.is_standard else "y"
         print_stdout(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
         _print_matrix(form.S)
 
@@ -235,7 +235,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
             raise InputError(f"found {shape}, expected a square matrix, at most {max_dimension} x {max_dimension}")
         A, variables = fmpq_mat(rows), None
     else:
-        member = _member(system, parameters)[1]
+        member = _get_member(system, parameters)[1]
         A, variables = member.A, member.variables
     cubics = lib.cubic_space(A, variables)
     data: dict[str, Any] = {
@@ -279,23 +279,23 @@ def associated(
       kahanmaps check-commute paper_m3_irreducible \\
           associated/paper_m3_irreducible-p-t.toml
 
-    If a factor g of chi is irreducible of degree 2 or more, the list also contains those over Q[t]/g that have the
-    other sign only at one root t of g: systems with the parameter t, "root of g". All other associated systems are
-    conjugates of these, or belong to products of their matrices B_s.
+    If a factor g of chi is irreducible of degree 2 or more, the list also contains the associated systems over Q[t]/g
+    whose sign at one root t of g differs from all other signs: systems with the parameter t, "root of g". All other
+    associated systems are conjugates of these, or belong to products of their matrices B_s.
     """
-    file, member = _member(system, parameters)
-    written: dict[str, lib.SystemFile] = {}
+    file, member = _get_member(system, parameters)
+    files: dict[str, lib.SystemFile] = {}
 
     def with_file(row: dict[str, Any], suffix: str, make_file: Callable[[str], lib.SystemFile]) -> dict[str, Any]:
         if write_to is None:
             return row
         text = "".join("p" if sign > 0 else "m" for sign in row["signs"])
         path = Path(write_to) / f"{file_name(file.name)}-{text}{suffix}.toml"
-        written[str(path)] = make_file(path.stem)
+        files[str(path)] = make_file(path.stem)
         will_write(str(path))
         return {**row, "file": str(path)}
 
-    rows, conjugate = [], []
+    rows, conjugate_rows = [], []
     for associate in member.associated():
         row: dict[str, Any] = {
             "label": associate.label,
@@ -304,23 +304,24 @@ def associated(
             "B": lib.plain(associate.B),
             "K": lib.format_polynomial(associate.K),
         }
-        chosen = lib.FamilyMember(member.A, member.H, associate.signs)
-        rows.append(with_file(row, "", partial(lib.SystemFile.from_member, chosen)))
+        associated_member = lib.FamilyMember(member.A, member.H, associate.signs)
+        rows.append(with_file(row, "", partial(lib.SystemFile.from_member, associated_member)))
     roots = list(member.roots.values())
-    for other in member.conjugate_associates():
+    for conjugate in member.conjugate_associates():
         row = {
-            "root": str(other.root),
-            "symbol": other.name,
-            "signs": list(other.signs),
-            "B_in_powers_of_A": [lib.format_univariate(c.polynomial, other.name) for c in other.coefficients],
-            "K": other.K_text,
+            "root": str(conjugate.root),
+            "symbol": conjugate.name,
+            "signs": list(conjugate.signs),
+            "B_in_powers_of_A": [lib.format_univariate(c.polynomial, conjugate.name) for c in conjugate.coefficients],
+            "K": conjugate.K_text,
         }
-        number = roots.index(other.root) + 1 if len(roots) > 1 else ""
-        conjugate.append(with_file(row, f"-{other.name}{number}", partial(lib.SystemFile.from_conjugate, other)))
+        root_number = roots.index(conjugate.root) + 1 if len(roots) > 1 else ""
+        make_file = partial(lib.SystemFile.from_conjugate, conjugate)
+        conjugate_rows.append(with_file(row, f"-{conjugate.name}{root_number}", make_file))
     if write_to is not None:
         Path(write_to).mkdir(parents=True, exist_ok=True)
-    for name, associate_file in written.items():
-        _write(associate_file, name)
+    for name, associate_file in files.items():
+        _write_file(associate_file, name)
     if as_json:
         print_json(
             {
@@ -328,16 +329,16 @@ def associated(
                 "system": file.name,
                 "factors": [str(f) for f in member.factors],
                 "associated": rows,
-                "conjugate": conjugate,
+                "conjugate": conjugate_rows,
             }
         )
         return
-    named = ", ".join(f"({factor})" for factor in member.factors)
-    print_stdout(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
+    factors = ", ".join(f"({factor})" for factor in member.factors)
+    print_stdout(f"{file.name}: signs belong to the factors {factors}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
         print_stdout(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
-    for row in conjugate:
+    for row in conjugate_rows:
         signs, powers = "".join("+" if sign > 0 else "-" for sign in row["signs"]), ", ".join(row["B_in_powers_of_A"])
         print_stdout(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
 
@@ -350,7 +351,7 @@ def associated(
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
-    """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
+    """Write a quadratic system over the algebra K = Q[t]/(chi) as a system over Q.
 
     \b
       kahanmaps family tensor euler_top --algebra 't^2-2' -o top.toml
@@ -363,23 +364,23 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     density gives a density.
     """
     output = None if output == "-" else output
-    over_algebra, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
-    file = lib.tensor_file(over_algebra, chi)
-    _write(file, output)
+    algebra_file, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
+    file = lib.tensor_file(algebra_file, chi)
+    _write_file(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
-        claimed = len(over_algebra.integrals) * int(chi.degree())
-        print_stderr(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
+        claimed_count = len(algebra_file.integrals) * int(chi.degree())
+        print_stderr(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed_count} integrals inherited")
 
 
-def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
-    file = opt.load_system(reference, {"parameters": parameters})
+def _get_member(system: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
+    file = opt.load_system(system, {"parameters": parameters})
     if file.member is None:
         raise lib.InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member
 
 
-def _write(file: lib.SystemFile, output: str | None) -> None:
+def _write_file(file: lib.SystemFile, output: str | None) -> None:
     text = file.to_toml()
     lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError for an invalid file
     if output is None:

@@ -43,7 +43,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     t^(r-1); the default is then --shape linear in every dimension. 0, f and -f always commute and are left out; --json
     has them, marked in "trivial".
 
-    Exit status: 0 the list is complete, 2 usage error, 3 undecided: there may be more.
+    Exit status: 0 the list is complete, 2 usage error, 3 undecided: there may be more such g.
     """
     file = opt.load_system(system, {**options, "quiet": quiet})
     seed, error_bits = options["seed"], options["error_bits"]

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 
 @click.command("find-density")
 @opt.system_options
-@click.option("--flow", is_flag=True, help="Densities of the differential equation instead of the map.")
+@click.option("--flow", is_flag=True, help="Search for densities of the differential equation instead of the map.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
 @search_options("density")
 def command(system: str | None, **options: Any) -> int:
@@ -31,9 +31,9 @@ def command(system: str | None, **options: Any) -> int:
     polynomials to positive and negative powers, of any degree. If it finds neither, it searches for integrals and tries
     products of powers of their factors too. Every formula is verified as an identity.
 
-    phi times any integral is a density again: the shortest one is shown, --json lists all of them.
+    phi times any integral is a density again: the shortest density found is shown, and --json lists all of them.
 
-    Exit status: 0 if a density was found, 2 for a usage error, 3 if there is none up to the degree that was tried.
+    Exit status: 0 if a density was found, 2 for a usage error, 3 if none was found up to the degree that was tried.
     """
     require_one_form(options)
     if options["flow"] and options["certificate"] is not None:

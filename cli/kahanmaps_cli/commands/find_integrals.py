@@ -42,7 +42,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     help="Search for discrete Darboux polynomials up to this degree instead; with --flow for those of the differential "
     "equation.",
 )
-@click.option("--flow", is_flag=True, help="Integrals of the differential equation, compared with those of the map.")
+@click.option("--flow", is_flag=True, help="Compare integrals of the differential equation with those of the map.")
 @click.option(
     "--max-degree",
     type=click.IntRange(1, 20),
@@ -51,7 +51,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 )
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Search for integrals of the map of SYSTEM: their number, closed forms P/Q, and proofs.
+    """Search for integrals of the map of SYSTEM: their number, formulas P/Q, and proofs.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -67,15 +67,15 @@ def command(system: str | None, **options: Any) -> int:
 
     Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals follows from
     theorems and from orbits, measured modulo primes; every formula is verified as an identity. If there is no formula
-    in x alone, it may contain x~, the image of x, x~~, the image of x~, and so on. --flow reports which integrals of
-    the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
+    in x alone, a formula may contain x~, the image of x, x~~, the image of x~, and so on. --flow reports which
+    integrals of the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
     combination of values; with --json one record per line. Values at which the map does not exist are listed at the
     end.
 
     Exit status: 0 if every integral that theorems give or orbits show has a formula, 2 for a usage error, 3 if some
-    have none, orbits were not measured, or the work or time limit was too small.
+    have no formula, orbits were not measured, or the work or time limit was too small.
     """
     require_one_form(options)
 
@@ -90,7 +90,7 @@ def command(system: str | None, **options: Any) -> int:
             )
         result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
-        line = f"{_count(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
+        line = f"{_count_line(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
         return Cell(line, lambda: record("find-integrals", result, search), lambda: None, result.reason)
 
     if rows_of(options["parameters"], system) is not None:
@@ -103,11 +103,11 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError("--flow cannot be combined with --monomials and --toml, which are for the map")
     if options["sets"] and options["darboux"] is not None:
         raise click.UsageError("give --monomials or --darboux, not both")
-    instead = "--monomials" if options["sets"] else "--darboux" if options["darboux"] is not None else ""
-    if instead and (options["as_toml"] or options["as_latex"]):
-        raise click.UsageError(f"{instead} can be combined with --json, not with --toml and --latex")
-    if instead:
-        return (_bases if options["sets"] else _darboux)(system, options)
+    search_flag = "--monomials" if options["sets"] else "--darboux" if options["darboux"] is not None else ""
+    if search_flag and (options["as_toml"] or options["as_latex"]):
+        raise click.UsageError(f"{search_flag} can be combined with --json, not with --toml and --latex")
+    if search_flag:
+        return (_search_bases if options["sets"] else _search_darboux)(system, options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         find = partial(lib.find_integrals, file, **search_arguments(options, "max_degree"), progress=search)
@@ -122,7 +122,7 @@ def command(system: str | None, **options: Any) -> int:
         return 3 if result.reason else 0
     integrals: list[Any] = [*result.integrals, *result.in_iterates]
     rows = [(integral.name, integral, f"{integral.origin}: ") for integral in integrals]
-    print_search("find-integrals", result, search, options, rows, _count(result))
+    print_search("find-integrals", result, search, options, rows, _count_line(result))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in result.time_dependent:
             prefix = "" if result.flow else "of the n-th point: "
@@ -134,13 +134,13 @@ def command(system: str | None, **options: Any) -> int:
     return write_certificate(options, file.name, result.certificate, 3 if result.reason else 0)
 
 
-def _count(result: Any) -> str:
+def _count_line(result: Any) -> str:
     if not result.profile.nullities and not result.codimension:
         return "orbits\tnot measured"
     return f"found\t{result.formula_count} functionally independent; {result.count_text}"
 
 
-def _darboux(system: str | None, options: dict[str, Any]) -> int:
+def _search_darboux(system: str | None, options: dict[str, Any]) -> int:
     with SearchProgress(options) as search:
         file, degree = opt.load_system(system, options), options["darboux"]
         result = lib.darboux_polynomials(file, degree, **search_arguments(options, "flow"), progress=search)
@@ -153,7 +153,7 @@ def _darboux(system: str | None, options: dict[str, Any]) -> int:
     return write_certificate(options, file.name, result.certificate, status)
 
 
-def _bases(system: str | None, options: dict[str, Any]) -> int:
+def _search_bases(system: str | None, options: dict[str, Any]) -> int:
     if options["symbolic"]:
         raise click.UsageError(
             "--monomials cannot be combined with --symbolic: the null space is measured at random eps"
@@ -165,12 +165,12 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
         rows: list[lib.Basis] = []
         reason = laboratory.defect
         for text in options["sets"]:
-            parts = [part.strip() for part in text.split(",")]
-            if not all(parts):
+            formulas = [f.strip() for f in text.split(",")]
+            if not all(formulas):
                 expected = "polynomials with commas between them: 'x^2,y^2,1'"
                 raise lib.InputError(f"found the set {lib.quoted(text)}, expected {expected}")
             letters = lib.with_iterates(file.variables, lib.iterates_in(text))
-            functions = [lib.parse_polynomial(part, letters, file.parameters) for part in parts]
+            functions = [lib.parse_polynomial(f, letters, file.parameters) for f in formulas]
             for k, function in enumerate(functions):
                 position = f"function {k + 1}"
                 if function.is_zero():
@@ -182,7 +182,7 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
                     )
             try:
                 if not reason:
-                    rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, parts))
+                    rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, formulas))
             except lib.NoPoint as error:
                 reason = str(error)
     note = lib.closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
@@ -204,7 +204,7 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
     for row in rows:
         print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:
-            names = [name for name, same in zip(row.functions, vector, strict=True) if not same]
+            names = [name for name, is_constant in zip(row.functions, vector, strict=True) if not is_constant]
             print_stdout(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
         if not row.agree:
             print_stdout("\tthe orbits that were compared do not agree: try another --seed")

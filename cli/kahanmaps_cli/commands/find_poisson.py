@@ -39,7 +39,7 @@ def command(system: str | None, **options: Any) -> int:
     involution. Products of polynomial integrals with other tensors are left out. Without --eps the formulas contain eps
     (the time step is 2 eps).
 
-    Exit status: 0 if a tensor was found, 2 for a usage error, 3 if there is none up to the degree that was tried.
+    Exit status: 0 if a tensor was found, 2 for a usage error, 3 if none was found up to the degree that was tried.
     """
     require_one_form(options)
     with SearchProgress(options) as search:

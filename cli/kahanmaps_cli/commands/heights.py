@@ -47,7 +47,7 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
 )
 @click.option(
     "--start",
-    "given",
+    "starts",
     type=PointText(),
     multiple=True,
     metavar="X",
@@ -74,31 +74,31 @@ def command(system: str | None, **options: Any) -> int:
     combination of values; with --json one record per line. Values at which the map does not exist are listed at the
     end.
 
-    Exit status: 0 if all orbits whose growth was decided grow alike, 2 for a usage error, 3 if none was decided, they
-    differ, or the work limit was reached.
+    Exit status: 0 if all orbits whose growth was decided grow alike, 2 for a usage error, 3 if no growth was decided,
+    the orbits differ, or the work limit was reached.
     """
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
-        survey = surveyed(file, eps, options, search)
+        survey = survey_heights(file, eps, options, search)
         undecided = f"undecided: {survey.text}" if survey.kind is lib.Growth.UNDECIDED else ""
         if not survey.is_complete:
             undecided = "stopped early: work limit reached before all orbits were finished; raise --effort"
 
         def print_text() -> None:
-            values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
-            each = ", ".join(lib.eps_suffix(value, file.map).removeprefix(", eps = ") for value in values)
-            eps = f", eps = {each}" if file.map.has_eps else ""
+            eps_values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
+            eps_text = ", ".join(lib.eps_suffix(value, file.map).removeprefix(", eps = ") for value in eps_values)
+            eps = f", eps = {eps_text}" if file.map.has_eps else ""
             print_stdout(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
             print_stdout(str(survey))
 
         def record() -> dict[str, Any]:
-            values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
-            steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
-            requested = {**opt.given(options, "seed", "steps", "max_digits"), **search.work}
+            eps_values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
+            steps = [str(step) for value in eps_values if (step := lib.time_step(value, file.map)) is not None]
+            entries = {**opt.pick(options, "seed", "steps", "max_digits"), **search.work}
             return record_of(
-                "heights", file, "exact", eps=lib.plain(list(values)), time_step=steps, **requested, **survey.to_json()
+                "heights", file, "exact", eps=lib.plain([*eps_values]), time_step=steps, **entries, **survey.to_json()
             )
 
         return Cell(survey.text, record, print_text, undecided)
@@ -108,17 +108,17 @@ def command(system: str | None, **options: Any) -> int:
 
 def require_heights(options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other."""
-    if options["count"] is not None and options["given"]:
+    if options["count"] is not None and options["starts"]:
         raise click.UsageError("give --start X or --random N, not both")
 
 
-def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
+def survey_heights(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
     """Run the survey with the given options."""
     return lib.height_survey(
         file.map,
         eps,
-        starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
+        starts=options["starts"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
         normal_form=file.normal_form,
-        **opt.given(options, "steps", "max_digits", "effort", "seed"),
+        **opt.pick(options, "steps", "max_digits", "effort", "seed"),
         progress=progress,
     )

@@ -45,7 +45,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|.
 
-    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early or --seconds stopped the run.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early or --seconds stopped the run.
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
@@ -58,15 +58,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     eps = opt.eps_of(file, options)
     starts = requested_starts(file, options, count=_DEFAULT_STARTS)
     with SearchProgress({**options, "quiet": quiet}) as search:
-        number_eps = lib.rational(1) if eps is None else eps
-        result = lib.lyapunov_exponents(file.map, starts, number_eps, steps, transient=transient, progress=search)
+        eps_value = lib.rational(1) if eps is None else eps
+        result = lib.lyapunov_exponents(file.map, starts, eps_value, steps, transient=transient, progress=search)
     if as_json:
 
         def number(value: Any) -> float | None:
             return float(value) if isfinite(value) else None  # JSON has no NaN
 
-        lists = {"per_time": result.mean, "per_step": result.per_step, "spread": result.spread}
-        lists["change_from_half"] = result.change
+        arrays = {"per_time": result.mean, "per_step": result.per_step, "spread": result.spread}
+        arrays["change_from_half"] = result.change
         record = record_of(
             "lyapunov",
             file,
@@ -76,7 +76,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             **starts_record(options, result.orbits),
             steps_requested=steps,
             **lib.attributes(result, "orbits", "ended", "steps", "transient", "stopped"),
-            **{name: [number(value) for value in values] for name, values in lists.items()},
+            **{name: [number(value) for value in values] for name, values in arrays.items()},
             sum=number(result.mean.sum()),
             log_volume=number(result.log_volume.mean()) if len(result.log_volume) else None,
             residual=number(result.residual),

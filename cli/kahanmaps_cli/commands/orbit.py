@@ -32,8 +32,8 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="Number of steps.")
-@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
-@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
+@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Compute only these iterates, instead of --steps.")
+@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Write every K-th iterate.")
 @opt.backward_option
 @click.option(
     "--arithmetic",
@@ -49,7 +49,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     help="Method of computation; by default chosen automatically (-v prints it and the reason).",
 )
 @click.option(
-    "--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="Correct digits for ball:auto; default 15."
+    "--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="Correct digits for ball:auto (default 15)."
 )
 @click.option(
     "--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs kahanmaps[fast]."
@@ -58,9 +58,9 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or the "
     "word 'known': all integrals that follow from theorems (not with --arithmetic float)."
 )
-@click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
-@click.option("--format", "form", type=click.Choice(_FORMATS), help="Default: by the suffix of FILE, otherwise text.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.option("--max-digits", type=Whole(1), metavar="N", help="Stop at numbers of over N digits (default 200000).")
+@click.option("--format", "form", type=click.Choice(_FORMATS), help="Output format (default: by FILE, else text).")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.quiet_option
@@ -80,8 +80,8 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
       kahanmaps orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 5
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. Numbers are exact: integers, p/q, decimals.
-    SYSTEM may also be another map than Kahan's; --eps is not needed if the map does not depend on it.
-    Ctrl-C stops after the current step and leaves a valid file; pressed again, it stops at once.
+    SYSTEM may also be another map than Kahan's; --eps is not needed if the map does not depend on eps. Ctrl-C stops
+    after the current step and leaves a valid file; a second Ctrl-C stops at once.
 
     For members of the commuting family steps are computed in normal form, and --at N computes the N-th iterate
     directly, by doublings; modulo P and in balls N may have thirty digits. Over Q indeterminacy points before step N
@@ -89,11 +89,10 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     --integral adds a column with the values of a function.
 
-    Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
+    Exit status: 0 done, 2 usage error, 3 stopped early (indeterminacy point, digit limit, ...), 130 interrupted.
     """
-    _require_consistent(options)
     output = None if output == "-" else output
-    form = _form(options, output)
+    form = _requested_format(options, output)
     options["quiet"] = quiet
     file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
     eps = opt.eps_of(file, options)
@@ -127,7 +126,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
             member=file.member,
             accuracy=options["accuracy"] or 15,
             progress=progress,
-            **opt.given(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
+            **opt.pick(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
         )
     trajectory.integrals = functions
     reason = trajectory.why
@@ -135,11 +134,11 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         print_stderr(reason)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
-    target: Any = sys.stdout if output is None else output
+    destination: Any = sys.stdout if output is None else output
     if is_table:
         from kahanmaps_cli.screen.orbit_table import OrbitTable  # this import loads the library
 
-        target = OrbitTable(target, file.variables, list(functions))
+        destination = OrbitTable(destination, file.variables, list(functions))
     last_step = trajectory.header()["steps"]
     time_left = TimeLeft(last_step)
     is_unread = False  # whether the reader of the pipe (such as head) has closed it
@@ -155,7 +154,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         interruptible(trajectory.interrupt),
         Progress(quiet or on_terminal) as progress,
     ):  # on a terminal the printed points already show the progress
-        end = trajectory.write(target, form, file.name, on_step)
+        end = trajectory.write(destination, form, file.name, on_step)
     if verbose and not quiet and trajectory.why != reason:
         print_stderr(trajectory.why)
     if output is not None and not quiet:
@@ -165,7 +164,8 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
-def _require_consistent(options: dict[str, Any]) -> None:
+def _requested_format(options: dict[str, Any], output: str | None) -> str:
+    """Return the requested format, by default that of the suffix of the output file; refuse contradictory options."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):
         raise click.UsageError("give either --steps N or --at N1,N2,...")
@@ -177,10 +177,6 @@ def _require_consistent(options: dict[str, Any]) -> None:
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"].kind != "float":
         raise click.UsageError("--kernel is for --arithmetic float")
-
-
-def _form(options: dict[str, Any], output: str | None) -> str:
-    """Return the requested format, by default the format given by the suffix of the output file."""
     form: str | None = options["form"]
     if options["as_json"]:
         if form not in (None, "json"):

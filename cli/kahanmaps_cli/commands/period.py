@@ -13,8 +13,8 @@ from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json, record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 
-_STATUS = {"periodic": 0, "aperiodic": 0}
-_WALK = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
+_EXIT_STATUS = {"periodic": 0, "aperiodic": 0}
+_ORBIT_HINT = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
 _LONG_PRIME, _MAX_PRIME = 90, 192  # bits; for primes between these sizes the computation takes seconds to minutes
 
 
@@ -55,8 +55,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     translation.
 
     --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
-    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps also these levels in each plane
-    at a rational root of chi, as values of the integral h/(1 + eps^2 D).
+    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps it also prints these levels in
+    each plane at a rational root of chi, as values of the integral h/(1 + eps^2 D).
 
     Exit status: 0 if the period was found, or proved not to exist, 2 for a usage error or a system without a normal
     form, 3 if undecided, or if the orbit cannot be continued at some point.
@@ -64,21 +64,21 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if (options["levels"] is None) == (options["start"] is None):
         raise click.UsageError("give either --start X or --levels N")
     if options["levels"] is not None:
-        return _levels(system, as_json, options)
+        return _print_levels(system, as_json, options)
     kind, prime = options["arithmetic"]
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, {**options, "quiet": quiet})
     no_period, normal_form = f"no period of {file.name} can be computed", file.normal_form
     if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
-        raise lib.InputError(f"{no_period}: {normal_form.reason}. {_WALK}")
+        raise lib.InputError(f"{no_period}: {normal_form.reason}. {_ORBIT_HINT}")
     eps = requested_eps(options["eps"], options["time_step"])
     # Check eps, prime and initial point as `orbit` does, with the same messages.
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
     if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(
             f"{no_period}: {normal_form.reason}. The map is a translation only if a matrix A makes the system a member "
-            f"of the commuting family with distinct roots of chi. {_WALK}"
+            f"of the commuting family with distinct roots of chi. {_ORBIT_HINT}"
         )
     if not quiet:
         if verbose:
@@ -86,7 +86,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _MAX_PRIME:
             print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     result = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
-    message, status = result.text.splitlines()[0], _STATUS.get(result.status, 3)
+    message, status = result.text.splitlines()[0], _EXIT_STATUS.get(result.status, 3)
     if as_json:
         # Numbers are written as text: many JSON readers cannot represent long periods exactly.
         planes = [
@@ -121,7 +121,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     return status
 
 
-def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
+def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     """Print the level curves with a period, and if a system is given, the level curves in its planes."""
     levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {

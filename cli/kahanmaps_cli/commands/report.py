@@ -11,7 +11,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
 from kahanmaps_cli.params import Section
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
@@ -24,7 +24,7 @@ _ONLY_FOR = {
     "seconds": ("analyze",),
     "explore": ("analyze",),
     "sections": ("verify",),
-    **dict.fromkeys(DRAWN, ("verify", "checks")),
+    **dict.fromkeys(MEMBER_OPTIONS, ("verify", "checks")),
 }
 
 
@@ -93,12 +93,12 @@ def command(system: str | None, **options: Any) -> int:
             from kahanmaps_cli.runs.search import symbols_and_eps
 
             symbols, eps = symbols_and_eps(options)
-            arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+            arguments = {"symbols": symbols, "eps": eps, **opt.pick(options, "effort", "seed"), "processes": 2}
             results: list[lib.Analysis] = []
             try:
                 file = opt.load_system(system, options)
                 lib.analyze(file, **arguments, progress=search, on_result=results.append)
-                page_options["certificate"] = _certificate(file, options)
+                page_options["certificate"] = _write_certificate(file, options)
                 search("the page")
                 html = lib.report_html(results[-1], explore=options["explore"], **page_options)
             except lib.TimeLimit:
@@ -109,8 +109,8 @@ def command(system: str | None, **options: Any) -> int:
             status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
-            draws = not is_named and (is_drawn or options["source"] == "verify")
-            file = drawn_file(options) if draws else opt.load_system(system, options)
+            needs_random_member = not is_named and (is_drawn or options["source"] == "verify")
+            file = random_member_file(options) if needs_random_member else opt.load_system(system, options)
             eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
             settings = lib.Settings(eps=eps, seed=options["seed"], progress=search)
             left_out: list[str] = []
@@ -118,7 +118,7 @@ def command(system: str | None, **options: Any) -> int:
                 reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
             else:
                 reports = []
-                for name, check in sorted(lib.CHECKS.items(), key=lambda named: named[1].is_of_pair):
+                for name, check in sorted(lib.CHECKS.items(), key=lambda item: item[1].is_of_pair):
                     search(name)
                     try:
                         reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))
@@ -126,7 +126,7 @@ def command(system: str | None, **options: Any) -> int:
                         left_out.append(f"{name} does not apply: {error}")
                 if not reports:
                     raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
-            page_options["certificate"] = _certificate(file, options)
+            page_options["certificate"] = _write_certificate(file, options)
             search("the page")
             html = lib.report_html(reports, file=file, left_out=left_out, **page_options)
             verdict = lib.combined(report.verdict for report in reports)
@@ -137,7 +137,7 @@ def command(system: str | None, **options: Any) -> int:
     return status
 
 
-def _certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
+def _write_certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
     """Write the certificate of all claims if requested; return its path relative to the page, "" if not requested."""
     path, page = options["certificate"], options["output"]
     if write_certificate(options, file.name, lambda checker: lib.certificate(file, checker, everything=True)):
@@ -149,19 +149,19 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bo
     """Return whether a system is named, and whether a random member is requested; refuse contradictory options."""
     context = click.get_current_context()
     names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
-    given = [
+    typed_options = [
         name
         for name in names
         if name is not None and context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
     ]
     for name, sources in _ONLY_FOR.items():
-        if name in given and options["source"] not in sources:
+        if name in typed_options and options["source"] not in sources:
             raise click.UsageError(f"{names[name]} is for --from {' or '.join(sources)}")
-    drawn = [name for name in DRAWN if name in given]
+    member_options = [name for name in MEMBER_OPTIONS if name in typed_options]
     is_named = system is not None or bool(options["variables"] or options["rhs"])
-    if drawn and is_named:
-        raise click.UsageError(f"give a SYSTEM or options of a random member ({names[drawn[0]]}), not both")
-    if not is_named and options["parameters"] and (drawn or options["source"] == "verify"):
+    if member_options and is_named:
+        raise click.UsageError(f"give a SYSTEM or options of a random member ({names[member_options[0]]}), not both")
+    if not is_named and options["parameters"] and (member_options or options["source"] == "verify"):
         raise click.UsageError("found -p without SYSTEM, expected a SYSTEM: a random member has no parameters")
     if options["output"] == "-" and sys.stdout.isatty():
         raise click.UsageError("the output is an HTML page: give -o FILE.html, or redirect it")
@@ -170,4 +170,4 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bo
     suffix = Path(options["output"]).suffix
     if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
         raise click.UsageError(f"found the extension {suffix} of {options['output']}, expected .html")
-    return is_named, any(options[name] is not None and options[name] is not False for name in DRAWN)
+    return is_named, any(options[name] is not None and options[name] is not False for name in MEMBER_OPTIONS)

@@ -66,22 +66,22 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
     result, search = run_scan(system, quiet, options)
-    with_member = [component for component in result.components if component.values is not None]
+    member_components = [component for component in result.components if component.values is not None]
     if options["folder"] is not None:
         folder, name = Path(options["folder"]), file_name(result.file.name)
-        paths = [folder / f"{name}-{k}.toml" for k in range(1, len(with_member) + 1)]
+        paths = [folder / f"{name}-{k}.toml" for k in range(1, len(member_components) + 1)]
         folder.mkdir(parents=True, exist_ok=True)
-        earlier = {path for path in folder.iterdir() if re.fullmatch(rf"{re.escape(name)}-\d+\.toml", path.name)}
-        for path in earlier.union(paths):
+        earlier_paths = {path for path in folder.iterdir() if re.fullmatch(rf"{re.escape(name)}-\d+\.toml", path.name)}
+        for path in earlier_paths.union(paths):
             will_write(str(path))
-        for path in earlier.difference(paths):
+        for path in earlier_paths.difference(paths):
             path.unlink()
-        for path, component in zip(paths, with_member, strict=True):
+        for path, component in zip(paths, member_components, strict=True):
             lib.write_atomically(str(path), result.member(component).to_toml().encode())
         if not quiet:
-            print_stderr(f"{options['folder']}: {len(with_member)} system files")
+            print_stderr(f"{options['folder']}: {len(member_components)} system files")
     if options["as_toml"]:
-        for component in with_member:
+        for component in member_components:
             click.echo(f"# {component.text}\n{result.member(component).to_toml()}")
     elif as_json:
         entries = {**lib.eps_record(result.eps, result.file.map), **search.work, **result.to_json()}

@@ -35,7 +35,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     The exceptional hypersurfaces, those that the map contracts, are computed over Q, together with the zeros of the
     denominator det(I - eps f'(x)). Their images are followed along power series modulo large primes. A singularity is
-    confined if after some steps the image is a hypersurface again. Without --eps two values are tried and compared.
+    confined if after some steps the image is a hypersurface again. Without --eps two values of eps are tried and
+    compared.
 
     "ranks" are the dimensions of the images after 1, 2, ... steps, and "pole orders" the multiplicities with which
     they lie in the hyperplane at infinity, called Z, for the first steps. Confined singularities are evidence for
@@ -57,12 +58,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, {**options, "quiet": quiet})
     with SearchProgress({**options, "quiet": quiet}) as search:
         runs = [
-            lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "effort"), progress=search)
+            lib.singularities(file.map, value, **opt.pick(options, "steps", "seed", "effort"), progress=search)
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
             if not search.is_over
         ]
-    agree = len({run.shape for run in runs}) == 1
-    verdict = runs[0].verdict if agree else lib.UNDECIDED
+    is_consistent = len({run.shape for run in runs}) == 1
+    verdict = runs[0].verdict if is_consistent else lib.UNDECIDED
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
         run_keys = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
@@ -119,13 +120,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             print_stdout(
                 "\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
             )
-        print_stdout(f"\n# {runs[0].text if agree else verdict}")
+        print_stdout(f"\n# {runs[0].text if is_consistent else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
-            why = "work limit reached; raise --effort"
-        elif not agree:
-            why = "the two values of eps give different results; choose one with --eps"
+            reason = "work limit reached; raise --effort"
+        elif not is_consistent:
+            reason = "the two values of eps give different results; choose one with --eps"
         else:
-            why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
-        print_stderr(f"undecided: {why}")
+            reason = next(h.note for run in runs for h in run.hypersurfaces if h.note)
+        print_stderr(f"undecided: {reason}")
     return 3 if verdict == lib.UNDECIDED or search.is_over else 0

@@ -69,7 +69,7 @@ def command(
             }
         )
     else:
-        _show(file)
+        _print_system(file)
 
 
 def _summary(file: Any) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _latex(file: Any) -> str:
     return "\n".join(lines)
 
 
-def _show(file: Any) -> None:
+def _print_system(file: Any) -> None:
     print_stdout(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
         print_stdout(f"  {name} = {value}")
@@ -116,11 +116,11 @@ def _show(file: Any) -> None:
         print_stdout(formula(line))
     if file.hamiltonian is not None:
         print_stdout(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
-    claimed = "" if file.catalog else "claimed "  # integrals of the catalogue are verified by tests
+    claim_word = "" if file.catalog else "claimed "  # integrals of the catalogue are verified by tests
     for name, integral in file.integrals.items():
-        print_stdout(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
+        print_stdout(f"{claim_word}integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
-        print_stdout(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
+        print_stdout(f"{claim_word}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
     facts, lines = _structured_facts(file), []
     if facts["verdict"]:
         lines.append(f"verdict: {facts['verdict']}")
@@ -140,8 +140,8 @@ def _show(file: Any) -> None:
             if not relation.dimension
             else f"{relation.dimension} relation{'s' * (relation.dimension > 1)}"
         )
-        what = f"polynomials of {relation.text}" if relation.text.startswith("degree") else relation.text
-        lines.append(f"{count} along an orbit among: {what}")
+        functions = f"polynomials of {relation.text}" if relation.text.startswith("degree") else relation.text
+        lines.append(f"{count} along an orbit among: {functions}")
     if lines:
         print_stdout("for generic parameters and eps:" if file.parameters else "for generic eps:")
     for line in lines:

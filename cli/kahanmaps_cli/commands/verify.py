@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,17 +11,14 @@ from kahanmaps import internals as lib
 from kahanmaps.display import markup
 from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
 from kahanmaps_cli.params import Section
 from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, on_terminal, print_raw, print_stdout, shorten, styled
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-_HOW = {
+_METHOD_NAMES = {
     "symbolic, normal form": "symbolic",
     "symbolic": "symbolic",
     "exact": "exact",
@@ -97,9 +94,9 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --section conclusions  # geometry of the level sets
 
     The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
-    proved by symbolic expansion, by a formal proof or exactly, or supported at random points over GF(p) with a bound on
-    the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with
-    sums over all eigenvalues are only supported.
+    proved by symbolic expansion, by a formal proof or by an exact computation, or supported at random points over GF(p)
+    with a bound on the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m >
+    6 claims with sums over all eigenvalues are only supported.
 
     --certificate FILE also writes the proofs of `kahanmaps certificate` for the member: its integrals, invariant
     measure and Poisson tensor. (`kahanmaps certificate SYSTEM --commute associates` is about its commuting maps.)
@@ -114,15 +111,15 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError(
             "a certificate is about one member: give --certificate without --universal, --beyond and --controls"
         )
-    drawn = {name: options[name] for name in DRAWN}
-    given = [name for name, value in drawn.items() if value is not None and value is not False]
+    member_options = {name: options[name] for name in MEMBER_OPTIONS}
+    typed_options = [name for name, value in member_options.items() if value is not None and value is not False]
     if options["universal"] or options["beyond"]:
-        conflicting = [f"--{name}" for name in given if name != "m"]
+        conflicting = [f"--{name}" for name in typed_options if name != "m"]
         conflicting += ["SYSTEM"] * (system is not None)
         if conflicting:
             flag = "--beyond" if options["beyond"] else "--universal"
             raise click.UsageError(f"found {flag} and {conflicting[0]}, expected {flag} with --m only")
-    elif system is not None and given:
+    elif system is not None and typed_options:
         raise click.UsageError("give either a SYSTEM, or the options of a random member (--m, --eigenvalues, ...)")
     if system is None and options["parameters"]:
         raise click.UsageError("found -p without SYSTEM: a random member has no parameters")
@@ -136,15 +133,16 @@ def command(system: str | None, **options: Any) -> int:
         verify_options = lib.VerifyOptions(
             options["sections"] or None, options["order"], options["ball_bits"], options["controls"], options["beyond"]
         )
+        m = 3 if options["m"] is None else options["m"]
         if options["beyond"] and not options["controls"]:
-            report = lib.beyond_table(3 if drawn["m"] is None else drawn["m"], settings)
+            report = lib.beyond_table(m, settings)
         elif options["universal"] or options["beyond"]:
-            report = lib.verify(None, settings, verify_options, m=3 if drawn["m"] is None else drawn["m"])
+            report = lib.verify(None, settings, verify_options, m=m)
         else:
             if system is not None:
                 file = opt.load_system(system, {"parameters": options["parameters"]})
             else:
-                file = drawn_file(options)
+                file = random_member_file(options)
             report = lib.verify(file, settings, verify_options)
     as_json, verbose = options["as_json"], options["verbose"]
     if report.context.get("beyond") and not as_json:
@@ -172,27 +170,55 @@ def markdown(report: lib.Report) -> str:
         cells = (
             finding.place.get("place", ""),
             markup.code(finding.formula or finding.claim),
-            _how(finding.evidence),
+            _method_text(finding.evidence),
             verdict,
         )
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_count(report)})"])
+    return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_verdict_counts(report)})"])
 
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
+    from rich import box
+    from rich.table import Table
+
     print_stdout(headline(report), style="bold")
     by_section = sections_of(report.findings)
-    others = by_section.pop("", [])
+    unsectioned = by_section.pop("", [])
+    has_controls = bool(report.context.get("controls"))
     for name, findings in by_section.items():
-        console().print(_table(name, findings, verbose, bool(report.context.get("controls"))))
-    for finding in others:
+        table = Table(
+            title=name, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_lines=verbose, expand=True
+        )
+        table.add_column("statement", overflow="fold", min_width=17, max_width=19)
+        table.add_column("formula", overflow="fold", ratio=1)
+        how, how_width = ("violated", 24) if has_controls else ("how", 14)
+        table.add_column(how, overflow="fold", min_width=11, max_width=how_width)
+        table.add_column("verdict", no_wrap=True)
+        for finding in findings:
+            misprint = finding.place.get("misprint")
+            lines = [finding.formula or finding.claim, *([f"misprint: {misprint}"] if misprint else [])]
+            if verbose:
+                lines.append(finding.claim.split(": ", 1)[-1])
+                lines += [f"{evidence.method}: {evidence.summary}" for evidence in (finding.evidence, *finding.also)]
+            if finding.witness is not None and (verbose or not finding.control):
+                lines += witness_lines(finding.witness, NUMBER_WIDTH)
+            verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
+            is_control = has_controls and "violation" in finding.place
+            table.add_row(
+                styled(finding.place["place"]),
+                styled("\n  ".join(lines)),
+                styled(str(finding.place["violation"]) if is_control else _method_text(finding.evidence)),
+                styled(verdict, verdict_style(finding)),
+            )
+        console().print(table)
+    for finding in unsectioned:
         print_stdout(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
             print_stdout(_LEGEND[method])
     # Further evidence, in addition to the evidence for the verdict.
-    also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
-    bounds = [int(str(e.data["error_bound"])[3:]) for e in also if "error_bound" in e.data]
+    all_evidence = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
+    bounds = [int(str(e.data["error_bound"])[3:]) for e in all_evidence if "error_bound" in e.data]
     if bounds:
         sentence = f"also: {len(bounds)} claims held at random points over GF(p)"
         print_stdout(f"{sentence}, each false with probability below 2^-{min(bounds)}")
@@ -204,47 +230,17 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
             print_stdout(f"refuted: {shorten(finding.claim, 200)}")
     for note in report.notes:
         print_stdout(f"note: {note}")
-    print_stdout(f"verdict\t{report.verdict}\t({_count(report)})", 9)
+    print_stdout(f"verdict\t{report.verdict}\t({_verdict_counts(report)})", 9)
 
 
-def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(
-        title=name, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_lines=verbose, expand=True
-    )
-    table.add_column("statement", overflow="fold", min_width=17, max_width=19)
-    table.add_column("formula", overflow="fold", ratio=1)
-    table.add_column("violated" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
-    table.add_column("verdict", no_wrap=True)
-    for finding in findings:
-        misprint = finding.place.get("misprint")
-        lines = [finding.formula or finding.claim, *([f"misprint: {misprint}"] if misprint else [])]
-        if verbose:
-            lines.append(finding.claim.split(": ", 1)[-1])
-            lines += [f"{evidence.method}: {evidence.summary}" for evidence in (finding.evidence, *finding.also)]
-        if finding.witness is not None and (verbose or not finding.control):
-            lines += witness_lines(finding.witness, NUMBER_WIDTH)
-        verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
-        is_control = controls and "violation" in finding.place
-        table.add_row(
-            styled(finding.place["place"]),
-            styled("\n  ".join(lines)),
-            styled(str(finding.place["violation"]) if is_control else _how(finding.evidence)),
-            styled(verdict, verdict_style(finding)),
-        )
-    return table
-
-
-def _how(evidence: lib.Evidence) -> str:
-    method = _HOW.get(evidence.method, evidence.method)
+def _method_text(evidence: lib.Evidence) -> str:
+    method = _METHOD_NAMES.get(evidence.method, evidence.method)
     bound: Any = evidence.data.get("error_bound")
     return f"{method}, {bound}" if bound else method
 
 
-def _count(report: lib.Report) -> str:
-    counted = Counter(str(f.verdict) for f in report.findings if f.applies and not f.control)
-    text = ", ".join(f"{number} {verdict}" for verdict, number in counted.items())
+def _verdict_counts(report: lib.Report) -> str:
+    counts = Counter(str(f.verdict) for f in report.findings if f.applies and not f.control)
+    text = ", ".join(f"{number} {verdict}" for verdict, number in counts.items())
     misprints = sum(1 for f in report.findings if f.place.get("misprint"))
     return text + (f"; {misprints} misprints, refuted as printed" if misprints else "")

@@ -61,17 +61,17 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     system, other = in_order(options["system"], options["other"], options)
     if options["eps2"] is not None and other is None:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
-    file, second = load_pair(system, other, options)
-    eps = eps_of(file if second is None or file.map.has_eps else second, options)
+    file, second_file = load_pair(system, other, options)
+    eps = eps_of(file if second_file is None or file.map.has_eps else second_file, options)
     eps = lib.rational(1) if eps is None else eps
-    chosen = two_variables("--axes", options["axes"], file.variables)
-    if second is None:
+    axes = two_variables("--axes", options["axes"], file.variables)
+    if second_file is None:
         captions, pairs = list[str](), list(lib.pairs_of_member(file))
     else:
-        captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
-        pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
+        captions = [f"{file.labelled('f')}, {second_file.labelled('g')}"]
+        pairs = [lib.pair_of_systems(file, second_file, eps, options["eps2"])]
     squares_of_pairs = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-    figure = lib.plot_squares(squares_of_pairs, options["style"], chosen, captions)
+    figure = lib.plot_squares(squares_of_pairs, options["style"], axes, captions)
     messages = []
     for square in squares_of_pairs:
         names = captions[0] if captions else " and ".join(square.pair.names)
@@ -79,4 +79,4 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         messages += [f"  {square.pair.note}"] * bool(square.pair.note)
         messages += [f"  points are missing: {square.stopped}"] * bool(square.stopped)
     is_partial = any(square.stopped for square in squares_of_pairs)
-    return Drawing(figure, file if second is None else None, messages, 3 if is_partial else 0)
+    return Drawing(figure, file if second_file is None else None, messages, 3 if is_partial else 0)

@@ -50,18 +50,18 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     Exit status: 0 done, 2 usage error, 3 some orbit ended early (the picture is written).
     """
     is_drift = options["show"] == "drift"
-    more = {"orders": not is_drift, "linear_bins": options["scale"] == "semilog"}
+    settings = {"orders": not is_drift, "linear_bins": options["scale"] == "semilog"}
     if not is_drift and not options["integrals"]:
-        more["integrals"] = ()  # no integrals, so that no search is started
-    result = requested_comparison(options, progress, **more)
+        settings["integrals"] = ()  # no integrals, so that no search is started
+    result = requested_comparison(options, progress, **settings)
     figure = lib.plot_comparison(result, options["style"], show=options["show"], scale=options["scale"])
     start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START]
-    others = f" and {len(result.starts) - 1} more" if len(result.starts) > 1 else ""
-    messages = [f"start {start}{others}{lib.eps_suffix(result.eps)}", *result.remarks(), *early_messages(result)]
+    more_starts = f" and {len(result.starts) - 1} more" if len(result.starts) > 1 else ""
+    messages = [f"start {start}{more_starts}{lib.eps_suffix(result.eps)}", *result.remarks(), *early_messages(result)]
     for curve in result.curves:
-        what = f"{curve.function} along {lib.METHODS[curve.method].title}"
+        curve_text = f"{curve.function} along {lib.METHODS[curve.method].title}"
         if curve.undefined:
-            messages.append(f"{what}: no value at {lib.counted(curve.undefined, 'step')}, left out")
+            messages.append(f"{curve_text}: no value at {lib.counted(curve.undefined, 'step')}, left out")
         if is_drift and (curve.errors > (limit := lib.clipped_from(result, curve.function))).any():
-            messages.append(f"{what}: errors above {limit:.0e} are an arrow at the top")
+            messages.append(f"{curve_text}: errors above {limit:.0e} are an arrow at the top")
     return Drawing(figure, result.file, messages, 3 if any(run.early for run in result.runs) else 0)

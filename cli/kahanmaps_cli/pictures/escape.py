@@ -23,7 +23,9 @@ from kahanmaps_cli.screen.progress import SearchProgress
     click.option("--cells", type=Whole(1), metavar="N", default=300, show_default=True, help="N x N initial points."),
     click.option("--steps", type=Whole(1), metavar="N", default=200, show_default=True, help="Number of steps."),
     click.option("--radius", type=ExactNumber(), metavar="R", default=None, help="The ball is max |x_i| <= R (1000)."),
-    click.option("--show", type=click.Choice(["time", "basin"]), default="time", show_default=True, help="Picture."),
+    click.option(
+        "--show", type=click.Choice(["time", "basin"]), default="time", show_default=True, help="What colors show."
+    ),
 )
 def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     """Plot when (or with --show basin, in which direction) float orbits of a plane of initial points leave a ball.
@@ -33,8 +35,8 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
       kahanmaps plot escape lotka_volterra --eps 1/4 --window=-3,3,-3,3 \\
           --show basin -o basins.pdf
 
-    Orbits that stay inside for all steps are white. Kahan maps of integrable systems have poles, past which orbits
-    return: an orbit that leaves the ball need not go to infinity.
+    Orbits that stay inside for all steps are white. Kahan maps are unbounded near indeterminacy points, and orbits may
+    return from there: an orbit that leaves the ball need not go to infinity.
 
     Exit status: 0 done, 2 usage error.
     """

@@ -12,14 +12,14 @@ from kahanmaps import internals as lib
 from kahanmaps.errors import InputError
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.degrees import degree_options, is_done, measure
-from kahanmaps_cli.commands.heights import height_options, require_heights, surveyed
+from kahanmaps_cli.commands.heights import height_options, require_heights, survey_heights
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
 _MAX_BYTES = 64_000_000
 # Statuses of OrbitEnd that count as early ends; a digit limit and a periodic orbit are normal ends.
-_EARLY = ("singular",)
+_EARLY_STATUSES = ("singular",)
 
 _scale_option = click.option(
     "--scale", type=click.Choice(["linear", "log", "loglog"]), help="Scale of the axes (default: by the growth)."
@@ -62,7 +62,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     def add(name: str, growth: lib.DegreeGrowth) -> None:
         """Add a result; a second result of the same name is called name (2)."""
         names = chain([name], (f"{name} ({k})" for k in count(2)))
-        growths[next(free for free in names if free not in growths)] = growth
+        growths[next(unused for unused in names if unused not in growths)] = growth
 
     for path in options["records"]:
         add(*lib.degrees_of_record(read_record(path), path))
@@ -76,7 +76,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     if len(names) > 1 and options["parameters"]:
         raise click.UsageError("-p needs a single SYSTEM: write the systems to files, or use --from")
     files = [opt.load_system(name, options) for name in names]
-    early: list[str] = []
+    messages: list[str] = []
     for file in files:
         if progress.is_over:
             break
@@ -84,12 +84,12 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         def on_progress(sentence: str, name: str = file.label) -> None:
             progress(f"{name}: {sentence}")
 
-        measured = measure(file, eps, options, on_progress)
-        add(file.label, measured)
-        if not is_done(measured, None):
-            early.append(f"{file.label}: stopped early: {measured.message}")
+        measured_growth = measure(file, eps, options, on_progress)
+        add(file.label, measured_growth)
+        if not is_done(measured_growth, None):
+            messages.append(f"{file.label}: stopped early: {measured_growth.message}")
     figure = lib.plot_degrees(growths, options["style"], scale=options["scale"])
-    return Drawing(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
+    return Drawing(figure, files[0] if len(files) == 1 else None, messages, 3 if messages or progress.is_over else 0)
 
 
 @picture(
@@ -104,7 +104,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points (default 3)."),
     click.option(
         "--start",
-        "given",
+        "starts",
         type=PointText(),
         multiple=True,
         metavar="X",
@@ -127,8 +127,8 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     coordinates over a common denominator. Each eps has a color; marks are heights, lines are fits. Results
     read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
-    Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
-    work limit was reached before all orbits were finished (the picture is written).
+    Exit status: 0 done, 2 usage error, 3 some orbit met an indeterminacy point, or
+    the work limit was reached before all orbits were finished (the picture is written).
     """
     require_heights(options)
     file: lib.SystemFile | None = None
@@ -142,17 +142,17 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     else:
         file = opt.load_system(options["system"], options)
         eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
-        survey = surveyed(file, eps, options, progress)
+        survey = survey_heights(file, eps, options, progress)
         curves, is_complete = lib.height_curves(survey), survey.is_complete
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
     messages = []
-    if short := sum(curve.status == "budget" for curve in curves):
-        messages.append(f"{short} of {len(curves)} orbits ended where a number exceeded --max-digits {digits}")
-    if early := sum(curve.status in _EARLY for curve in curves):
-        messages.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
+    if budget_count := sum(curve.status == "budget" for curve in curves):
+        messages.append(f"{budget_count} of {len(curves)} orbits ended where a number exceeded --max-digits {digits}")
+    if early_count := sum(curve.status in _EARLY_STATUSES for curve in curves):
+        messages.append(f"{early_count} of {len(curves)} orbits ended early, at a singular point of the map")
     if not is_complete and not progress.is_over:
         messages.append("stopped early: work limit reached before all orbits were finished; raise --effort")
-    return Drawing(figure, file, messages, 3 if early or not is_complete or progress.is_over else 0)
+    return Drawing(figure, file, messages, 3 if early_count or not is_complete or progress.is_over else 0)
 
 
 def read_record(path: str) -> Any:

@@ -70,17 +70,17 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     messages = [f"{curves.normal_form}; {lib.eps_phrase(lib.eps_record(curves.eps))}"]
     for k, pole in enumerate(curves.poles, 1):
         if pole is not None:
-            which = f"start {k}: " if len(curves.poles) > 1 else ""
-            messages.append(f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
+            orbit_text = f"start {k}: " if len(curves.poles) > 1 else ""
+            messages.append(f"{orbit_text}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
     for plane in curves.planes:
         if plane.shape == "0":
             messages.append(f"lambda = {plane.root_text}: h = 0, so that every point of this plane is fixed")
-    outside = [
+    outside_texts = [
         f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
         for _, plane, column in lib.panels_of(curves)
         if not options["projective"] and (view := lib.view_of(plane, column)).outside
     ]
-    if outside:
-        messages.append(f"dots outside the windows: {', '.join(outside)}; --projective shows all of them")
+    if outside_texts:
+        messages.append(f"dots outside the windows: {', '.join(outside_texts)}; --projective shows all of them")
     is_complete = all(pole is None for pole in curves.poles)
     return Drawing(figure, file, messages, 0 if is_complete else 3)

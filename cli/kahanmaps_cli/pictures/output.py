@@ -97,10 +97,10 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
             """Draw the picture, print messages, and write it to its file or to standard output."""
             # Refuse invalid sizes and formats before the computation.
             lib.require_matplotlib()
-            given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
+            style_options = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
             if options["size"] is not None:
-                given["width"], given["height"] = options["size"]
-            style = options["style"] = lib.Style(**given)
+                style_options["width"], style_options["height"] = options["size"]
+            style = options["style"] = lib.Style(**style_options)
             path, is_verbose = options["output"], not options["quiet"]
             kind = lib.format_of(path, options["kind"])
             with SearchProgress(options) as progress:
@@ -114,10 +114,10 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
             if options["title"]:
                 lib.write_title(figure, printable(options["title"]), style)
             system = "" if drawing.file is None else drawing.file.to_toml()
-            with warnings.catch_warnings(record=True) as caught:
+            with warnings.catch_warnings(record=True) as font_warnings:
                 warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
                 content = lib.picture_bytes(figure, kind, style, command_line(), system)
-            if caught and is_verbose:
+            if font_warnings and is_verbose:
                 print_stderr("the fonts lack some letters, which are drawn as boxes")
             if deliver(path, content) and is_verbose:
                 width, height = figure.get_size_inches() * 2.54

@@ -93,55 +93,53 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     notes: list[str] = []
     field = lib.field_of(file)
     starts = initial_points(file, field, eps, options)
-    default = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
-    steps = default if options["steps"] is None else options["steps"]
+    default_steps = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
+    steps = default_steps if options["steps"] is None else options["steps"]
     color = options["color_by"]
     if color not in ("orbit", "step"):
         color = lib.requested_function(file, eps, color)
     levels = None if options["levels"] is None else lib.requested_axis(file, eps, options["levels"])
     axes = _requested_axes(file, eps, options)
-    orbits = lib.walked(
+    orbits = lib.follow_orbits(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
         steps,
         lambda step: progress(f"step {step} of {steps}"),
     )
     if axes is None:
         count = 3 if options["space"] else 2
-        chosen = [file.variables[k] for k in lib.fullest_axes(orbits.points.reshape(-1, file.dim), count)]
-        axes = tuple(lib.requested_axis(file, eps, name) for name in chosen)
+        axis_names = [file.variables[k] for k in lib.fullest_axes(orbits.points.reshape(-1, file.dim), count)]
+        axes = tuple(lib.requested_axis(file, eps, name) for name in axis_names)
         if file.dim > count:
-            notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
+            notes.append(f"axes {', '.join(axis_names)}: the projection with the largest spread (--axes chooses)")
     euler = None
     if options["euler"]:
         # `file.system` raises InputError if there is no quadratic vector field.
-        by_euler = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
-        euler = lib.walked(lib.MethodEnsemble(*by_euler, kernel="numpy"), steps)
+        arguments = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
+        euler = lib.follow_orbits(lib.MethodEnsemble(*arguments, kernel="numpy"), steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
-    shown = lib.portrait_of(orbits, axes, color=color, window=window, euler=euler, join=options["lines"])
+    portrait = lib.portrait_of(orbits, axes, color=color, window=window, euler=euler, join=options["lines"])
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if field is None and options["flow"]:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
     if field is not None:
-        flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], shown.window)
+        flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], portrait.window)
         if options["levels"] or options["euler"]:  # arrows would be invisible between gray lines
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
             flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, orbits, options["backward"]))
-        shown = replace(shown, flow=flow)
+        portrait = replace(portrait, flow=flow)
     if levels is not None:
         if len(plane) != 2 or len(axes) != 2:
             raise lib.InputError("--levels needs two variables as axes: give --axes X,Y")
-        requested_levels = options["levels_at"]
-        values = (
-            lib.levels_through(levels, starts) if requested_levels is None else lib.to_floats(requested_levels).tolist()
-        )
-        curves = lib.level_curves(levels, plane, file.dim, values, shown.window)
-        if missing := sum(not pieces for pieces in curves):
-            notes.append(f"{missing} of {len(values)} levels of {levels.name} have no curve in the window")
-        shown = replace(shown, levels=curves)
-    note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
-    figure = lib.plot_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
+        levels_at = options["levels_at"]
+        values = lib.levels_through(levels, starts) if levels_at is None else lib.to_floats(levels_at).tolist()
+        curves = lib.level_curves(levels, plane, file.dim, values, portrait.window)
+        if missing_count := sum(not pieces for pieces in curves):
+            notes.append(f"{missing_count} of {len(values)} levels of {levels.name} have no curve in the window")
+        portrait = replace(portrait, levels=curves)
+    note = f"{portrait.left_out} points outside" if portrait.left_out and window is None else ""
+    figure = lib.plot_portrait(portrait, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
     orbit_count = counted(orbits.orbits, "orbit")
     origin = " from automatic initial points" if require_one_kind_of_starts(options) is None else ""
@@ -150,13 +148,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     messages = [f"{file.label}: {orbit_count}{origin}, {counted(len(orbits.points) - 1, 'step')}{backward}{at_eps}"]
     messages += [f"{count} of {orbit_count} ended early: {reason}" for reason, count in orbits.ended.items()]
     points = orbits.points.shape[0] * orbits.points.shape[1]
-    if chords := sum(curve is None for curve in shown.joined):
-        what = f"{chords} of {counted(len(shown.joined), 'orbit')}"
-        notes.append(f"{what} do not fill a curve: their lines join consecutive steps")
-    if shown.left_out:
-        notes.append(f"{shown.left_out} of {points} points lie outside the window (--window)")
-    if shown.undefined:
-        notes.append(f"{shown.undefined} of {points} points are left out: an axis or the color has a pole there")
+    if unfilled := sum(curve is None for curve in portrait.joined):
+        orbits_text = f"{unfilled} of {counted(len(portrait.joined), 'orbit')}"
+        notes.append(f"{orbits_text} do not fill a curve: their lines join consecutive steps")
+    if portrait.left_out:
+        notes.append(f"{portrait.left_out} of {points} points lie outside the window (--window)")
+    if portrait.undefined:
+        notes.append(f"{portrait.undefined} of {points} points are left out: an axis or the color has a pole there")
     return Drawing(figure, file, [*messages, *notes], 3 if orbits.ended else 0)
 
 
@@ -180,8 +178,8 @@ def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps:
             f"found no initial points for {file.map.kind}, expected --start X, --starts FILE, --grid, --line or "
             "--random N: automatic ones need a vector field"
         )
-    named = [text.strip() for text in (options["axes"] or "").split(",")]
-    plane = [file.variables.index(text) for text in named if text in file.variables]
+    texts = [text.strip() for text in (options["axes"] or "").split(",")]
+    plane = [file.variables.index(text) for text in texts if text in file.variables]
     plane = [*plane, *(k for k in range(file.dim) if k not in plane)][:2]
     return lib.automatic_starts(field, eps, plane, backward=options["backward"])
 
@@ -192,14 +190,14 @@ def _requested_axes(
     """Return the requested axes, or the only possible axes; None if the points determine the axes."""
     text, count = options["axes"], 3 if options["space"] else 2
     if text is not None:
-        pieces = [piece.strip() for piece in text.split(",")]
-        if len(pieces) not in (2, 3) or not all(pieces):
+        texts = [axis_text.strip() for axis_text in text.split(",")]
+        if len(texts) not in (2, 3) or not all(texts):
             raise lib.InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
-        if len(set(pieces)) < len(pieces):
+        if len(set(texts)) < len(texts):
             raise lib.InputError(f"found --axes {text[:60]}, expected different axes")
         return tuple(
-            "step" if piece == "step" and "step" not in file.variables else lib.requested_axis(file, eps, piece)
-            for piece in pieces
+            "step" if axis_text == "step" and "step" not in file.variables else lib.requested_axis(file, eps, axis_text)
+            for axis_text in texts
         )
     if file.dim == 1 and count == 2:
         return "step", lib.requested_axis(file, eps, file.variables[0])

@@ -77,8 +77,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     )
     notes = []
     if axes is None:
-        chosen = section.widest_axes(hyperplane)
-        axes = [lib.requested_axis(file, eps, file.variables[k]) for k in chosen]
+        indices = section.widest_axes(hyperplane)
+        axes = [lib.requested_axis(file, eps, file.variables[k]) for k in indices]
         notes.append(f"axes {', '.join(axis.name for axis in axes)}: the largest spread (--axes chooses)")
     curves = [] if options["no_curves"] else lib.curves_on(file, eps, hyperplane, axes)
     figure = lib.plot_section(

@@ -34,23 +34,23 @@ comparison_options: Callable[[opt.F], opt.F] = opt.stack(
 )
 
 
-def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **more: Any) -> lib.Comparison:
+def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **extra: Any) -> lib.Comparison:
     """Run the comparison that is requested by the options of `comparison_options`."""
-    kind = require_one_kind_of_starts(options)
+    starts_option = require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
     _ = file.real_approximation.system  # first refuse a map without a quadratic system
-    starts = None if kind is None else options["start"] or requested_starts(file, options)
+    starts = None if starts_option is None else options["start"] or requested_starts(file, options)
     return lib.compare(
         file,
         starts,
         opt.requested_eps(options["eps"], options["time_step"]),
         options["steps"],
         progress=progress,
-        **{"methods": options["methods"], "integrals": options["integrals"] or None, "seed": options["seed"], **more},
+        **{"methods": options["methods"], "integrals": options["integrals"] or None, "seed": options["seed"], **extra},
     )
 
 
 def early_messages(result: lib.Comparison) -> list[str]:
     """Return a sentence for each method with orbits that ended early."""
-    early = [(lib.METHODS[run.method].title, run.early, len(run.ends)) for run in result.runs if run.early]
-    return [f"{title} ended early in {len(ends)} of {n} orbits: {ends[0].message}" for title, ends, n in early]
+    early_runs = [(lib.METHODS[run.method].title, run.early, len(run.ends)) for run in result.runs if run.early]
+    return [f"{title} ended early in {len(ends)} of {n} orbits: {ends[0].message}" for title, ends, n in early_runs]

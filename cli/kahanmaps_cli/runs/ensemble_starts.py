@@ -25,16 +25,16 @@ _MAGIC = b"\x93NUMPY"
 
 def require_one_kind_of_starts(options: Mapping[str, Any], *, random_by_default: bool = False) -> str | None:
     """Return the option that gives the initial points; None if there is none. Raises UsageError for several."""
-    kinds = [name for name in ("start", "starts", "grid", "line", "count") if options.get(name) not in (None, ())]
-    flags = ["--random" if name == "count" else f"--{name}" for name in kinds]
-    if len(kinds) > 1:
+    sources = [name for name in ("start", "starts", "grid", "line", "count") if options.get(name) not in (None, ())]
+    flags = ["--random" if name == "count" else f"--{name}" for name in sources]
+    if len(sources) > 1:
         raise click.UsageError(f"give {flags[0]} or {flags[1]}, not both")
-    of_random = "count" in options and (options["box"] is not None or options["seed"] is not None)
-    if of_random and options["count"] is None and (kinds or not random_by_default):
+    has_random_options = "count" in options and (options["box"] is not None or options["seed"] is not None)
+    if has_random_options and options["count"] is None and (sources or not random_by_default):
         raise click.UsageError("--box and --seed are for --random N")
     if options.get("starts") == "-" and options.get("system") == "-":
         raise click.UsageError("found - for both SYSTEM and --starts, but there is only one standard input")
-    return kinds[0] if kinds else None
+    return sources[0] if sources else None
 
 
 def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
@@ -43,16 +43,16 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
     if options["start"]:
         for x in options["start"]:
             if len(x) != dim:
-                found = counted(len(x), "coordinate")
-                raise InputError(f"found an initial point with {found}, expected {dim}: {', '.join(file.variables)}")
+                size = counted(len(x), "coordinate")
+                raise InputError(f"found an initial point with {size}, expected {dim}: {', '.join(file.variables)}")
         return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, dim)
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
     for name, separator in (("grid", "="), ("line", ":")):
         if options[name] is not None:
             if separator not in options[name] or (name == "line" and "=" in options[name]):
-                shape = "x=-1:1:20,y=1/2" if name == "grid" else "0,0:1,1/2:50"
-                raise InputError(f"found --{name} {quoted(options[name])}, expected a {name} such as {shape}")
+                example = "x=-1:1:20,y=1/2" if name == "grid" else "0,0:1,1/2:50"
+                raise InputError(f"found --{name} {quoted(options[name])}, expected a {name} such as {example}")
             return lib.starts_on(options[name], file.variables)
     count = options["count"] or count or 1
     if count * dim > lib.MAX_NUMBERS:
@@ -62,10 +62,10 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
     box = lib.rational(1) if options["box"] is None else options["box"]
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
-    size = lib.to_float(box)
-    if size == 0.0:
+    bound = lib.to_float(box)
+    if bound == 0.0:
         raise InputError("found a --box that underflows to 0 in floating point, expected a larger one")
-    return lib.starts_in_box(count, dim, size, options["seed"] or 0)
+    return lib.starts_in_box(count, dim, bound, options["seed"] or 0)
 
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
@@ -85,6 +85,8 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
 
     Raises InputError with file and line of the first mistake.
     """
+    import numpy as np
+
     where = "standard input" if path == "-" else path
     if path == "-":
         data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
@@ -106,7 +108,36 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{where}: found neither a .npy file nor UTF-8 text with a point in each line") from None
-    return _from_text(text, where, variables)
+    # One point per line; names in the first line assign the columns to variables.
+    rows: list[list[float]] = []
+    columns: list[int] | None = None
+    width, is_first = len(variables), True
+    for number, line in enumerate(text.split("\n"), start=1):
+        content = line.partition("#")[0].strip().strip("()[]{}")  # points are often printed in brackets
+        if not content:
+            continue
+        cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
+        if is_first and set(variables) <= set(cells):
+            columns, width, is_first = [cells.index(name) for name in variables], len(cells), False
+            continue
+        is_first = False
+        if len(cells) != width:
+            count_text = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
+            names = "" if columns is not None else f": {', '.join(variables)}"
+            raise InputError(f"{where}:{number}: found {count_text}, expected {width}{names}")
+        row: list[float] = []
+        for k in range(len(cells)) if columns is None else columns:
+            try:
+                row.append(lib.to_float(lib.parse_number(cells[k])))
+            except InputError as error:
+                message = error.message if isinstance(error, ExpressionError) else error
+                raise InputError(f"{where}:{number}: entry {k + 1}: {message}") from error
+        rows.append(row)
+        if len(rows) * len(variables) > lib.MAX_NUMBERS:
+            raise InputError(f"{where}:{number}: found more than {lib.MAX_NUMBERS} numbers, expected fewer")
+    if not rows:
+        raise InputError(f"{where}: found no point, expected one per line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
+    return np.array(rows, dtype=np.float64)
 
 
 def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArray:
@@ -134,43 +165,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
         raise InputError(f"{where}: found an array of shape {shape}, expected at most {lib.MAX_NUMBERS} numbers")
     with np.errstate(over="ignore"):
         starts: lib.FloatArray = np.ascontiguousarray(rows, dtype=np.float64)
-    bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
-    if len(bad):
-        first_bad = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
-        raise InputError(f"{where}: row {bad[0]}: found {first_bad}, expected finite numbers")
+    bad_rows = np.flatnonzero(~np.isfinite(starts).all(axis=1))
+    if len(bad_rows):
+        bad_number = starts[bad_rows[0]][~np.isfinite(starts[bad_rows[0]])][0]
+        raise InputError(f"{where}: row {bad_rows[0]}: found {bad_number}, expected finite numbers")
     return starts
-
-
-def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArray:
-    """Read points from text, one per line; names in the first line assign the columns to variables."""
-    import numpy as np
-
-    rows: list[list[float]] = []
-    columns: list[int] | None = None
-    width, is_first = len(variables), True
-    for number, line in enumerate(text.split("\n"), start=1):
-        content = line.partition("#")[0].strip().strip("()[]{}")  # points are often printed in brackets
-        if not content:
-            continue
-        cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
-        if is_first and set(variables) <= set(cells):
-            columns, width, is_first = [cells.index(name) for name in variables], len(cells), False
-            continue
-        is_first = False
-        if len(cells) != width:
-            what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
-            names = "" if columns is not None else f": {', '.join(variables)}"
-            raise InputError(f"{where}:{number}: found {what}, expected {width}{names}")
-        row: list[float] = []
-        for k in range(len(cells)) if columns is None else columns:
-            try:
-                row.append(lib.to_float(lib.parse_number(cells[k])))
-            except InputError as error:
-                message = error.message if isinstance(error, ExpressionError) else error
-                raise InputError(f"{where}:{number}: entry {k + 1}: {message}") from error
-        rows.append(row)
-        if len(rows) * len(variables) > lib.MAX_NUMBERS:
-            raise InputError(f"{where}:{number}: found more than {lib.MAX_NUMBERS} numbers, expected fewer")
-    if not rows:
-        raise InputError(f"{where}: found no point, expected one per line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
-    return np.array(rows, dtype=np.float64)

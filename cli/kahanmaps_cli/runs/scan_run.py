@@ -53,18 +53,18 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
     """Run the scan of a command line; return the scan and its progress, which counts the work."""
     names = names_of(options)
     if opt.is_inline(options, system):
-        given = {"eps", *(name for name, _ in options["parameters"])}
-        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
+        assigned_names = {"eps", *(name for name, _ in options["parameters"])}
+        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in assigned_names))
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError(
             "system files contain no eps: leave eps out of --over, or leave out --toml and --write-to"
         )
     file = opt.load_system(system, {**options, "quiet": quiet})
-    has_begun, interrupted = Event(), Event()
+    has_begun, stop_requested = Event(), Event()
 
     def on_progress(sentence: str) -> None:
         has_begun.set()
-        if interrupted.is_set():
+        if stop_requested.is_set():
             raise lib.TimeOver
         search(sentence)
 
@@ -74,14 +74,14 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
             # compiler would swallow an exception.
             os.write(2, b"interrupted\n")
             os._exit(INTERRUPTED)
-        interrupted.set()
+        stop_requested.set()
 
     with SearchProgress({**options, "quiet": quiet}) as search, interruptible(interrupt):
         result = lib.scan(
             file,
             names,
             eps=opt.requested_eps(options["eps"], options["time_step"], required=False),
-            **opt.given(options, "terms", "effort", "seed", "jobs"),
+            **opt.pick(options, "terms", "effort", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
             progress=on_progress,
@@ -97,8 +97,8 @@ def ending(result: lib.Scan, search: SearchProgress) -> int:
         return 0
     is_interrupted = result.ended == "interrupted"
     if not search.quiet:
-        why = "interrupted" if is_interrupted else "work limit reached; raise --effort"
-        print_stderr(f"stopped early: {why}; not done: {', '.join(result.omitted)}")
+        reason = "interrupted" if is_interrupted else "work limit reached; raise --effort"
+        print_stderr(f"stopped early: {reason}; not done: {', '.join(result.omitted)}")
     return INTERRUPTED if is_interrupted else 3
 
 

@@ -40,17 +40,17 @@ def require_one_form(options: dict[str, Any]) -> None:
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
     """Return the names given by --symbolic, except eps, and the number eps (None if it is symbolic)."""
-    named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
+    names = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
-    if eps is not None and "eps" in named:
+    if eps is not None and "eps" in names:
         raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
-    return tuple(name for name in named if name != "eps"), eps
+    return tuple(name for name in names if name != "eps"), eps
 
 
 def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
     """Return the arguments of a search: symbols, eps, effort, seed, and the options called `names`."""
     symbols, eps = symbols_and_eps(options)
-    return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "effort", "seed")}
+    return {"symbols": symbols, "eps": eps, **opt.pick(options, *names, "effort", "seed")}
 
 
 def scope(result: Any) -> str:
@@ -75,9 +75,9 @@ def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:
     }
 
 
-def record(name: str, result: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
+def record(name: str, result: Any, search: SearchProgress, **entries: Any) -> dict[str, Any]:
     """Return the JSON record of a search."""
-    return {**heading(name, result, search), **result.to_json(), **more, "document": dict(result.file.document)}
+    return {**heading(name, result, search), **result.to_json(), **entries, "document": dict(result.file.document)}
 
 
 def print_search(

@@ -67,11 +67,11 @@ class OutputFile(click.Path):
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
             # Check before the computation that the file can be written.
-            folder, target = lib.resolved(path).parent, Path(path)
+            folder, target = lib.resolve_path(path).parent, Path(path)
             if not path or not folder.is_dir():
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
-            in_its_place = target.exists() and (self.grows or not target.is_file())
-            if not os.access(path if in_its_place else folder, os.W_OK):
+            is_written_in_place = target.exists() and (self.grows or not target.is_file())
+            if not os.access(path if is_written_in_place else folder, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
             _recorded_files(ctx).note(path, is_written=True)
         return path

@@ -25,7 +25,7 @@ from kahanmaps.errors import printable
 
 _MIN_STEP = 16  # first step with an estimate: earlier steps are too fast to be timed
 _MIN_SECONDS = 0.01  # shorter times cannot be measured reliably
-_CENTURIES = 22.0  # logarithm of the growth of the time beyond which no number is printed
+_MAX_LOG_GROWTH = 22.0  # logarithm of the growth of the time beyond which no number is printed
 
 
 def print_stderr(message: str) -> None:
@@ -56,18 +56,18 @@ class Progress:
     def __init__(self, quiet: bool = False) -> None:
         self.quiet = quiet
         self._terminal = sys.stderr.isatty()
-        self._start = self._last = time.monotonic()
-        self._shown = 0
+        self._start = self._latest = time.monotonic()
+        self._shown_length = 0
         self._sentence = ""
-        self._drawing = RLock()  # reentrant: a signal handler may print while the lock is held
-        self._ended = Event()
+        self._lock = RLock()  # reentrant: a signal handler may print while the lock is held
+        self._has_ended = Event()
 
     def __call__(self, sentence: str) -> None:
         self._sentence = sentence
         now = time.monotonic()
-        if self.quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
+        if self.quiet or now - self._start < 1 or now - self._latest < (0.1 if self._terminal else 10):
             return
-        self._last = now
+        self._latest = now
         self._draw(now)
 
     def _draw(self, now: float) -> None:
@@ -75,27 +75,27 @@ class Progress:
         if not self._terminal:
             _write(text + "\n")
             return
-        with self._drawing:
+        with self._lock:
             try:  # cut the line: a line longer than the terminal cannot be redrawn
                 width = max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
             except (OSError, ValueError):
                 width = 80
             text = text[: width - 1]
-            _write("\r" + text.ljust(self._shown))
-            self._shown = len(text)
+            _write("\r" + text.ljust(self._shown_length))
+            self._shown_length = len(text)
 
     def _tick(self) -> None:
-        while not self._ended.wait(1):
+        while not self._has_ended.wait(1):
             if self._sentence:
                 self._draw(time.monotonic())
 
     def clear(self) -> None:
         """Clear the line on a terminal until the next sentence."""
-        with self._drawing:
+        with self._lock:
             self._sentence = ""
-            if self._shown:
-                _write("\r" + " " * self._shown + "\r")
-                self._shown = 0
+            if self._shown_length:
+                _write("\r" + " " * self._shown_length + "\r")
+                self._shown_length = 0
 
     def __enter__(self) -> Self:
         if self._terminal and not self.quiet:
@@ -105,7 +105,7 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._ended.set()
+        self._has_ended.set()
         self.clear()
 
 
@@ -183,28 +183,29 @@ class TimeLeft:
     def __init__(self, steps: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._steps, self._clock = steps, clock
         self._start = clock()
-        self._before, self._last = (0, 0.0), (0, 0.0)
-        self._recent: list[tuple[int, float]] = []
+        self._reference, self._latest = (0, 0.0), (0, 0.0)
+        self._recent_steps: list[tuple[int, float]] = []
 
     def __call__(self, step: int) -> str:
         """Return the estimate as text to append to a progress message; empty if it is too early for an estimate."""
-        spent = self._clock() - self._start
-        self._recent = [*self._recent[-3:], (step, spent)]
-        if step >= 2 * self._last[0] and step >= _MIN_STEP:
-            self._before, self._last = self._last, (step, spent)
+        elapsed = self._clock() - self._start
+        self._recent_steps = [*self._recent_steps[-3:], (step, elapsed)]
+        if step >= 2 * self._latest[0] and step >= _MIN_STEP:
+            self._reference, self._latest = self._latest, (step, elapsed)
         if step >= self._steps:
             return ""
         # The growth is the logarithm of the time of all steps divided by the time of the steps up to this one.
-        (first, began), *later = self._recent
-        n, t = self._before
-        if len(later) == 3 and began > _MIN_SECONDS and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):
-            growth = math.log(spent / began) * (self._steps - step) / (step - first)
-        elif step < _MIN_STEP or t <= 0 or spent <= t:
+        (first, first_time), *later = self._recent_steps
+        n, t = self._reference
+        is_exponential = all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent_steps))
+        if len(later) == 3 and first_time > _MIN_SECONDS and is_exponential:
+            growth = math.log(elapsed / first_time) * (self._steps - step) / (step - first)
+        elif step < _MIN_STEP or t <= 0 or elapsed <= t:
             return ""
         else:
-            growth = max(1.0, math.log(spent / t) / math.log(step / n)) * math.log(self._steps / step)
-        seconds = spent * math.expm1(min(growth, _CENTURIES))
-        return f", at least {duration(seconds) if growth < _CENTURIES else 'centuries'} left"
+            growth = max(1.0, math.log(elapsed / t) / math.log(step / n)) * math.log(self._steps / step)
+        seconds = elapsed * math.expm1(min(growth, _MAX_LOG_GROWTH))
+        return f", at least {duration(seconds) if growth < _MAX_LOG_GROWTH else 'centuries'} left"
 
 
 def duration(seconds: float) -> str:

@@ -29,10 +29,10 @@ def envelope(command: str) -> dict[str, str]:
     return {"command": command, "version": lib.__version__}
 
 
-def record_of(command: str, file: lib.SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
+def record_of(command: str, file: lib.SystemFile, arithmetic: str, **entries: Any) -> dict[str, Any]:
     """Return the JSON object of a command for a system, with the system file."""
     common = {"system": file.name, "convention": lib.convention(file.map), "arithmetic": arithmetic}
-    return {**envelope(command), **common, **more, "document": dict(file.document)}
+    return {**envelope(command), **common, **entries, "document": dict(file.document)}
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -46,8 +46,8 @@ def print_report(
     """Print a report and additional measured numbers; return the exit status of the verdict."""
     if as_json:
         name = click.get_current_context().info_name or ""
-        beside = {} if measured is None else {"measured": measured.to_json()}
-        print_json({**envelope(name), **report.to_json(), **beside})
+        entries = {} if measured is None else {"measured": measured.to_json()}
+        print_json({**envelope(name), **report.to_json(), **entries})
     elif on_terminal():
         _print_terminal(report, verbose)
     else:
@@ -83,7 +83,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
 
     # If there are many findings, print the first ones and all that are not proved.
     is_long = len(report.findings) > CLAIMS_SHOWN
-    shown = [
+    shown_findings = [
         f
         for k, f in enumerate(report.findings)
         if not is_long or k < CLAIMS_SHOWN or str(f.verdict) != "proved" or f.control
@@ -94,7 +94,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     if not verbose:
         table.add_column("decided by", overflow="fold")
     printed_hypotheses: set[str] = set()
-    for finding in shown:
+    for finding in shown_findings:
         verdict = styled(lib.verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
             lines = [finding.claim, *lib.details(finding, printed_hypotheses, NUMBER_WIDTH)]
@@ -109,18 +109,18 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
         table.add_row(verdict, styled(claim), styled(reason))
     print_stdout(lib.headline(report), style="bold")
     console().print(table)
-    if len(shown) < len(report.findings):
-        print_stdout(f"{len(report.findings) - len(shown)} more claims, all proved (--json has all)")
+    if len(shown_findings) < len(report.findings):
+        print_stdout(f"{len(report.findings) - len(shown_findings)} more claims, all proved (--json has all)")
     if not verbose:
         # The short table omits hypotheses, further evidence and witnesses.
-        hypotheses = list(dict.fromkeys(text for f in shown for text in f.evidence.data.get("hypotheses", ())))
+        hypotheses = list(dict.fromkeys(text for f in shown_findings for text in f.evidence.data.get("hypotheses", ())))
         if hypotheses:
             more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
             print_stdout(f"verified: {'; '.join(hypotheses[:8])}{more}")
-        also = dict.fromkeys(evidence.summary for f in shown if not f.control for evidence in f.also)
-        for summary in list(also)[:4]:
+        summaries = dict.fromkeys(evidence.summary for f in shown_findings if not f.control for evidence in f.also)
+        for summary in list(summaries)[:4]:
             print_stdout(f"also: {summary}")
-        for finding in shown:
+        for finding in shown_findings:
             if finding.witness is not None:
                 print_stdout(f"{lib.verdict_text(finding)}: {finding.claim}")
                 for line in lib.witness_lines(finding.witness, NUMBER_WIDTH):

@@ -7,7 +7,6 @@ in the text. The colors are named ones that are legible on light and dark backgr
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from collections.abc import Sequence
 from textwrap import fill
@@ -26,7 +25,7 @@ VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "und
 # Maximal number of characters of a number on a terminal.
 NUMBER_WIDTH = 40
 _LABEL_WIDTH = 12
-_WHEN = {"auto": None, "always": True, "never": False}
+_COLOR_CHOICES = {"auto": None, "always": True, "never": False}
 
 
 def on_terminal() -> bool:
@@ -36,7 +35,9 @@ def on_terminal() -> bool:
 
 def columns() -> int:
     """The width of the terminal."""
-    return max(20, shutil.get_terminal_size().columns)
+    from shutil import get_terminal_size  # loads four modules for compression
+
+    return max(20, get_terminal_size().columns)
 
 
 def is_colored() -> bool:
@@ -87,19 +88,19 @@ def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")
-        shown = line
+        output = line
         if on_terminal() and len(cells) > 1:
             label = cells[0].ljust(hang) if len(cells[0]) < hang else f"{cells[0]}  "
-            shown = _filled("  ".join(cells[1:]), label, hang)
+            output = _wrap("  ".join(cells[1:]), label, hang)
         elif on_terminal():
             margin = len(line) - len(line.lstrip())
-            shown = _filled(line.lstrip(), line[:margin], margin + 4)
+            output = _wrap(line.lstrip(), line[:margin], margin + 4)
         if style or line.startswith("# "):
-            shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
+            output = "\n".join(paint(piece, style or "bold") if piece else "" for piece in output.split("\n"))
         for cell in cells[:2]:
             if cell in VERDICT_COLORS and not style:
-                shown = shown.replace(cell, paint(cell, VERDICT_COLORS[cell]), 1)
-        click.echo(shown, color=is_colored())
+                output = output.replace(cell, paint(cell, VERDICT_COLORS[cell]), 1)
+        click.echo(output, color=is_colored())
 
 
 def print_raw(text: str, end: str = "\n") -> None:
@@ -117,7 +118,7 @@ def styled(text: str, style: str = "") -> Text:
 def print_entry(head: str, text: str, style: str = "") -> None:
     """Print a list entry; all heads of the list have equal length. On a terminal continuation lines are indented."""
     head, text = printable(head), printable(text)
-    lines = _filled(text, head, len(head)) if on_terminal() else head + text
+    lines = _wrap(text, head, len(head)) if on_terminal() else head + text
     click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_colored())
 
 
@@ -127,8 +128,8 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     Tabs are also used if the terminal is too narrow for the numbers, since a broken number would look like two numbers.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    least = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
-    if not on_terminal() or least > columns():
+    min_width = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
+    if not on_terminal() or min_width > columns():
         for row in rows:
             print_raw("\t".join(row))
         return
@@ -136,17 +137,17 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
 
     table = Table(header_style="bold")
     for k, heading in enumerate(rows[0]):
-        header, side = styled(heading, VERDICT_COLORS.get(heading, "")), "left" if k < words else "right"
-        table.add_column(header, justify=side, overflow="fold", no_wrap=k >= words)  # type: ignore[arg-type]
+        header, justify = styled(heading, VERDICT_COLORS.get(heading, "")), "left" if k < words else "right"
+        table.add_column(header, justify=justify, overflow="fold", no_wrap=k >= words)  # type: ignore[arg-type]
     for row in rows[1:]:
         table.add_row(*map(styled, row))
     console().print(table)
 
 
-def _filled(text: str, first: str, hang: int) -> str:
-    """Break `first` and `text` at blanks into lines of the width of the terminal, with a hanging indent."""
-    margins = {"initial_indent": first, "subsequent_indent": " " * hang}
-    return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first  # type: ignore[arg-type]
+def _wrap(text: str, first_label: str, hang: int) -> str:
+    """Break `first_label` and `text` at blanks into lines of the width of the terminal, with a hanging indent."""
+    margins = {"initial_indent": first_label, "subsequent_indent": " " * hang}
+    return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first_label  # type: ignore[arg-type]
 
 
 def color_option() -> click.Option:
@@ -154,11 +155,11 @@ def color_option() -> click.Option:
 
     def choose(context: click.Context, parameter: click.Parameter, value: Any) -> None:
         if value is not None:
-            context.color = _WHEN[value]
+            context.color = _COLOR_CHOICES[value]
 
     return click.Option(
         ["--color"],
-        type=click.Choice(list(_WHEN)),
+        type=click.Choice(list(_COLOR_CHOICES)),
         metavar="WHEN",
         callback=choose,
         expose_value=False,

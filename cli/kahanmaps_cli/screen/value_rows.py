@@ -41,7 +41,7 @@ def table(
     An error at one combination is printed on standard error, and the table continues; if all combinations fail, the
     error is raised. --seconds limits the total time. Returns the exit status.
     """
-    quiet, began = options["quiet"], time.monotonic()
+    quiet, begin = options["quiet"], time.monotonic()
     rows = rows_of(options["parameters"], system)
     if rows is None:
         file = load_system(system, options)
@@ -54,15 +54,15 @@ def table(
         if cell.undecided and not quiet and not search.is_over:
             print_stderr(cell.undecided)
         return 3 if cell.undecided or search.is_over else 0
-    done, refused = 0, list[tuple[str, KahanmapsError]]()
+    decided, failures = 0, list[tuple[str, KahanmapsError]]()
     for row in rows:
         name = ", ".join(f"{name} = {value}" for name, value in row)
         try:
             file = load_system(system, {**options, "parameters": row, "quiet": True})
-            with SearchProgress(options, began) as search:
+            with SearchProgress(options, begin) as search:
                 cell = compute(file, search)
         except KahanmapsError as error:
-            refused.append((name, error))
+            failures.append((name, error))
             continue
         if options["as_json"]:
             print_json(cell.record())
@@ -70,14 +70,14 @@ def table(
             print_stdout(f"{name}\t{cell.line}")
         if search.is_over:
             return 3
-        done += not cell.undecided
-    if len(refused) == len(rows):
-        raise refused[0][1]
-    for name, reason in refused:
+        decided += not cell.undecided
+    if len(failures) == len(rows):
+        raise failures[0][1]
+    for name, reason in failures:
         print_stderr(f"{name}: {reason}")
-    if done < len(rows) and not quiet:
-        print_stderr(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
-    return 0 if done == len(rows) else 3
+    if decided < len(rows) and not quiet:
+        print_stderr(f"undecided, or stopped early: {len(rows) - decided} of {len(rows)}")
+    return 0 if decided == len(rows) else 3
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:

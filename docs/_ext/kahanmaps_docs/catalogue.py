@@ -45,7 +45,7 @@ def section(file: SystemFile) -> str:
     ]
     if file.parameters:
         values = ", ".join(f"${latex_name(name)} = {latex_number(value)}$" for name, value in file.parameters.items())
-        pieces.append(f"Parameters, with the values that the formulas here are for: {values}.")
+        pieces.append(f"The formulas are for these values of the parameters: {values}.")
     pieces += [displayed(formula) for formula in formulas(file)]
     if "family" in file.document:
         pieces.append("A member of the commuting family.")
@@ -79,7 +79,7 @@ def displayed(formula: str) -> str:
     if len(formula) <= LONGEST_FORMULA or formula.startswith(r"\begin"):
         return f"$$\n{formula}\n$$"
     left = formula.partition(" = ")[0]
-    return f"${left}$ is too long to be read here: {len(formula)} characters of LaTeX."
+    return f"${left}$ is too long to be shown: {len(formula)} characters of LaTeX."
 
 
 def facts(file: SystemFile) -> list[str]:
@@ -89,7 +89,8 @@ def facts(file: SystemFile) -> list[str]:
     if "degrees" in known or "growth" in known:
         degrees = ", ".join(map(str, known.get("degrees", [])))
         growth = f"{known['growth']} growth" if "growth" in known else ""
-        root = f", by the largest root of {code(known['dynamical_degree'])}" if "dynamical_degree" in known else ""
+        dynamical = known.get("dynamical_degree")
+        root = f", dynamical degree: the largest root of {code(dynamical)}" if dynamical else ""
         results.append(f"degrees of the iterates: {degrees + ', ...: ' if degrees else ''}{growth}{root}")
     if "codimension" in known:
         results.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")

@@ -22,11 +22,9 @@ file was made). Degrees, growth, verdict and relations are also given as structu
 
 from __future__ import annotations
 
-import difflib
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,8 +32,6 @@ from kahanmaps.documents.families import family_member
 from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
-
     from kahanmaps.documents.files import SystemFile
 
 
@@ -44,7 +40,8 @@ class UnknownSystem(InputError, KeyError):
 
 
 _ENDING = ".toml"
-_LIST_THEM = "'kahanmaps systems' lists the catalogue"
+_FOLDER = Path(__file__).parent
+_LIST_HINT = "'kahanmaps systems' lists the catalogue"
 
 
 def names() -> tuple[str, ...]:
@@ -53,7 +50,7 @@ def names() -> tuple[str, ...]:
     >>> "lorenz" in names()
     True
     """
-    return _names_in(resources.files(__name__))
+    return _names_in(_FOLDER)
 
 
 def map_names() -> tuple[str, ...]:
@@ -62,10 +59,10 @@ def map_names() -> tuple[str, ...]:
     >>> "lyness" in map_names()
     True
     """
-    return _names_in(resources.files(__name__).joinpath("maps"))
+    return _names_in(_FOLDER / "maps")
 
 
-def _names_in(folder: Traversable) -> tuple[str, ...]:
+def _names_in(folder: Path) -> tuple[str, ...]:
     entries = (entry.name for entry in folder.iterdir())
     return tuple(sorted(name.removesuffix(_ENDING) for name in entries if name.endswith(_ENDING)))
 
@@ -77,12 +74,11 @@ def text_of(name: str) -> bytes:
         from kahanmaps.documents.toml_text import to_toml
 
         return to_toml(generated[1], ("variables",), ("catalog", "system", "integrals", "density")).encode()
-    folder = resources.files(__name__)
     if name in map_names():
-        return folder.joinpath("maps", name + _ENDING).read_bytes()
+        return (_FOLDER / "maps" / (name + _ENDING)).read_bytes()
     if name not in names():
         raise KeyError(name)
-    return folder.joinpath(name + _ENDING).read_bytes()
+    return (_FOLDER / (name + _ENDING)).read_bytes()
 
 
 def titles() -> dict[str, tuple[int, str]]:
@@ -115,7 +111,7 @@ class Catalogue(Mapping[str, "SystemFile"]):
         if not isinstance(name, str):
             raise UnknownSystem(f"found {name!r}, expected a name: list(km.catalogue())[:3] are the first three")
         if name not in self:
-            raise UnknownSystem(str(_unknown(name)))
+            raise UnknownSystem(str(_unknown_system(name)))
         return load(name)
 
     def __iter__(self) -> Iterator[str]:
@@ -183,28 +179,30 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
     if not isinstance(reference, Path):
         generated = family_member(reference)
         name = reference if generated is None else generated[0]
-        hyphenated = name.replace("-", "_")
-        if generated is None and not os.path.exists(name) and hyphenated in (*names(), *map_names()):
-            name = hyphenated
+        underscored = name.replace("-", "_")
+        if generated is None and not os.path.exists(name) and underscored in (*names(), *map_names()):
+            name = underscored
         if generated is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
         has_ending = "." in reference and "(" not in reference  # a file extension, perhaps mistyped
         has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)
         if not (has_ending or has_separator or os.path.exists(reference)):
-            raise _unknown(reference)
+            raise _unknown_system(reference)
     return read_system(reference, parameters)
 
 
-def _unknown(name: str) -> InputError:
+def _unknown_system(name: str) -> InputError:
     if not name or len(name) > 60 or not name.isprintable():  # this cannot be the name of a system
-        return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
+        return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_HINT}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())
-    close = difflib.get_close_matches(normalized, known_names, 3)
-    # Otherwise suggest names that contain the given text, e.g. "volterra".
-    close += [other for other in known_names if len(normalized) > 2 and normalized in other and other not in close]
-    close = close[:3]
-    meant = f", did you mean {' or '.join(close)}?" if close else ":"
+    from difflib import get_close_matches
+
+    similar_names = get_close_matches(normalized, known_names, 3)
+    # Then suggest names that contain the given text, e.g. "volterra".
+    longer_names = [known for known in known_names if len(normalized) > 2 and normalized in known]
+    similar_names = list(dict.fromkeys([*similar_names, *longer_names]))[:3]
+    question = f", did you mean {' or '.join(similar_names)}?" if similar_names else ":"
     return InputError(
-        f"found the unknown system {name!r}{meant} {_LIST_THEM}; a file is given by its path, e.g. ./{name}{_ENDING}"
+        f"found the unknown system {name!r}{question} {_LIST_HINT}; a file is given by its path, e.g. ./{name}{_ENDING}"
     )

@@ -23,7 +23,7 @@ from __future__ import annotations
 import json
 import os
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from importlib import import_module
 from math import inf
@@ -35,16 +35,17 @@ from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
 from kahanmaps.version import __version__
 
-BEFORE = ("experiment", "number", "key", "task")
-BETWEEN = ("outcome", "verdict")
-AFTER = ("message",)
-OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # a stable export omits these, and stderr and versions
-RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
+FIRST_COLUMNS = ("experiment", "number", "key", "task")
+MIDDLE_COLUMNS = ("outcome", "verdict")
+LAST_COLUMNS = ("message",)
+RUN_COLUMNS = ("seconds", "peak_memory", "host", "finished")  # a stable export omits these, and stderr and versions
+_COLUMNS = (*FIRST_COLUMNS, *MIDDLE_COLUMNS, *LAST_COLUMNS, *RUN_COLUMNS)
+RESERVED = frozenset((*_COLUMNS, "system", "options", "result", "stderr", "versions"))
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
 _MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
-_ROW_GROUP = 10_000
-_CHARACTERS = 50_000_000  # in one row group: a fixed number of rows with long lists may take gigabytes
+_MAX_ROWS = 10_000
+_MAX_CHARACTERS = 50_000_000  # in one row group: a fixed number of rows with long lists may take gigabytes
 
 
 # The path of a value in a row: "option", "system" or "result", followed by keys.
@@ -83,10 +84,10 @@ def names_of(entry: Entry) -> tuple[str, str]:
     return name, f"{section}.{name}"
 
 
-def plain(value: Any) -> str:
+def to_text(value: Any) -> str:
     """Return a value as text: integers and texts unchanged, the empty text for None, lists as JSON.
 
-    >>> [plain(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
+    >>> [to_text(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
     ['', 'true', '100000000000000000000', '0.1', '7/3', '[1, 8]']
     """
     if value is None:
@@ -102,7 +103,7 @@ def plain(value: Any) -> str:
 
 def cell(value: Any) -> str:
     """Return a value as text for a CSV file; text that a spreadsheet would execute is escaped by an apostrophe."""
-    return spreadsheet_safe(plain(value)) if isinstance(value, str) else plain(value)
+    return spreadsheet_safe(to_text(value)) if isinstance(value, str) else to_text(value)
 
 
 def is_number(value: Any) -> bool:
@@ -112,10 +113,10 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and -inf < value < inf
 
 
-def nearest(value: Any) -> float:
+def nearest_double(value: Any) -> float:
     """Return the double nearest to an exact number; infinite if the number exceeds all doubles.
 
-    >>> nearest("7/3"), nearest("0.1"), nearest(-(10**400))
+    >>> nearest_double("7/3"), nearest_double("0.1"), nearest_double(-(10**400))
     (2.3333333333333335, 0.1, -inf)
     """
     numerator, _, denominator = str(value).partition("/") if isinstance(value, str) else (value, "", "")
@@ -132,14 +133,14 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
     """
     from kahanmaps.maps.convention import CONVENTION  # loads FLINT: only when results are written
 
-    left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
+    omitted = {*RUN_COLUMNS, "stderr", "versions"} if stable else set()
     header = {"record": "header"} if stable else {"record": "header", "version": __version__}
-    stream.write(_line({**header, "convention": CONVENTION}))
+    stream.write(_json_line({**header, "convention": CONVENTION}))
     count = 0
     for row in rows:
-        stream.write(_line({"record": "result", **{k: v for k, v in known(row).items() if k not in left_out}}))
+        stream.write(_json_line({"record": "result", **{k: v for k, v in row_data(row).items() if k not in omitted}}))
         count += 1
-    stream.write(_line({"record": "end", "results": count}))
+    stream.write(_json_line({"record": "end", "results": count}))
 
 
 def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
@@ -173,34 +174,34 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
     fields = {**layout.types, **dict.fromkeys(number_columns.values(), "float64")}
     schema = arrow.schema(
-        [arrow.field(plain(name), types[kind]) for name, kind in fields.items()],
+        [arrow.field(to_text(name), types[kind]) for name, kind in fields.items()],
         metadata={"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__},
     )
     with atomic_write(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
 
-        def write(group: list[dict[str, Any]]) -> None:
+        def write(row_group: list[dict[str, Any]]) -> None:
             try:
-                writer.write_table(arrow.Table.from_pylist(group, schema))
+                writer.write_table(arrow.Table.from_pylist(row_group, schema))
             except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
                 raise InputError(_CHANGED.format("a value", "")) from error
 
-        group: list[dict[str, Any]] = []
+        row_group: list[dict[str, Any]] = []
         characters = 0
         for row in rows():
-            line = {}
+            cells = {}
             for name, value in layout.cells(row).items():
                 if value is not None and layout.types[name] == "string":
                     if name in number_columns:
-                        line[number_columns[name]] = nearest(value)
-                    value = plain(value)
+                        cells[number_columns[name]] = nearest_double(value)
+                    value = to_text(value)
                     characters += len(value)
-                line[plain(name)] = value
-            group.append(line)
-            if len(group) == _ROW_GROUP or characters > _CHARACTERS:
-                write(group)
-                group, characters = [], 0
-        if group:
-            write(group)
+                cells[to_text(name)] = value
+            row_group.append(cells)
+            if len(row_group) == _MAX_ROWS or characters > _MAX_CHARACTERS:
+                write(row_group)
+                row_group, characters = [], 0
+        if row_group:
+            write(row_group)
 
 
 class _Layout:
@@ -210,32 +211,37 @@ class _Layout:
         kinds: defaultdict[Entry, set[str]] = defaultdict(set)
         for row in rows:
             for entry, value in entries(row):
-                kinds[entry].add(_kind(value) if typed else "text")
+                kinds[entry].add(_kind_of_value(value) if typed else "text")
         self._column_of: dict[Entry, str] = {}
-        taken = set(RESERVED)
-        parts: dict[str, list[str]] = {"option": [], "system": [], "result": []}
-        for section, names in parts.items():
+        used_names = set(RESERVED)
+        names_by_section: dict[str, list[str]] = {"option": [], "system": [], "result": []}
+        for section, names in names_by_section.items():
             for entry in sorted(entry for entry in kinds if entry[0] == section):
-                name, full = names_of(entry)
-                name = full if name in taken else name
-                while name in taken:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
+                name, long_name = names_of(entry)
+                name = long_name if name in used_names else name
+                while name in used_names:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
                     name = f"{section}.{name}"
-                taken.add(name)
+                used_names.add(name)
                 names.append(name)
                 self._column_of[entry] = name
-        last = AFTER if stable else (*AFTER, *OF_THE_RUN)
-        self._always = (*BEFORE, *BETWEEN, *last)
-        self.names = (*BEFORE, *parts["system"], *parts["option"], *BETWEEN, *parts["result"], *last)
-        kinds_in = {name: kinds[entry] for entry, name in self._column_of.items()}
-        self.types = {
-            name: _type(kinds_in[name]) if name in kinds_in else _FIXED.get(name, "string") for name in self.names
-        }
-        self.numbers = [name for name in self.names if {"number"} <= kinds_in.get(name, set()) <= {*_NUMBERS, "none"}]
+        last_columns = LAST_COLUMNS if stable else (*LAST_COLUMNS, *RUN_COLUMNS)
+        self._fixed_columns = (*FIRST_COLUMNS, *MIDDLE_COLUMNS, *last_columns)
+        systems, options, results = (names_by_section[section] for section in ("system", "option", "result"))
+        self.names = (*FIRST_COLUMNS, *systems, *options, *MIDDLE_COLUMNS, *results, *last_columns)
+        self.types = {name: _FIXED_TYPES.get(name, "string") for name in self.names}
+        self.numbers = []
+        entry_of = {name: entry for entry, name in self._column_of.items()}
+        for name in (name for name in self.names if name in entry_of):
+            value_kinds = kinds[entry_of[name]] - {"none"}
+            if value_kinds:  # the first type that fits; a column without values has the type string
+                self.types[name] = next(type_ for type_, fitting in _KINDS_OF_TYPE.items() if value_kinds <= fitting)
+            if {"number"} <= value_kinds <= _NUMBER_KINDS:
+                self.numbers.append(name)
 
     def cells(self, row: Row) -> dict[str, Any]:
         """Return the values of a row by the names of their columns."""
-        fixed = known(row)
-        cells = {name: fixed[name] for name in self._always}
+        fixed = row_data(row)
+        cells = {name: fixed[name] for name in self._fixed_columns}
         for entry, value in entries(row):
             if entry not in self._column_of:
                 raise InputError(_CHANGED.format(f"the value {quoted(names_of(entry)[0])}", f" of task {row.number}"))
@@ -245,17 +251,17 @@ class _Layout:
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
 # Types of Parquet and the kinds of values that each type represents exactly; a column has the first type that fits.
-_HOLDS = {
+_KINDS_OF_TYPE = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},
     "float64": {"small", "float64", "none"},
     "string": {"bool", "small", "int64", "float64", "number", "text", "none"},
 }
-_NUMBERS = {"small", "int64", "float64", "number"}
-_FIXED = {"number": "int64", "seconds": "float64", "peak_memory": "int64"}
+_NUMBER_KINDS = {"small", "int64", "float64", "number"}
+_FIXED_TYPES = {"number": "int64", "seconds": "float64", "peak_memory": "int64"}
 
 
-def _kind(value: Any) -> str:
+def _kind_of_value(value: Any) -> str:
     if isinstance(value, bool):
         return "bool"
     if isinstance(value, int):
@@ -265,16 +271,7 @@ def _kind(value: Any) -> str:
     return "none" if value is None else "number" if isinstance(value, str) and is_number(value) else "text"
 
 
-def _type(kinds: Set[str]) -> str:
-    """Return the type of a Parquet column with values of these kinds.
-
-    >>> [_type(kinds) for kinds in ({"small", "none"}, {"small", "float64"}, {"int64", "float64"}, {"none"})]
-    ['int64', 'float64', 'string', 'string']
-    """
-    return "string" if kinds <= {"none"} else next(name for name, holds in _HOLDS.items() if kinds <= holds)
-
-
-def known(row: Row) -> dict[str, Any]:
+def row_data(row: Row) -> dict[str, Any]:
     """Return the entries that every row has, in the order of JSON lines; entries of a missing record are None."""
     task, record = row.task, row.record
     of_record = ("verdict", "result", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished")
@@ -290,6 +287,6 @@ def known(row: Row) -> dict[str, Any]:
     }
 
 
-def _line(record: Mapping[str, Any]) -> str:
+def _json_line(record: Mapping[str, Any]) -> str:
     """Return a line of JSON; only dicts inside the record are sorted by keys."""
     return "{" + ", ".join(f"{json.dumps(name)}: {_ENCODER.encode(value)}" for name, value in record.items()) + "}\n"

@@ -33,7 +33,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from kahanmaps.atomic_files import resolved
+from kahanmaps.atomic_files import resolve_path
 from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
 from kahanmaps.experiments.results.records import (
@@ -88,13 +88,13 @@ _MIN_BYTES = 512  # the smallest page that SQLite has
 # In KiB. Planning accesses the index of keys at random: unless the index of a million keys fits into the cache, every
 # key causes the write of a page.
 _CACHE = 128 << 10
-_OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
+_MACHINE_CODES = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 # fmt: off
 _COLUMNS = (
     "outcome", "result", "verdict", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished",
 )
 # fmt: on
-_SELECTED = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"))
+_SELECTED_COLUMNS = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"))
 
 
 class StoreError(InputError):
@@ -207,8 +207,8 @@ class Store(HtmlDisplay):
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
         try:
-            store.path = resolved(store.name)
-            with store._errors():
+            store.path = resolve_path(store.name)
+            with store._translate_errors():
                 store._open(create)
         except BaseException as error:
             store.close()
@@ -234,7 +234,7 @@ class Store(HtmlDisplay):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if error is not None:
             note_source(error, self.name)
         self.close()
@@ -262,7 +262,22 @@ class Store(HtmlDisplay):
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
         self._is_initialized(create)  # before locking, so that no lock file is created beside a foreign file
         if not self._is_readonly:
-            self._take_lock()
+            # The operating system releases the lock of the writer when the process ends. The locked file cannot be the
+            # database itself: closing any of its descriptors would drop the locks of SQLite.
+            while self._lock is None:
+                descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    # The previous writer may have removed the file after it was opened here. A lock of a removed file
+                    # has no effect.
+                    with suppress(FileNotFoundError):
+                        if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
+                            self._lock = descriptor
+                except BlockingIOError:
+                    raise StoreError(f"another batch is writing to {self.name}: wait for it, or end it") from None
+                finally:
+                    if self._lock is None:
+                        os.close(descriptor)
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
             if not self._is_initialized(create):  # again: another process may have done it before the lock
@@ -292,40 +307,20 @@ class Store(HtmlDisplay):
             )
         return True
 
-    def _take_lock(self) -> None:
-        """Take the lock of the writer, which the operating system releases when the process ends.
-
-        The locked file cannot be the database itself: closing any of its descriptors would drop the locks of SQLite.
-        """
-        while self._lock is None:
-            descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # The previous writer may have removed the file after it was opened here. A lock of a removed file has
-                # no effect.
-                with suppress(FileNotFoundError):
-                    if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
-                        self._lock = descriptor
-            except BlockingIOError:
-                raise StoreError(f"another batch is writing to {self.name}: wait for it, or end it") from None
-            finally:
-                if self._lock is None:
-                    os.close(descriptor)
-
     # SQL, with messages for the errors of SQLite
 
     def _execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
         """Execute one statement."""
-        return self._opened().execute(sql, values)
+        return self._require_connection().execute(sql, values)
 
-    def _opened(self) -> sqlite3.Connection:
+    def _require_connection(self) -> sqlite3.Connection:
         if self._connection is None:
             raise StoreError(f"{self.name} has been closed: open it again")
         return self._connection
 
     def _fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
         """Return all rows of a query at once: a statement with unread rows would keep its lock and block the writer."""
-        with self._errors():
+        with self._translate_errors():
             rows = self._execute(sql, values).fetchall()
         if any(isinstance(value, bytes) for row in rows for value in row):
             raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): restore an earlier copy")
@@ -341,23 +336,22 @@ class Store(HtmlDisplay):
         """Execute all statements in the block, or none of them."""
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
-        with self._errors(), self._opened() as connection:  # the connection commits at the end, or rolls back
+        # The connection commits at the end of the block, or rolls back.
+        with self._translate_errors(), self._require_connection() as connection:
             connection.execute("BEGIN IMMEDIATE")
             yield
 
     @contextmanager
-    def _errors(self) -> Iterator[None]:
+    def _translate_errors(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.Error as error:
             # An error without a code comes from Python's module: the text is not UTF-8.
             code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
-            kind = Unavailable if code in _OF_THE_MACHINE else StoreError
+            kind = Unavailable if code in _MACHINE_CODES else StoreError
             if kind is Unavailable:
-                reason = (
-                    f"cannot be read or written: {error}; what was stored before is safe; check the disk, its free "
-                )
-                reason += "space and other users of the file, and run it again"
+                reason = f"cannot be read or written: {error}; what was stored before is safe; check the disk, its "
+                reason += "free space and other users of the file, and run it again"
             elif code == sqlite3.SQLITE_NOTADB:
                 reason = "is not an SQLite database: check the name"
             elif code in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
@@ -368,7 +362,7 @@ class Store(HtmlDisplay):
             raise kind(f"{self.name} {reason}") from error
 
     @contextmanager
-    def _reading(self, entry: str) -> Iterator[None]:
+    def _report_damage(self, entry: str) -> Iterator[None]:
         """Report parsing errors in the block as damage of the file; `entry` names the parsed entry."""
         try:
             yield
@@ -377,22 +371,22 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} is damaged ({entry}: {reason}): restore an earlier copy") from error
 
     def _task(self, key: str, text: str) -> Task:
-        with self._reading(f"the task {key}"):
+        with self._report_damage(f"the task {key}"):
             return Task.from_text(text)
 
     def _record(self, key: str, row: Sequence[Any]) -> Record | None:
-        """Return the record in a row of the columns `_SELECTED`; None if the task has no result."""
+        """Return the record in a row of the columns `_SELECTED_COLUMNS`; None if the task has no result."""
         if row[0] is None:
             return None
         cells = dict(zip((*_COLUMNS, "attempts"), row, strict=True))
         del cells["attempts"]
-        with self._reading(f"the record of task {key}"):
+        with self._report_damage(f"the record of task {key}"):
             cells["outcome"] = Outcome(cells["outcome"])
             if (cells["outcome"] is Outcome.OK) is not (cells["result"] is not None):
                 no = "no " * (cells["result"] is None)
                 raise ValueError(f"the outcome is {cells['outcome']}, and the result {no}text")
-            cells["result"] = None if cells["result"] is None else _table(cells["result"])
-            cells["versions"] = _table(cells["versions"])
+            cells["result"] = None if cells["result"] is None else _parse_dict(cells["result"])
+            cells["versions"] = _parse_dict(cells["versions"])
             cells["seconds"] = float(cells["seconds"])
             cells["peak_memory"] = None if cells["peak_memory"] is None else index(cells["peak_memory"])
             return Record(key=key, **cells)
@@ -411,17 +405,17 @@ class Store(HtmlDisplay):
                 raise StoreError(
                     f"{self.name} has no experiment {name}: it has {', '.join(all_names) or 'none at all'}"
                 )
-        chosen: list[StoredExperiment] = []
+        experiments: list[StoredExperiment] = []
         offset = 0
-        for name, definition, limits, total, tasks, id, planned in rows:
+        for name, definition, limits, total, tasks, id, plan_size in rows:
             if names is None or name in names:
-                with self._reading(f"the experiment {quoted(name)}"):
-                    if total != (planned or 0):
-                        raise ValueError(f"the plan has {planned or 0} tasks, expected {total}")
-                    limited = TaskLimits(**_table(limits))
-                    chosen.append(StoredExperiment(name, definition, limited, total, index(tasks), id, offset))
+                with self._report_damage(f"the experiment {quoted(name)}"):
+                    if total != (plan_size or 0):
+                        raise ValueError(f"the plan has {plan_size or 0} tasks, expected {total}")
+                    task_limits = TaskLimits(**_parse_dict(limits))
+                    experiments.append(StoredExperiment(name, definition, task_limits, total, index(tasks), id, offset))
                     offset += total
-        return chosen
+        return experiments
 
     def plan(
         self,
@@ -440,28 +434,28 @@ class Store(HtmlDisplay):
         """
         with self._transaction():
             sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"
-            before = self._execute(sql, (experiment,)).fetchone()
-            if before is not None and before[0] == digest(definition):
+            stored = self._execute(sql, (experiment,)).fetchone()
+            if stored is not None and stored[0] == digest(definition):
                 sql = "UPDATE experiment SET limits = ? WHERE name = ?"
                 self._execute(sql, (canonical(asdict(limits)), experiment))
-                planned = Planned(before[1], before[2], 0, 0, is_resumed=True)
+                result = Planned(stored[1], stored[2], 0, 0, is_resumed=True)
             else:
                 texts = ((task.key, task.text) for task in tasks)
-                planned = self._replace_plan(experiment, definition, limits, texts)
+                result = self._replace_plan(experiment, definition, limits, texts)
                 for name, text in documents.items():
                     if name != digest(text):
                         raise StoreError(
                             f"the document {name} is not the one with this digest, which is {digest(text)}"
                         )
                     self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, text))
-            self._put_skipped(experiment, skipped)
-            return planned
+            self._replace_skipped(experiment, skipped)
+            return result
 
-    def _put_skipped(self, experiment: str, skipped: Iterable[tuple[str, str]]) -> None:
+    def _replace_skipped(self, experiment: str, skipped: Iterable[tuple[str, str]]) -> None:
         (id,) = self._execute("SELECT id FROM experiment WHERE name = ?", (experiment,)).fetchone()
         self._execute("DELETE FROM skipped WHERE experiment = ?", (id,))
         rows = ((id, system, reason) for system, reason in skipped)
-        self._opened().executemany("INSERT OR REPLACE INTO skipped VALUES (?, ?, ?)", rows)
+        self._require_connection().executemany("INSERT OR REPLACE INTO skipped VALUES (?, ?, ?)", rows)
 
     def _replace_plan(
         self, experiment: str, definition: str, limits: TaskLimits, tasks: Iterable[tuple[str, str]]
@@ -478,16 +472,16 @@ class Store(HtmlDisplay):
         self._execute("CREATE TEMP TABLE earlier (task INTEGER PRIMARY KEY)")
         self._execute("INSERT INTO earlier SELECT DISTINCT task FROM plan WHERE experiment = ?", (id,))
         self._execute("DELETE FROM plan WHERE experiment = ?", (id,))
-        total = new = 0
+        total = new_tasks = 0
         tasks = iter(tasks)
         while batch := list(islice(tasks, PLAN_CHUNK)):
-            new += self._add_tasks(batch)
+            new_tasks += self._add_tasks(batch)
             rows = [(id, number, key) for number, (key, _) in enumerate(batch, total)]
-            self._opened().executemany("INSERT INTO plan SELECT ?, ?, id FROM task WHERE key = ?", rows)
+            self._require_connection().executemany("INSERT INTO plan SELECT ?, ?, id FROM task WHERE key = ?", rows)
             total += len(batch)
         sql = "SELECT count(DISTINCT task) FROM plan WHERE experiment = ?"
-        (different,) = self._execute(sql, (id,)).fetchone()
-        self._execute("UPDATE experiment SET total = ?, tasks = ? WHERE id = ?", (total, different, id))
+        (distinct,) = self._execute(sql, (id,)).fetchone()
+        self._execute("UPDATE experiment SET total = ?, tasks = ? WHERE id = ?", (total, distinct, id))
         sql = "SELECT count(*) FROM earlier WHERE task NOT IN (SELECT task FROM plan WHERE experiment = ?)"
         (dropped,) = self._execute(sql, (id,)).fetchone()
         self._execute(
@@ -496,11 +490,12 @@ class Store(HtmlDisplay):
             "AND NOT EXISTS (SELECT 1 FROM result WHERE result.task = task.id)"
         )
         self._execute("DROP TABLE earlier")
-        return Planned(total, different - new, new, dropped)
+        return Planned(total, distinct - new_tasks, new_tasks, dropped)
 
     def _add_tasks(self, tasks: Sequence[tuple[str, str]]) -> int:
         """Add tasks, given by keys and texts, and return the number of new ones."""
-        return self._opened().executemany("INSERT OR IGNORE INTO task (key, text) VALUES (?, ?)", tasks).rowcount
+        sql = "INSERT OR IGNORE INTO task (key, text) VALUES (?, ?)"
+        return self._require_connection().executemany(sql, tasks).rowcount
 
     # Tasks to be run
 
@@ -516,22 +511,22 @@ class Store(HtmlDisplay):
         With `retry_failed` failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
         i-th of n disjoint parts of the tasks.
         """
-        sql, chosen = self._pending(experiments, retry_failed, shard)
+        sql, queries = self._pending_query(experiments, retry_failed, shard)
         sql = sql.format("t.key, t.text", "JOIN task AS t ON t.id = p.task")
         return (
             Job(self._task(key, text), experiment.limits)
-            for experiment, *values in chosen
+            for experiment, *values in queries
             for rows in self._fetch_plan(sql, experiment, PLAN_CHUNK, *values)
             for key, text in rows
         )
 
     def count_pending(self, experiments: Sequence[str] | None = None, **options: Any) -> int:
         """Return the number of jobs that `pending` yields with these arguments."""
-        sql, chosen = self._pending(experiments, **options)
+        sql, queries = self._pending_query(experiments, **options)
         sql = sql.format("count(*)", "")
-        return sum(self._fetch(sql, (e.id, 0, e.total, *values))[0][0] for e, *values in chosen)
+        return sum(self._fetch(sql, (e.id, 0, e.total, *values))[0][0] for e, *values in queries)
 
-    def _pending(
+    def _pending_query(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
         """Return a query for the pending tasks in a chunk of the plan, and its values for each experiment."""
@@ -541,7 +536,7 @@ class Store(HtmlDisplay):
         chosen = self.experiments(experiments)
         # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once and is in
         # one shard, and the yielded tasks need not be stored.
-        among = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
+        restriction = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
         sql = f"""
             SELECT {{}} FROM plan AS p {{}}
             LEFT JOIN result AS r INDEXED BY result_summary ON r.task = p.task
@@ -549,7 +544,7 @@ class Store(HtmlDisplay):
             AND (r.task IS NULL {"OR r.outcome <> 'ok'" if retry_failed else ""}) AND (p.number + ?) % ? = ?
             AND NOT EXISTS (
                 SELECT 1 FROM plan AS q
-                WHERE q.task = p.task AND (q.experiment, q.number) < (p.experiment, p.number) {among}
+                WHERE q.task = p.task AND (q.experiment, q.number) < (p.experiment, p.number) {restriction}
             )
             ORDER BY p.number"""
         return sql, [(experiment, experiment.offset, parts, part - 1) for experiment in chosen]
@@ -576,13 +571,13 @@ class Store(HtmlDisplay):
                 stored = self._find_result(record.key)
                 if stored is None:
                     raise StoreError(f"{self.name} has no task {record.key}: plan it before its result is added")
-                task, *before, attempts = stored
-                is_kept = before[0] == Outcome.OK and not record.is_ok
-                self._put_result(task, before if is_kept else row, (attempts or 0) + 1)
+                task, *old_row, attempts = stored
+                is_kept = old_row[0] == Outcome.OK and not record.is_ok
+                self._put_result(task, old_row if is_kept else row, (attempts or 0) + 1)
 
     def _find_result(self, key: str) -> Sequence[Any] | None:
         """Return the id, the columns of the result (None if missing) and the attempts of a task; None if unknown."""
-        sql = f"SELECT t.id, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
+        sql = f"SELECT t.id, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
         row: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
         return row
 
@@ -593,14 +588,14 @@ class Store(HtmlDisplay):
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
-        chosen = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
+        stored = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
-            SELECT p.number, t.key, t.text, {_SELECTED}
+            SELECT p.number, t.key, t.text, {_SELECTED_COLUMNS}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         return (
             Row(experiment.name, number, self._task(key, text), self._record(key, cells))
-            for experiment in chosen
+            for experiment in stored
             for rows in self._fetch_plan(sql, experiment, RESULT_CHUNK)
             for number, key, text, *cells in rows
             if missing or cells[0] is not None
@@ -612,14 +607,14 @@ class Store(HtmlDisplay):
         New experiments are added with their plans. Of two results of a task a success replaces a failure; otherwise the
         result of this database is kept. Two experiments of the same name must have the same definition.
         """
-        new = results = replaced = conflicts = 0
+        new_tasks = results = replaced = conflicts = 0
         conflicting: list[str] = []
         with Store.open(other, readonly=True) as source, self._transaction():
             if source.path.samefile(self.path):
                 raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
             own_digests = dict(self._execute("SELECT name, digest FROM experiment").fetchall())
             for experiment in source.experiments():
-                if own_digests.get(experiment.name, defined := digest(experiment.definition)) != defined:
+                if own_digests.get(experiment.name, source_digest := digest(experiment.definition)) != source_digest:
                     raise StoreError(
                         f"the experiment {experiment.name} is defined in one way in {self.name} and in another way in "
                         f"{source.name}: rename it in one of them; nothing was merged"
@@ -630,18 +625,18 @@ class Store(HtmlDisplay):
                         WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
                     tasks = (row for rows in source._fetch_plan(sql, experiment, PLAN_CHUNK) for row in rows)
                     planned = self._replace_plan(experiment.name, experiment.definition, experiment.limits, tasks)
-                    self._put_skipped(experiment.name, source._skipped(experiment))
-                    new += planned.new_tasks
+                    self._replace_skipped(experiment.name, source._skipped(experiment))
+                    new_tasks += planned.new_tasks
             for (name,) in source._fetch("SELECT digest FROM document"):  # one at a time: each document may be long
                 self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, source.document(name)))
             sql = f"""
-                SELECT r.task, t.key, t.text, {_SELECTED} FROM result AS r JOIN task AS t ON t.id = r.task
+                SELECT r.task, t.key, t.text, {_SELECTED_COLUMNS} FROM result AS r JOIN task AS t ON t.id = r.task
                 WHERE r.task > ? ORDER BY r.task LIMIT ?"""
-            last = 0
-            while rows := source._fetch(sql, (last, RESULT_CHUNK)):
-                last = rows[-1][0]
+            last_task = 0
+            while rows := source._fetch(sql, (last_task, RESULT_CHUNK)):
+                last_task = rows[-1][0]
                 for _, key, text, *other_result, attempts in rows:
-                    new += self._add_tasks([(key, text)])
+                    new_tasks += self._add_tasks([(key, text)])
                     task, *own_result, own_attempts = self._find_result(key) or ()
                     if own_result[0] is None or other_result[0] == Outcome.OK != own_result[0]:
                         results += own_result[0] is None
@@ -650,7 +645,7 @@ class Store(HtmlDisplay):
                     elif other_result[0] == Outcome.OK and other_result[1:3] != own_result[1:3]:
                         conflicts += 1
                         conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
-        return Merged(new, results, replaced, conflicts, tuple(conflicting))
+        return Merged(new_tasks, results, replaced, conflicts, tuple(conflicting))
 
     # Queries
 
@@ -665,10 +660,10 @@ class Store(HtmlDisplay):
             "FROM (SELECT DISTINCT task, experiment FROM plan INDEXED BY plan_of_task) AS p "  # may be planned twice
             "JOIN result AS r INDEXED BY result_summary ON r.task = p.task GROUP BY p.experiment, r.outcome, r.verdict"
         )
-        for id, outcome, verdict, count, took in counts:
-            with self._reading(f"the outcomes of {quoted(experiments[id].name)}"):
+        for id, outcome, verdict, count, total_seconds in counts:
+            with self._report_damage(f"the outcomes of {quoted(experiments[id].name)}"):
                 outcomes[id][Outcome(outcome)] += count
-                seconds[id] += took
+                seconds[id] += total_seconds
                 if verdict is not None:
                     verdicts[id][verdict] += count
         return [
@@ -705,16 +700,16 @@ class Store(HtmlDisplay):
                 "digits"
             )
         tasks = self._fetch(
-            f"SELECT t.id, t.key, t.text, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
+            f"SELECT t.id, t.key, t.text, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
             (prefix, f"{prefix}g", MAX_FOUND),  # g comes after every hexadecimal digit
         )
-        places = (
+        places_sql = (
             "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
             "WHERE p.task = ? ORDER BY p.experiment, p.number"
         )
         return [
-            StoredTask(self._task(key, text), self._record(key, row), self._fetch(places, (id,)), row[-1] or 0)
+            StoredTask(self._task(key, text), self._record(key, row), self._fetch(places_sql, (id,)), row[-1] or 0)
             for id, key, text, *row in tasks
         ]
 
@@ -726,7 +721,7 @@ class Store(HtmlDisplay):
         return str(rows[0][0])
 
 
-def _table(text: str) -> dict[str, Any]:
+def _parse_dict(text: str) -> dict[str, Any]:
     """Return the dict encoded in JSON. Raises ValueError or TypeError for any other text."""
     table = json.loads(text)
     if not isinstance(table, dict):

@@ -18,18 +18,18 @@ from typing import Any, NamedTuple
 
 from kahanmaps.display_protocols import HtmlDisplay, shorten
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of, nearest, plain
+from kahanmaps.experiments.results.export import Entry, entries, is_number, names_of, nearest_double, row_data, to_text
 from kahanmaps.experiments.results.records import STORED_OUTCOMES, VERDICTS, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
-_SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # headings in tables
-OF_THE_RUN = ("seconds", "peak_memory")
+_HEADINGS = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # headings in tables
+RUN_COLUMNS = ("seconds", "peak_memory")
 
 # Entries whose values are text even if they look like numbers: an experiment may be called 007, a digest may be
 # 12e34567.
-_WORDS = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
-_RELATED = 3  # maximal number of names suggested for an unknown name
-_LISTED = 60
+_TEXT_NAMES = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
+_MAX_SUGGESTIONS = 3  # maximal number of names suggested for an unknown name
+_MAX_LISTED = 60
 _MAX_WIDTH = 160  # maximal number of characters of a printed cell
 
 
@@ -87,16 +87,16 @@ class Summary(HtmlDisplay):
         lines = [(*g.values, *(c.get(name, 0) for name in names)) for g, c in zip(self.groups, counts, strict=True)]
         pieces: list[tuple[str, list[str], list[tuple[Any, ...]]]] = [("tasks", names, lines)]
         lines = [
-            (*g.values, name, cells["n"], "yes" if cells["same"] else "no", *map(cells.get, _SHOWN))
+            (*g.values, name, cells["n"], "yes" if cells["same"] else "no", *map(cells.get, _HEADINGS))
             for g in self.groups
             for name, cells in g.numbers.items()
         ]
-        pieces += [("numbers", ["number", "n", "same", *_SHOWN.values()], lines)] if lines else []
+        pieces += [("numbers", ["number", "n", "same", *_HEADINGS.values()], lines)] if lines else []
         lines = [(*g.values, name, *cells.values()) for g in self.groups for name, cells in g.flags.items()]
         pieces += [("true or false", ["flag", "true", "false"], lines)] if lines else []
 
         def cell(value: Any) -> str:
-            return f"{value:.{digits}g}" if isinstance(value, float) else shorten(plain(value), _MAX_WIDTH)
+            return f"{value:.{digits}g}" if isinstance(value, float) else shorten(to_text(value), _MAX_WIDTH)
 
         return [
             SummaryTable(
@@ -129,7 +129,7 @@ class _GroupBuilder:
 
     def group(self) -> Group:
         numbers: dict[str, dict[str, float]] = {}
-        for name in sorted(self.numbers, key=lambda name: (name in OF_THE_RUN, name)):
+        for name in sorted(self.numbers, key=lambda name: (name in RUN_COLUMNS, name)):
             ordered = sorted(self.numbers[name])
             n = len(ordered)
             numbers[name] = {"n": n, "same": ordered[0] == ordered[-1]}
@@ -173,79 +173,73 @@ def summarise(
     """
     by = tuple(dict.fromkeys(by))
     groups: dict[tuple[Any, ...], _GroupBuilder] = {}  # the keys identify and sort the groups
-    seen, numeric = set[Entry](), set(() if stable else OF_THE_RUN)
+    seen_entries, numeric_names = set[Entry](), set(() if stable else RUN_COLUMNS)
     has_results = False
     for row in rows:
-        keys: dict[str, Any] = {}
-        measured = {} if stable or row.record is None else {name: getattr(row.record, name) for name in OF_THE_RUN}
+        entry_values: dict[str, Any] = {}
+        numbers = {} if stable or row.record is None else {name: getattr(row.record, name) for name in RUN_COLUMNS}
         for entry, value in entries(row):
-            seen.add(entry)
-            short, full = names_of(entry)
-            for name in (short, full):
+            seen_entries.add(entry)
+            short_name, long_name = names_of(entry)
+            for name in (short_name, long_name):
                 if name in by:
-                    keys.setdefault(name, value)  # if entries have the same name, the first one keeps it
+                    entry_values.setdefault(name, value)  # if entries have the same name, the first one keeps it
             if entry[0] == "result":
                 has_results = True
-                measured[full if short in OF_THE_RUN else short] = value
-        grouped_by = [_sort_key_and_value(row, name, keys.get(name)) for name in by]
-        identity = tuple(key for key, _ in grouped_by)
-        group = groups.get(identity)
+                numbers[long_name if short_name in RUN_COLUMNS else short_name] = value
+        keys_and_values = [_sort_key_and_value(row, name, entry_values.get(name)) for name in by]
+        group_key = tuple(key for key, _ in keys_and_values)
+        group = groups.get(group_key)
         if group is None:
-            group = groups[identity] = _GroupBuilder(tuple(value for _, value in grouped_by))
+            group = groups[group_key] = _GroupBuilder(tuple(value for _, value in keys_and_values))
         group.counts["missing" if row.record is None else row.record.outcome] += 1
         if row.record is not None and row.record.verdict is not None:
             group.verdicts[row.record.verdict] += 1
-        for name, value in measured.items():
+        for name, value in numbers.items():
             if is_number(value):
-                numeric.add(name)
+                numeric_names.add(name)
                 if name in by if values is None else name not in values:
                     continue
                 if isinstance(value, bool):
-                    group.flags[name][plain(value)] += 1
+                    group.flags[name][to_text(value)] += 1
                 else:
-                    group.numbers[name].append(nearest(value))
+                    group.numbers[name].append(nearest_double(value))
     if groups:  # without rows no name can be recognized as unknown
-        short_names, full_names = ({names_of(entry)[k] for entry in seen} for k in (0, 1))
+        short_names, full_names = ({names_of(entry)[k] for entry in seen_entries} for k in (0, 1))
         for name in by:
             if name not in full_names:
                 purpose = "to group by" if has_results else "to group by (there is no result yet)"
-                _must_exist(name, short_names.union(_WORDS), purpose)
+                _require_known(name, short_names.union(_TEXT_NAMES), purpose)
         for name in values or ():
-            _must_exist(name, numeric, "of numbers")
-    return Summary(by, tuple(groups[identity].group() for identity in sorted(groups)))
+            _require_known(name, numeric_names, "of numbers")
+    return Summary(by, tuple(groups[group_key].group() for group_key in sorted(groups)))
 
 
 def _sort_key_and_value(row: Row, name: str, value: Any) -> tuple[Any, Any]:
-    """Return the sort key and the value of a row for a name in `by`; `value` is the entry with this name."""
-    if name == "system":
-        word: str | None = system_words(row.task.system)
-        return (2, word, canonical(row.task.system)), word  # systems in different files may have the same name
-    if name not in _WORDS:
-        return _order(value), value
-    word = (row.task.system or {}).get(name) if name == "document" else known(row)[name] or None
-    return ((3,) if word is None else (2, word)), word
+    """Return the sort key and the value of a row for a name in `by`; `value` is the entry with this name.
 
-
-def _order(value: Any) -> tuple[Any, ...]:
-    """Return a sort key: numbers, then false and true, texts, None. Only equal values have equal keys.
-
-    >>> sorted([None, "x", 10, "1/7", True, "0.5", 2, "1/10"], key=_order)
-    ['1/10', '1/7', '0.5', 2, 10, True, 'x', None]
+    Numbers come first, then false and true, texts, None. Only equal values have equal keys.
     """
-    if value is None:
-        return (3,)
-    if isinstance(value, bool):
-        return 1, value
-    return (0, Fraction(value)) if is_number(value) else (2, plain(value))
+    if name == "system":
+        text: str | None = system_words(row.task.system)
+        return (2, text, canonical(row.task.system)), text  # systems in different files may have the same name
+    if name not in _TEXT_NAMES:
+        if value is None:
+            return (3,), value
+        if isinstance(value, bool):
+            return (1, value), value
+        return ((0, Fraction(value)) if is_number(value) else (2, to_text(value))), value
+    text = (row.task.system or {}).get(name) if name == "document" else row_data(row)[name] or None
+    return ((3,) if text is None else (2, text)), text
 
 
-def _must_exist(name: str, known_names: set[str], purpose: str) -> None:
+def _require_known(name: str, known_names: set[str], purpose: str) -> None:
     if name in known_names:
         return
-    close = difflib.get_close_matches(name, sorted(known_names), _RELATED)
-    meant = f", did you mean {' or '.join(close)}?" if close else ";"
-    listed = sorted(known_names)
-    more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    similar_names = difflib.get_close_matches(name, sorted(known_names), _MAX_SUGGESTIONS)
+    question = f", did you mean {' or '.join(similar_names)}?" if similar_names else ";"
+    names = sorted(known_names)
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
     raise InputError(
-        f"found the unknown name {quoted(name)}{meant} names {purpose}: {', '.join(listed[:_LISTED])}{more}"
+        f"found the unknown name {quoted(name)}{question} names {purpose}: {', '.join(names[:_MAX_LISTED])}{more}"
     )

@@ -1,8 +1,7 @@
 """The spec of the system of a task, as plain data, and the system constructed from it.
 
-    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}           a random member of the family, constructed when it
-    is needed {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the
-    catalogue
+    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}                      a random member, constructed when needed
+    {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the catalogue
 
 A document is the content of a system file as plain data. A spec refers to a document by its digest: hence a task does
 not depend on the path of the file but on its content. The name of a system is part of its spec, since reports print it.
@@ -70,10 +69,10 @@ def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
     >>> family_spec({"m": 3, "seed": 7, "eps": "1/10"})
     {'family': {'draw': 'eigenvalues', 'size': 2, 'm': 3, 'seed': 7}}
     """
-    given = {name: values[name] for name in FAMILY if values.get(name) is not None}
-    draw = given.get("draw", "eigenvalues")
-    size = 1 if "chi" in given or draw == "generic" else 2
-    return {"family": {"draw": draw, "size": size, **given, "seed": values.get("seed", 0)}}
+    given_values = {name: values[name] for name in FAMILY if values.get(name) is not None}
+    draw = given_values.get("draw", "eigenvalues")
+    size = 1 if "chi" in given_values or draw == "generic" else 2
+    return {"family": {"draw": draw, "size": size, **given_values, "seed": values.get("seed", 0)}}
 
 
 def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> SystemFile:
@@ -84,11 +83,11 @@ def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> Syst
     """
     if "family" in spec:
         return _random_system(canonical(spec["family"]))
-    return _read(document(spec["document"]), canonical(spec["parameters"]))
+    return _read_document(document(spec["document"]), canonical(spec["parameters"]))
 
 
 @lru_cache(_MAX_CACHED_SYSTEMS)
-def _read(text: str, parameters: str) -> SystemFile:
+def _read_document(text: str, parameters: str) -> SystemFile:
     return SystemFile(**DocumentReader(json.loads(text), "system", json.loads(parameters)).read())
 
 

@@ -91,25 +91,25 @@ class ClusterWorkers(Executor):
         self._group_seconds = group_seconds
         self._on_message = on_message or (lambda text: None)
         # `env=` of subprocess.run would replace the whole environment of the worker.
-        passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
-        self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
+        environment = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
+        self._command = ["/usr/bin/env", *environment, *(command or [python or sys.executable, "-m", MODULE])]
         self._tries: dict[str, int] = {}  # key of a job in flight -> failed attempts in a group of its own
-        self._open: list[Job] = []
-        self._again: deque[Job] = deque()  # jobs to be run in groups of their own
+        self._open_group: list[Job] = []
+        self._retries: deque[Job] = deque()  # jobs to be run in groups of their own
         self._groups: dict[Any, list[Job]] = {}  # future at the scheduler -> its group
-        self._means: dict[str, float] = {}  # mean seconds of recent tasks by kind
-        self._unfit: set[str] | None = set()  # jobs of groups without records; None: there was a record
-        self._unfit_groups = 0
+        self._mean_seconds: dict[str, float] = {}  # mean seconds of recent tasks by kind
+        self._jobs_without_record: set[str] | None = set()  # jobs of groups without records; None: there was a record
+        self._groups_without_record = 0
         self._client = connect(address, connect_seconds)
-        self._results = import_module("distributed").as_completed(loop=self._client.loop)
-        self._lost: str | None = None  # reason why the scheduler is lost
+        self._futures = import_module("distributed").as_completed(loop=self._client.loop)
+        self._lost_reason: str | None = None  # reason why the scheduler is lost
         self._threads, self._counted_at, self._is_reported = 0, -COUNT_EVERY, False
         self._count_threads()
 
     @property
     def is_free(self) -> bool:
         """Whether one more job may be submitted now."""
-        return not self._again and len(self._groups) < self._window
+        return not self._retries and len(self._groups) < self._max_groups
 
     @property
     def in_flight(self) -> int:
@@ -123,10 +123,10 @@ class ClusterWorkers(Executor):
                 f"task {job.task.key} is already running: submit it again when its record has been returned"
             )
         self._tries[job.task.key] = 0
-        self._open.append(job)
+        self._open_group.append(job)
         # A task of unknown duration is a group of its own.
-        seconds = sum(self._means.get(job.task.kind, self._group_seconds) for job in self._open)
-        if len(self._open) >= LARGEST_GROUP or seconds >= self._group_seconds:
+        seconds = sum(self._mean_seconds.get(job.task.kind, self._group_seconds) for job in self._open_group)
+        if len(self._open_group) >= LARGEST_GROUP or seconds >= self._group_seconds:
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
@@ -137,22 +137,23 @@ class ClusterWorkers(Executor):
         """
         deadline = time.monotonic() + timeout
         while True:
-            while self._again and len(self._groups) < self._window:
-                self._send([self._again.popleft()])
+            while self._retries and len(self._groups) < self._max_groups:
+                self._send([self._retries.popleft()])
             # While every thread has a waiting group, the open group is not sent, and further jobs can be added.
-            if len(self._groups) < self._window:
+            if len(self._groups) < self._max_groups:
                 self._send_open()
-            while not (is_ready := self._results.has_ready()) and time.monotonic() < deadline and self._is_connected:
+            while not (is_ready := self._futures.has_ready()) and time.monotonic() < deadline and self._is_connected:
                 time.sleep(0.01)
-            futures = self._results.next_batch(block=False) if is_ready else []
+            futures = self._futures.next_batch(block=False) if is_ready else []
             self._count_threads()
             records = [record for future in futures if self._is_connected for record in self._collect(future)]
             if records or (self._is_connected and time.monotonic() >= deadline):
                 return records
             if not self._is_connected:
+                reason = self._lost_reason or "the connection was closed"
                 raise ClusterLost(
-                    f"the scheduler at {self.address} is lost ({self._lost or 'the connection was closed'}): what was "
-                    "recorded is safe; run the same command again once the scheduler is back"
+                    f"the scheduler at {self.address} is lost ({reason}): what was recorded is safe; run the same "
+                    "command again once the scheduler is back"
                 )
 
     def close(self) -> None:
@@ -168,13 +169,13 @@ class ClusterWorkers(Executor):
         self._groups.clear()
 
     @property
-    def _window(self) -> int:
+    def _max_groups(self) -> int:
         """The number of groups allowed at the scheduler: for each thread one running group and one waiting group."""
         return max(2, 2 * self._threads)
 
     @property
     def _is_connected(self) -> bool:
-        return self._lost is None and self._client.status == "running"
+        return self._lost_reason is None and self._client.status == "running"
 
     def _count_threads(self) -> None:
         """Count the threads of the workers from time to time, and report once that there are none."""
@@ -188,8 +189,8 @@ class ClusterWorkers(Executor):
             self._is_reported = not self._threads
 
     def _send_open(self) -> None:
-        if self._open:
-            jobs, self._open = self._open, []
+        if self._open_group:
+            jobs, self._open_group = self._open_group, []
             self._send(jobs)
 
     def _send(self, jobs: list[Job]) -> None:
@@ -211,10 +212,10 @@ class ClusterWorkers(Executor):
                     key=f"kahanmaps-{uuid.uuid4().hex}",
                 )
             except Exception as error:  # the client has closed itself after losing the scheduler
-                self._lost = self._lost or on_one_line(error)
+                self._lost_reason = self._lost_reason or on_one_line(error)
                 return
         self._groups[future] = jobs
-        self._results.add(future)
+        self._futures.add(future)
 
     def _collect(self, future: Any) -> list[Record]:
         """Return the records that a group has printed. Its other jobs will be run again alone, or are lost."""
@@ -225,18 +226,18 @@ class ClusterWorkers(Executor):
             output = future.result(timeout=FETCH)
             message = f"the worker's command {ending(output.returncode)}"
             message += " and no record" if output.returncode == 0 else ""
-            is_unfit = output.returncode >= 0
+            has_ended_by_itself = output.returncode >= 0
         except TimeoutError:  # the worker died before its output was fetched: the scheduler repeats the command
-            self._results.add(future)
+            self._futures.add(future)
             return []
         except subprocess.TimeoutExpired as error:
-            output, is_unfit = error, False
+            output, has_ended_by_itself = error, False
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
             if future.status != "error":  # an error of the connection, not of the command
-                self._lost = self._lost or on_one_line(error)
+                self._lost_reason = self._lost_reason or on_one_line(error)
                 return []
-            output, is_unfit = None, "KilledWorker" not in type(error).__name__
+            output, has_ended_by_itself = None, "KilledWorker" not in type(error).__name__
             message = f"the worker could not run its command: {on_one_line(error)}"
         del self._groups[future]
         with suppress(Exception):
@@ -248,31 +249,31 @@ class ClusterWorkers(Executor):
             if record is None or record.key not in unfinished:  # a record that is printed twice is returned once
                 continue
             job = unfinished.pop(record.key)
-            self._unfit = None
+            self._jobs_without_record = None
             if record.outcome is Outcome.LOST:
                 self._tries[record.key] += 1
                 failures.append((job, record))
                 continue
-            mean = self._means.setdefault(job.task.kind, record.seconds)
-            self._means[job.task.kind] += (record.seconds - mean) / 10
+            mean = self._mean_seconds.setdefault(job.task.kind, record.seconds)
+            self._mean_seconds[job.task.kind] += (record.seconds - mean) / 10
             records.append(record)
         stderr = (getattr(output, "stderr", None) or b"").decode(errors="replace")[-TAIL:]
         for key, job in unfinished.items():
             self._tries[key] += is_alone
             failures.append((job, Record(key, Outcome.LOST, message=message, stderr=stderr)))
-        if unfinished and is_unfit and self._unfit is not None:
+        if unfinished and has_ended_by_itself and self._jobs_without_record is not None:
             # A missing installation must not be reported as thousands of lost tasks, nor a crashing task as a
             # missing installation.
-            self._unfit |= unfinished.keys()
-            self._unfit_groups += 1
-            if self._unfit_groups >= UNFIT_AFTER and self._tries.keys() <= self._unfit:
+            self._jobs_without_record |= unfinished.keys()
+            self._groups_without_record += 1
+            if self._groups_without_record >= UNFIT_AFTER and self._tries.keys() <= self._jobs_without_record:
                 command = " ".join(self._command)
                 sentence = f"the workers cannot run {command!r}: {message}, and none has ever printed a record"
                 raise WorkersUnfit(f"{sentence}\n{stderr.strip()}".strip())
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         for job, record in failures:
             if self._tries[record.key] < TRIES:
-                self._again.append(job)
+                self._retries.append(job)
             else:
                 records.append(replace(record, finished=finished))
         for record in records:
@@ -304,11 +305,11 @@ def connect(address: str, timeout: float) -> Any:
         raise InputError(
             f"a cluster needs distributed, which is not installed ({error}): pip install 'kahanmaps[cluster]'"
         ) from None
-    path, chosen = Path(address), address
+    path, scheduler = Path(address), address
     if "://" not in address and (path.is_file() or address.endswith(".json")):
         # distributed would wait forever for a missing file.
         try:
-            chosen = str(json.loads(path.read_text(encoding="utf-8"))["address"])
+            scheduler = str(json.loads(path.read_text(encoding="utf-8"))["address"])
         except OSError as error:
             raise InputError(f"cannot read the scheduler file {address}: {error.strerror}") from None
         except (ValueError, LookupError, TypeError):
@@ -322,16 +323,16 @@ def connect(address: str, timeout: float) -> Any:
             logging.getLogger(name).disabled = True
     client_future: Future[Any] = Future()
 
-    def make() -> None:
+    def make_client() -> None:
         try:
             # distributed warns of different package versions, which do not matter: workers only run a command.
             with warnings.catch_warnings(action="ignore"):
-                client_future.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
+                client_future.set_result(client(scheduler, timeout=timeout, set_as_default=False, name="kahanmaps"))
         except BaseException as error:
             client_future.set_exception(error)
 
     # In a thread: distributed waits forever if another service listens at the address.
-    Thread(target=make, daemon=True).start()
+    Thread(target=make_client, daemon=True).start()
     try:
         return client_future.result(timeout + 1)
     except Exception as error:

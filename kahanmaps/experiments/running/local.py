@@ -49,14 +49,14 @@ GROUP_SECONDS = 5.0  # seconds of work for one worker process: its start takes a
 TAIL = 2000  # characters stored of a message, a traceback, or the output of a worker
 
 # Error messages of Python, FLINT, GMP and OpenBLAS for lack of memory.
-_NO_MEMORY = (
+_MEMORY_PHRASES = (
     *("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc", "not enough memory"),
     *("memory allocation", "memory alloc failed", "malloc failed", "too many memory regions"),
 )
 # Signals raised by a fault in the process or by its own limits: the task, or a library that it called, has crashed. All
 # other signals are sent from outside, e.g. when a job is cancelled or the machine shuts down. The system sends SIGKILL
 # also for lack of memory; this case cannot be recognized.
-_OWN = {
+_CRASH_SIGNALS = {
     *(Signals.SIGSEGV, Signals.SIGABRT, Signals.SIGFPE, Signals.SIGBUS, Signals.SIGILL),
     *(Signals.SIGSYS, Signals.SIGTRAP, Signals.SIGXCPU, Signals.SIGXFSZ),
 }
@@ -165,8 +165,8 @@ class LocalWorkers:
         if error is None:
             try:
                 data |= json.loads(future.result())
-            except (ValueError, RecursionError) as wrong:  # e.g. an integer with more digits than Python parses
-                data |= {"outcome": Outcome.FAILED, "message": f"the result cannot be kept: {wrong}"}
+            except (ValueError, RecursionError) as parse_error:  # e.g. an integer with more digits than Python parses
+                data |= {"outcome": Outcome.FAILED, "message": f"the result cannot be kept: {parse_error}"}
             worker.seconds += data["seconds"]
             # An unexpected error, with a traceback, may be caused by earlier tasks of this worker.
             is_doubtful = data["outcome"] == Outcome.FAILED and "stderr" in data
@@ -182,29 +182,29 @@ class LocalWorkers:
             return _record_of(data)
         # Pebble also reports a broken pool if the worker ended with status 0 or before it accepted the task.
         status = error.exitcode if isinstance(error, ProcessExpired) else worker.exitcode
-        data["stderr"] = printed = worker.printed()
+        data["stderr"] = output = worker.printed()
         is_ready = worker.is_ready
         self._end(worker)
         if isinstance(error, TimeoutError):
             message = f"not done within {attempt.job.limits.time:g} seconds"
             return _record_of({**data, "outcome": Outcome.TIMEOUT, "message": message})
-        ended = f"the child {ending(status)}"
+        ending_text = f"the child {ending(status)}"
         if not is_ready and not is_from_outside(status):
-            output = printed or "no output"
-            raise WorkersError(f"a worker process cannot start (it {ending(status)}): {output}")
+            shown_output = output or "no output"
+            raise WorkersError(f"a worker process cannot start (it {ending(status)}): {shown_output}")
         if is_from_outside(status):
             attempt.tries += 1
             if attempt.tries < self._tries:
                 return None
-            return _record_of({**data, "outcome": Outcome.LOST, "message": ended})
-        lacks_memory = any(phrase in printed.lower() for phrase in _NO_MEMORY)
+            return _record_of({**data, "outcome": Outcome.LOST, "message": ending_text})
+        lacks_memory = any(phrase in output.lower() for phrase in _MEMORY_PHRASES)
         # A signal that reports a fault may also be sent from outside, but hardly twice.
         if not was_fresh or not (lacks_memory or attempt.had_fault or (status is not None and status > 0)):
             attempt.had_fault = True
             return None
         if lacks_memory:
             return _record_of({**data, "outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"})
-        return _record_of({**data, "outcome": Outcome.CRASHED, "message": ended})
+        return _record_of({**data, "outcome": Outcome.CRASHED, "message": ending_text})
 
     def _end(self, worker: _Worker) -> None:
         """Kill a worker. A thread of its pool notices this after some tenths of a second."""
@@ -240,10 +240,10 @@ class _Worker:
     def start_task(self, attempt: _Attempt) -> Future[str]:
         """Start a task and return the future of its record as text."""
         os.ftruncate(self._output.fileno(), 0)
-        new = {key: text for key, text in attempt.documents.items() if key not in self._documents}
-        self._documents.update(new)
+        new_documents = {key: text for key, text in attempt.documents.items() if key not in self._documents}
+        self._documents.update(new_documents)
         job = attempt.job
-        arguments = (job.task.text, job.limits.memory, new)
+        arguments = (job.task.text, job.limits.memory, new_documents)
         future: Future[str] = self.pool.schedule(_run_task, args=arguments, timeout=job.limits.time)
         return future
 
@@ -335,13 +335,13 @@ class _Process(SpawnProcess):
 
 def _record_of(data: dict[str, Any]) -> Record:
     finished = datetime.now(UTC).isoformat(timespec="seconds")
-    where = {"host": platform.node(), "versions": _versions(), "finished": finished}
-    return Record.from_json({**where, **data})
+    environment = {"host": platform.node(), "versions": _versions(), "finished": finished}
+    return Record.from_json({**environment, **data})
 
 
 def is_from_outside(status: int | None) -> bool:
     """Whether this exit status, as in `subprocess`, means that the process was killed from outside."""
-    return status is not None and status < 0 and -status not in _OWN
+    return status is not None and status < 0 and -status not in _CRASH_SIGNALS
 
 
 def ending(status: int | None) -> str:
@@ -431,7 +431,12 @@ def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: 
     except BaseException as error:  # every error of a task becomes its record, even SystemExit
         data |= failure(error)
     _limit_memory(None, idle)
-    return {**data, "seconds": time.perf_counter() - begin, "peak_memory": _peak_memory()}
+    seconds = time.perf_counter() - begin
+    # The largest resident size since the task began, in bytes; without /proc, since the process began.
+    peak_memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    with suppress(OSError), open("/proc/self/status") as file:
+        peak_memory = next((int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM:")), peak_memory)
+    return {**data, "seconds": seconds, "peak_memory": peak_memory}
 
 
 def failure(error: BaseException) -> dict[str, Any]:
@@ -464,8 +469,8 @@ def _limit_memory(memory: int | None, idle: int | None) -> None:
     with suppress(OSError, ValueError):  # the system refuses a limit below the current size
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard
-        if memory is not None and (used := idle or _address_space()) is not None:
-            soft = used + memory
+        if memory is not None and (base := idle or _address_space()) is not None:
+            soft = base + memory
             soft = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
@@ -474,13 +479,3 @@ def _address_space() -> int | None:
     with suppress(OSError), open("/proc/self/statm") as file:
         return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     return None
-
-
-def _peak_memory() -> int:
-    """Return the largest resident size since the task began, in bytes."""
-    with suppress(OSError), open("/proc/self/status") as file:
-        for line in file:
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024

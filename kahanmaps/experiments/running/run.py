@@ -19,7 +19,7 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _TICK = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_SHARED = 4  # records are collected for this multiple of the time taken to write the last list
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time taken to write the last list
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 
@@ -47,7 +47,7 @@ class Batch:
         self._deadline = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
-        executor, took = self._executor, 0.0
+        executor, write_seconds = self._executor, 0.0
         try:
             self._submit_jobs()
             while executor.in_flight:
@@ -55,15 +55,15 @@ class Batch:
                     self.abandoned = executor.in_flight
                     return
                 records = executor.wait(_TICK)
-                end = time.monotonic() + _SHARED * took
-                while records and executor.in_flight and time.monotonic() < end:
+                collection_end = time.monotonic() + _COLLECTION_FACTOR * write_seconds
+                while records and executor.in_flight and time.monotonic() < collection_end:
                     self._submit_jobs()
-                    records += executor.wait(max(0.0, end - time.monotonic()))
+                    records += executor.wait(max(0.0, collection_end - time.monotonic()))
                 self._submit_jobs()
-                began = time.monotonic()
+                write_begin = time.monotonic()
                 yield records
                 if records:
-                    took = min(time.monotonic() - began, _TICK)
+                    write_seconds = min(time.monotonic() - write_begin, _TICK)
         finally:
             executor.close()
 
@@ -154,12 +154,12 @@ def run(
 
 def _jobs(spec: Spec, names: Sequence[str], shard: tuple[int, int]) -> Iterator[Job]:
     """Yield the jobs of a spec in order, each task once."""
-    seen = set()
+    seen_keys = set()
     part, parts = shard
-    chosen = [experiment for experiment in spec.experiments if experiment.name in names]
-    rows = ((experiment, task) for experiment in chosen for task in experiment.tasks())
+    experiments = [experiment for experiment in spec.experiments if experiment.name in names]
+    rows = ((experiment, task) for experiment in experiments for task in experiment.tasks())
     for number, (experiment, task) in enumerate(rows):
-        if task.key not in seen:
-            seen.add(task.key)
+        if task.key not in seen_keys:
+            seen_keys.add(task.key)
             if number % parts == part - 1:
                 yield Job(task, experiment.limits)

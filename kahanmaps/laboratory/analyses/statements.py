@@ -35,8 +35,8 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
     yield Statement(PROVED, f"div f = {divergence}{': the flow preserves volume' if divergence == '0' else ''}")
     yield from (Statement(PROVED, points.text) for points in search.found[:MAX_POINTS])
     if len(search.found) > MAX_POINTS:
-        more = counted(len(search.found) - MAX_POINTS, "more set")
-        yield Statement(NOTE, f"and {more} of fixed points, which --json lists")
+        count_text = counted(len(search.found) - MAX_POINTS, "more set")
+        yield Statement(NOTE, f"and {count_text} of fixed points, which --json lists")
     if search.undecided:
         yield Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}")
     elif not search.found:
@@ -71,9 +71,9 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             yield Statement(time_dependent.integral.verdict, text)
         profile = search.profile
         if search.by_theorems:
-            number = counted(search.by_theorems, "independent integral")
+            count_text = counted(search.by_theorems, "independent integral")
             status = MEASURED if search.symbols else PROVED  # symbols have random values here
-            yield Statement(status, f"{number} by theorems: {search.theorems}")
+            yield Statement(status, f"{count_text} by theorems: {search.theorems}")
         if not profile.nullities:
             yield Statement(UNDECIDED, f"the number of integrals was not measured: {search.reason}")
         elif profile.period is not None:
@@ -82,18 +82,18 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             text = "orbits show no integral"
             if search.codimension:
                 at_least = "" if search.is_exact else "at least "
-                number = f"{at_least}{counted(search.codimension, 'independent integral')}"
+                count_text = f"{at_least}{counted(search.codimension, 'independent integral')}"
                 codimension = f"{at_least}{search.codimension}"
-                text = f"generic orbits lie on varieties of codimension {codimension}, which means {number}"
+                text = f"generic orbits lie on varieties of codimension {codimension}, which means {count_text}"
             empty_degree = max((degree for degree, k in enumerate(profile.nullities, 1) if not k), default=0)
-            relations = (
+            relation_texts = (
                 [f"none up to degree {empty_degree}" if empty_degree > 1 else "none of degree 1"]
                 if empty_degree
                 else []
             )
             spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
-            relations += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
-            yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
+            relation_texts += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
+            yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relation_texts)}")
             if not profile.agree:
                 yield Statement(NOTE, "the orbits that were compared disagree")
         yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in result.relations)
@@ -101,17 +101,17 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             text = "are constant on each orbit and differ between orbits, so they are integrals"
             if len(integrals) == 1:
                 text = "is constant on each orbit and differs between orbits, so it is an integral"
-            yield Statement(NOTE, f"{_listed(integrals)} {text}")
+            yield Statement(NOTE, f"{_join_names(integrals)} {text}")
         if functions := list(
             dict.fromkeys(name for relation in result.relations for name in relation.functions_of_eps)
         ):
-            depend = "depends" if len(functions) == 1 else "depend"
-            yield Statement(NOTE, f"{_listed(functions)} {depend} on eps only")
+            verb = "depends" if len(functions) == 1 else "depend"
+            yield Statement(NOTE, f"{_join_names(functions)} {verb} on eps only")
         if search.reason and profile.nullities:
             yield Statement(NOTE, search.reason)
     if isinstance(result.normal_form, SystemNormalForm):
-        number = counted(result.normal_form.form.m, "independent integral")
-        yield Statement(PROVED, f"{number}, as a member of the commuting family")
+        count_text = counted(result.normal_form.form.m, "independent integral")
+        yield Statement(PROVED, f"{count_text}, as a member of the commuting family")
     if result.pencil is not None:
         growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
         contradiction = result.pencil.contradiction(growth)
@@ -120,7 +120,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         yield Statement(UNDECIDED if contradiction else MEASURED, text)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     """Return the names or, if there are many, the first and the last one."""
     return ", ".join(names) if len(names) <= MAX_NAMES else f"{names[0]}, ..., {names[-1]}"
 
@@ -134,8 +134,8 @@ def of_densities(result: AnalysisResult) -> Iterator[Statement]:
         yield from (Statement(phi.verdict, f"dx/phi is invariant, phi = {phi.text}") for phi in search.shown)
         if len(search.densities) > 1:
             names = [] if result.integrals is None else [integral.name for integral in result.integrals.integrals]
-            times = f"any function of {_listed(names)}" if names else "any integral"
-            yield Statement(NOTE, f"dx/phi is also invariant for this phi times {times}")
+            factor_text = f"any function of {_join_names(names)}" if names else "any integral"
+            yield Statement(NOTE, f"dx/phi is also invariant for this phi times {factor_text}")
     else:
         yield Statement(MEASURED if search.shows_none else UNDECIDED, search.reason)
     if search.anti_invariant is not None:
@@ -165,11 +165,11 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
     """Yield the degrees with their recurrence, then the heights."""
     degrees, heights = result.degrees, result.heights
     if degrees is not None:
-        shown = ", ".join(map(str, degrees.degrees[1 : MAX_DEGREES + 1]))
-        more = ", ..." if len(degrees.degrees) > MAX_DEGREES + 1 else ""
-        if shown:
+        degrees_text = ", ".join(map(str, degrees.degrees[1 : MAX_DEGREES + 1]))
+        ellipsis = ", ..." if len(degrees.degrees) > MAX_DEGREES + 1 else ""
+        if degrees_text:
             status = MEASURED if degrees.primes else PROVED  # without primes: degrees of powers of a matrix
-            yield Statement(status, f"degrees of the iterates: {shown}{more}")
+            yield Statement(status, f"degrees of the iterates: {degrees_text}{ellipsis}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
             certainty = MEASURED if degrees.derived is None else Certainty.DERIVED
@@ -193,13 +193,13 @@ def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
     if len(verdicts) > 1:
         yield Statement(UNDECIDED, f"the values {values} of eps disagree: {', '.join(sorted(verdicts))}")
         return
-    first = min(result.singularities, key=lambda run: run.followed or 0)
-    at = f" (eps = {values})" if result.file.map.has_eps else ""
-    status = UNDECIDED if first.verdict == SingularityOutcome.UNDECIDED else MEASURED
-    yield Statement(status, f"{first.text}{at}")
-    ends = [h.confined_at for run in result.singularities for h in run.hypersurfaces if h.confined_at is not None]
-    if ends:
-        yield Statement(MEASURED, f"the longest confined pattern has {counted(max(ends), first.unit)}")
+    shortest_run = min(result.singularities, key=lambda run: run.followed or 0)
+    eps_text = f" (eps = {values})" if result.file.map.has_eps else ""
+    status = UNDECIDED if shortest_run.verdict == SingularityOutcome.UNDECIDED else MEASURED
+    yield Statement(status, f"{shortest_run.text}{eps_text}")
+    lengths = [h.confined_at for run in result.singularities for h in run.hypersurfaces if h.confined_at is not None]
+    if lengths:
+        yield Statement(MEASURED, f"the longest confined pattern has {counted(max(lengths), shortest_run.unit)}")
 
 
 def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
@@ -208,8 +208,8 @@ def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
     if search is None:
         return
     texts = []
-    if (linear := len(search.infinitesimal)) > MAX_FIELDS:
-        texts.append(f"a Lie algebra of affine symmetries, of dimension {linear}")
+    if (dimension := len(search.infinitesimal)) > MAX_FIELDS:
+        texts.append(f"a Lie algebra of affine symmetries, of dimension {dimension}")
     else:
         fields = [f"({', '.join(x.rhs)})" for x in search.infinitesimal]
         texts += [f"a one-parameter group of symmetries, the flow of {field}" for field in fields]
@@ -236,13 +236,35 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
     elif structures is not None and structures.proved:
         yield Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}")
     if result.file.is_quadratic:
-        yield from _hyperplanes(result)
+        # The hyperplanes that are invariant under the flow, grouped by the action of the map on them.
+        system, eps = result.file.system, result.eps
+        planes_by_image: dict[str, list[str]] = {}
+        for darboux in affine_darboux(system).functions:
+            image = "not birational" if result.defect else "invariant"
+            if eps is not None and not result.defect:
+                image = under_map(system, darboux.function, eps)
+            planes_by_image.setdefault(image, []).append(f"{format_polynomial(darboux.function)} = 0")
+        kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
+        for image, planes in planes_by_image.items():
+            subject_text, it = f"the {kind} {planes[0]} is", "it"
+            if len(planes) > 1:
+                subject_text, it = f"the {kind}s {', '.join(planes[:-1])} and {planes[-1]} are", "them"
+            at_eps = f" for the flow; at eps = {eps} the map"
+            endings = {
+                "invariant": ", for flow and map",
+                "contracted": f"{at_eps} contracts {it}: det(I + eps f'(x)) is 0 there",
+                "undefined": f"{at_eps} is not defined on {it}: det(I - eps f'(x)) is 0 there",
+                "undecided": f" for the flow; deciding the image of {it} under the map at eps = {eps} "
+                "would take too long",
+                "not birational": " for the flow",
+            }
+            yield Statement(PROVED, f"{subject_text} invariant{endings[image]}")
     if result.normal_form is not None and result.normal_form.text:
         text = f"belongs to the commuting family: {result.normal_form.text}"
         centre = f"({', '.join(map(format_number, result.centre))})" if result.centre and any(result.centre) else ""
         if result.normal_form.T is not None or centre:
-            moved = "y" if result.normal_form.T is None else "T y"
-            text += f", in coordinates y with x = {' + '.join(filter(None, [centre, moved]))}"
+            linear_text = "y" if result.normal_form.T is None else "T y"
+            text += f", in coordinates y with x = {' + '.join(filter(None, [centre, linear_text]))}"
         yield Statement(PROVED, text)
     if result.tensor is not None:
         text = "" if result.defect else ": the map is the Kahan map over K, to which docs/beyond.md applies"
@@ -253,45 +275,21 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
         yield Statement(PROVED, f"{text} each root t")
 
 
-def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the hyperplanes that are invariant under the flow, grouped by the action of the map on them."""
-    system, eps = result.file.system, result.eps
-    planes_by_image: dict[str, list[str]] = {}
-    for darboux in affine_darboux(system).functions:
-        image = "not birational" if result.defect else "invariant"
-        if eps is not None and not result.defect:
-            image = under_map(system, darboux.function, eps)
-        planes_by_image.setdefault(image, []).append(f"{format_polynomial(darboux.function)} = 0")
-    kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
-    for image, planes in planes_by_image.items():
-        are, it = f"the {kind} {planes[0]} is", "it"
-        if len(planes) > 1:
-            are, it = f"the {kind}s {', '.join(planes[:-1])} and {planes[-1]} are", "them"
-        of_map = {
-            "invariant": ", for flow and map",
-            "contracted": f" for the flow; at eps = {eps} the map contracts {it}: det(I + eps f'(x)) is 0 there",
-            "undefined": f" for the flow; at eps = {eps} the map is not defined on {it}: det(I - eps f'(x)) is 0 there",
-            "undecided": f" for the flow; deciding the image of {it} under the map at eps = {eps} would take too long",
-            "not birational": " for the flow",
-        }
-        yield Statement(PROVED, f"{are} invariant{of_map[image]}")
-
-
 def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     """Yield statements on the systems g whose Kahan maps commute with that of f, one statement for g and -g."""
     if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
-        split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
-        yield Statement(PROVED, text if split else f"{text} over the splitting field of chi")
+        is_split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
+        yield Statement(PROVED, text if is_split else f"{text} over the splitting field of chi")
     search = result.commuting
     if search is None:
         return
     if search.every_g_commutes:
         yield Statement(PROVED, "the map is the identity and commutes with every other")
-    listed: list[CommutingField] = []
+    listed_fields: list[CommutingField] = []
     for g in search.nontrivial:  # -g is also a solution, since its map is the inverse
-        if not any(g.system == other.system.scaled(-1) for other in listed):
-            listed.append(g)
+        if not any(g.system == other.system.scaled(-1) for other in listed_fields):
+            listed_fields.append(g)
             text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(g.rhs)})"
             yield Statement(g.finding.verdict, text)
     for k, family in enumerate(search.families):
@@ -299,15 +297,17 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
         if opposite not in [(other.base.system, [g.system for g in other.directions]) for other in search.families[:k]]:
             # All fields g of the family, or the number of its parameters if the formula is long.
             base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
-            moved = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
-            which = "g and -g, g" if base else "all g"  # without a base the family contains -g
-            letters = ", ".join(f"t{j}" for j in range(1, len(moved) + 1))
-            text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
+            terms = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
+            fields_text = "g and -g, g" if base else "all g"  # without a base the family contains -g
+            parameters = ", ".join(f"t{j}" for j in range(1, len(terms) + 1))
+            text = (
+                f"commutes with the Kahan maps of {fields_text} = {' + '.join([*base, *terms])}, for all {parameters}"
+            )
             if len(text) > MAX_CHARACTERS:
-                number = counted(len(moved), "parameter")
-                text = f"commutes with a linear family of {number}, which find-commuting writes out"
+                count_text = counted(len(terms), "parameter")
+                text = f"commutes with a linear family of {count_text}, which find-commuting writes out"
             yield Statement(family.finding.verdict, text)
     yield from (Statement(NOTE, text) for text in (*search.irrational, search.note) if text)
     yield from (Statement(UNDECIDED, text) for text in search.undecided)
-    if not (listed or search.every_g_commutes or search.families or search.irrational or search.undecided):
+    if not (listed_fields or search.every_g_commutes or search.families or search.irrational or search.undecided):
         yield Statement(PROVED, f"among the {search.kind_text} only 0, f and -f commute with f")

@@ -9,7 +9,7 @@ from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.family.tensor import TensorStructure, tensor_structure
+from kahanmaps.family.tensor import tensor_structure
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses import statements
 from kahanmaps.laboratory.analyses.step import AnalysisContext, AnalysisStep, MapKinds
@@ -17,7 +17,7 @@ from kahanmaps.laboratory.analysis_result import AnalysisResult
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities, with_factors
+from kahanmaps.laboratory.preserve.densities import find_densities, with_factors
 from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation, sparse_relations
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map, with_limit
@@ -40,7 +40,7 @@ from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 _POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities; in higher dimensions the search is slow
 
 
-def _family(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
+def _find_normal_form(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
     """Return the normal form of a member of the commuting family, in coordinates with the centre as origin."""
     structures = context.result.hamiltonian
     if structures is None or structures.hamiltonian is None:
@@ -51,51 +51,46 @@ def _family(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalFo
     return system_normal_form(hamiltonian.system, hamiltonian)
 
 
-def _family_json(result: AnalysisResult) -> dict[str, Any]:
+def _normal_form_json(result: AnalysisResult) -> dict[str, Any]:
     """Return the structure of a member of the commuting family: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
-    member = None
+    data = None
     if isinstance(result.normal_form, SystemNormalForm):
         form = result.normal_form.form
-        member = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
-        member |= {**attributes(result.normal_form, "A", "T"), **attributes(result, "centre")}
-    return {"family": (result.normal_form.text or None) if result.normal_form is not None else None, "member": member}
+        data = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
+        data |= {**attributes(result.normal_form, "A", "T"), **attributes(result, "centre")}
+    return {"family": (result.normal_form.text or None) if result.normal_form is not None else None, "member": data}
 
 
-def _algebra(context: AnalysisContext, **_: Any) -> TensorStructure | None:
-    """Return an algebra larger than Q over which f is defined; None if f has a normal form, which says more."""
-    return None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
-
-
-def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
+def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
     """Return the singularities at the given eps or at two values of eps; none if formulas would be too large."""
     values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
     if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
-    stages = zip(values, effort.share([1] * len(values)), strict=True)
+    values_with_budget = zip(values, effort.share([1] * len(values)), strict=True)
     return [
-        find_singularities(context.map, value, seed=context.seed, effort=stage, progress=progress)
-        for value, stage in stages
+        find_singularities(context.map, value, seed=context.seed, effort=budget, progress=progress)
+        for value, budget in values_with_budget
     ]
 
 
-def _degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
+def _measure_degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
     """Return the degrees of the iterates, derived from the singularity patterns if these are known."""
-    runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
+    singularity_runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
     # Used only if known for all steps, and thus equal to the patterns that `degree_growth` would compute.
-    patterns_of_runs = patterns_of(runs) if runs else None
-    patterns = None if patterns_of_runs is None or patterns_of_runs.running else patterns_of_runs
+    computed_patterns = patterns_of(singularity_runs) if singularity_runs else None
+    patterns = None if computed_patterns is None or computed_patterns.running else computed_patterns
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
 
 
-def _curves(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil | None:
+def _find_pencil(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil | None:
     """Return the pencil of invariant curves of a planar map with one integral."""
-    proved = [integral for integral in context.integrals if integral.verdict is Certainty.PROVED]
-    if context.dim != 2 or len(proved) != 1 or context.has_symbols:
+    integrals = [integral for integral in context.integrals if integral.verdict is Certainty.PROVED]
+    if context.dim != 2 or len(integrals) != 1 or context.has_symbols:
         return None
-    return pencil_of(proved[0].name, proved[0].function, context.result.eps, seed=context.seed, effort=effort)
+    return pencil_of(integrals[0].name, integrals[0].function, context.result.eps, seed=context.seed, effort=effort)
 
 
-def _curves_json(result: AnalysisResult) -> dict[str, Any]:
+def _pencil_json(result: AnalysisResult) -> dict[str, Any]:
     """Return the curves and the action of the map on them; null if the degrees contradict the curves."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     if result.pencil is None or result.pencil.contradiction(growth):
@@ -103,7 +98,7 @@ def _curves_json(result: AnalysisResult) -> dict[str, Any]:
     return {"invariant_curves": {**result.pencil.to_json(), "motion": result.pencil.motion(growth)}}
 
 
-def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
+def _find_relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
     """Return the Hirota-Kimura relations with few terms, in the lowest degrees in which there are any."""
     profile = None if context.result.integrals is None else context.result.integrals.profile
     if profile is None or profile.first_degree is None or profile.period is not None:
@@ -112,12 +107,12 @@ def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]
     maps = Laboratory(context.file_without_claims, (), context.result.eps, context.seed, algebraic=True).maps
     last_degree = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
     for degree in range(profile.first_degree, min(last_degree, profile.degree, 4) + 1):
-        first = 1 + len({name for relation in relations for name in relation.names})
-        relations += sparse_relations(maps, degree, context.map.variables, first=first) or ()
+        first_index = 1 + len({name for relation in relations for name in relation.names})
+        relations += sparse_relations(maps, degree, context.map.variables, first=first_index) or ()
     return relations
 
 
-def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> PoissonSearch | None:
+def _find_poisson_tensors(context: AnalysisContext, effort: Budget, **options: Any) -> PoissonSearch | None:
     """Return the invariant tensors of low degree, with their Casimirs and the integrals in involution."""
     if context.dim not in _POISSON_DIMENSIONS:
         return None
@@ -125,14 +120,7 @@ def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> Poisso
     return with_brackets(search, context.integrals, effort)
 
 
-def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
-    """Search for densities: polynomials, or products of powers of factors of the integrals."""
-    return with_factors(
-        find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
-    )
-
-
-def _flow(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
+def _find_limits(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
     """Return the limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
     if context.result.integrals is None:
         return None
@@ -157,16 +145,19 @@ ANALYSES = (
     ),
     AnalysisStep(
         "the commuting family",
-        _family,
+        _find_normal_form,
         "structure",
         statements.of_structure,
         key="normal_form",
         requires=("Hamiltonian structure", "a larger algebra"),
-        json=_family_json,
+        json=_normal_form_json,
     ),
     AnalysisStep(
         "a larger algebra",
-        _algebra,
+        # An algebra larger than Q over which f is defined, unless f has a normal form, which says more.
+        lambda context, **_: (
+            None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
+        ),
         key="tensor",
         json=lambda result: {
             "algebra": result.tensor and attributes(result.tensor, "text", "C", "rank", chi="chi_text")
@@ -188,7 +179,7 @@ ANALYSES = (
     # Degrees use the singularities. Above dimension 4 these are slow and run last, without degrees using them.
     AnalysisStep(
         "singularities",
-        _singularities,
+        _trace_patterns,
         "singularities",
         statements.of_singularities,
         MapKinds.OVER_Q,
@@ -201,7 +192,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "degrees",
-        _degrees,
+        _measure_degrees,
         "growth",
         statements.of_growth,
         MapKinds.ALL,
@@ -218,26 +209,35 @@ ANALYSES = (
         weight=0.4,
         requires=("the commuting family", "degrees", "invariant curves", "relations along orbits"),
     ),
-    AnalysisStep("invariant curves", _curves, applies_to=MapKinds.OVER_Q, key="pencil", json=_curves_json),
+    AnalysisStep("invariant curves", _find_pencil, applies_to=MapKinds.OVER_Q, key="pencil", json=_pencil_json),
     AnalysisStep(
         "relations along orbits",
-        _relations,
+        _find_relations,
         applies_to=MapKinds.ALL,
         key="relations",
         json=lambda result: {"hirota_kimura": [relation.text for relation in result.relations]},
     ),
     AnalysisStep(
         "Poisson tensors",
-        _poisson,
+        _find_poisson_tensors,
         "Poisson tensors",
         statements.of_poisson_tensors,
         MapKinds.OVER_Q,
         key="poisson",
     ),
     AnalysisStep(
-        "densities", _densities, "measure", statements.of_densities, MapKinds.ALL, weight=0.25, requires=("integrals",)
+        "densities",
+        # Polynomials, or products of powers of factors of the integrals.
+        lambda context, **options: with_factors(
+            find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
+        ),
+        "measure",
+        statements.of_densities,
+        MapKinds.ALL,
+        weight=0.25,
+        requires=("integrals",),
     ),
-    AnalysisStep("the flow", _flow, "the flow", statements.of_flow, MapKinds.OVER_Q, weight=0.06, key="flow"),
+    AnalysisStep("the flow", _find_limits, "the flow", statements.of_flow, MapKinds.OVER_Q, weight=0.06, key="flow"),
     AnalysisStep(
         "heights",
         lambda context, **options: height_survey(

@@ -58,7 +58,7 @@ class Stopped(Exception):
         self.ended, self.message = ended, message
 
 
-def reduced(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
+def reduce_map(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
     """Return the map modulo a random prime of 61 bits, at a random residue if `eps` is None. Raises BadPrime."""
     field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
@@ -85,8 +85,8 @@ class Line:
         self._equations = map_.equations
         self.steps = 0
         self.degree = 1
-        drawn = (nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(map_.dim))
-        self._X = [*drawn, nmod_poly([1], p)] if start is None else list(start)
+        coordinates = (nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(map_.dim))
+        self._X = [*coordinates, nmod_poly([1], p)] if start is None else list(start)
 
     @property
     def is_explicit(self) -> bool:
@@ -99,7 +99,7 @@ class Line:
         Raises ZeroDivisionError if the map is undefined at all points of the curve, and Stopped at a limit.
         """
         for equation in self._equations:
-            too_large = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+            degree_error = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
             curve: list[nmod_poly] | None = None
             if equation.dim <= _MAX_MINORS_DIMENSION or equation.explicit is not None:
                 curve = self._image_by_minors(equation)
@@ -108,13 +108,13 @@ class Line:
             # With a guess that is too small the terms of the margin disagree, and the length is doubled.
             while curve is None:
                 self._require_budget()
-                curve = self._reconstruct_curve(self._image_series(equation, length), length)
+                curve = self._image_by_series(equation, length)
                 if curve is None and length == max_length:
-                    raise too_large
+                    raise degree_error
                 length = min(2 * length, max_length)
             degree = max(0, *(int(entry.degree()) for entry in curve))
             if degree > self._max_degree:
-                raise too_large
+                raise degree_error
             self._X, self.degree = curve, degree
         self.steps += 1
 
@@ -127,17 +127,17 @@ class Line:
         *numerators, denominator = equation.image(self._X, nmod_poly([0], self.prime), times)
         if denominator.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
-        common = denominator.gcd(self._random_combination(numerators))
-        count_work(gcd_units(len(denominator), len(common)))
+        common_factor = denominator.gcd(self._random_combination(numerators))
+        count_work(gcd_units(len(denominator), len(common_factor)))
         self._require_budget()
         curve, t = [], nmod(self._rng.randrange(self.prime), self.prime)
         for entry in (*numerators, denominator):
-            count_work(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
-            quotient = entry // common
+            count_work(product_units(len(common_factor), len(entry) - len(common_factor) + 1) + len(entry) / 20)
+            quotient = entry // common_factor
             # With probability about 1/p the random combination has a factor that is not common to all numerators.
-            if quotient(t) * common(t) != entry(t):
-                common = reduce(nmod_poly.gcd, numerators, denominator)
-                return [entry // common for entry in (*numerators, denominator)]
+            if quotient(t) * common_factor(t) != entry(t):
+                common_factor = reduce(nmod_poly.gcd, numerators, denominator)
+                return [entry // common_factor for entry in (*numerators, denominator)]
             curve.append(quotient)
         return curve
 
@@ -149,24 +149,22 @@ class Line:
         if self._budget.is_spent:
             raise Stopped(Ended.BUDGET, f"work limit reached at iterate {self.steps + 1}; raise --effort")
 
-    def _image_series(self, equation: Equation, length: int) -> list[nmod_poly]:
-        """Return the coordinates of the next curve as power series, to `length` terms."""
+    def _image_by_series(self, equation: Equation, length: int) -> list[nmod_poly] | None:
+        """Return the image from power series with `length` terms, or None if these are too few to be certain."""
         X = [entry.truncate(length) for entry in self._X]
-        values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
+        monomials = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
         count_work(row_units(equation, length))
         try:
-            rows = equation.rows(values, nmod_poly([0], self.prime))
+            rows = equation.rows(monomials, nmod_poly([0], self.prime))
             *x, denominator = kernel(rows, 1, length, [], self._require_budget)
         except PrecisionTooLow:
             raise ZeroDivisionError("the point t = 0 of the line has no image") from None
         if not int(denominator[0]):
             raise ZeroDivisionError("the point t = 0 of the line has no image")
         count_work(series_units(length) + len(x) * product_units(length, length))
-        inverse = denominator.inverse_series_trunc(length)
-        return [entry.mul_low(inverse, length) for entry in x]
-
-    def _reconstruct_curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
-        """Return the polynomials (X : Z) with X/Z = x, or None if x has too few terms to be certain."""
+        reciprocal = denominator.inverse_series_trunc(length)
+        x = [entry.mul_low(reciprocal, length) for entry in x]
+        # The polynomials (X : Z) with X/Z = x.
         for _ in range(2):
             numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)
@@ -179,11 +177,11 @@ class Line:
             # Numerator and denominator may have the same degree; without its first term the series is t times a
             # proper fraction.
             values = (values + [0] * (length - len(values)))[1:]
-            minimal = self._context.minpoly(values)
-            degree = int(minimal.degree())
+            recurrence = self._context.minpoly(values)
+            degree = int(recurrence.degree())
             if 2 * degree + _MARGIN > len(values):
                 return None
-            denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
+            denominator = nmod_poly([int(c) for c in reversed(recurrence.coeffs())], self.prime)
             Z = denominator.mul_low(inverse, length)
             curve = [*(Z.mul_low(entry, length) for entry in x), Z]
             # Unless the random functions are in special position, this is the denominator of all coordinates.

@@ -38,7 +38,7 @@ from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduce_map
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.laboratory.singular.written import forms_over_eps
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -115,7 +115,7 @@ def bound_dynamical_degree(
     budget = budget_for("dynamical degree", effort)
     for _ in range(_TRIES):
         try:
-            modular_map = reduced(map_, eps, rng)
+            modular_map = reduce_map(map_, eps, rng)
             if not is_birational(modular_map, rng):
                 continue
             bounds = _search_lower_bound(modular_map, rng, budget, progress)
@@ -124,8 +124,8 @@ def bound_dynamical_degree(
         if bounds is None:
             return None
         with flint.ctx.workprec(128):  # the smallest (deg f^n)^(1/n) of the iterates with formulas, rounded up
-            roots = [arb(degree).root(n) for n, degree in enumerate(_degrees_of_formulas(map_, eps, budget), 1)]
-            return replace(bounds, upper=round_up(min(roots).upper()))
+            upper_bounds = [arb(degree).root(n) for n, degree in enumerate(_degrees_of_formulas(map_, eps, budget), 1)]
+            return replace(bounds, upper=round_up(min(upper_bounds).upper()))
     return None
 
 
@@ -151,15 +151,15 @@ def is_birational(map_: Map, rng: random.Random) -> bool:
     return True
 
 
-def degree_above(largest: int, lines: int) -> int:
+def degree_above(max_line_degree: int, line_count: int) -> int:
     """Bound the degree D of a birational map of the plane by the largest of its degrees along tangents of a conic.
 
-    There must be more than six `lines`. Returns the largest D with lines (D - largest) <= 6 (D - 1).
+    There must be more than six `line_count`. Returns the largest D with lines (D - largest) <= 6 (D - 1).
 
     >>> degree_above(100, 96), degree_above(1, 96), degree_above(16, 97)
     (106, 1, 16)
     """
-    return (lines * largest - 6) // (lines - 6)
+    return (line_count * max_line_degree - 6) // (line_count - 6)
 
 
 def lower_bound(lower: int, upper: int, steps: int) -> arb | None:
@@ -190,14 +190,14 @@ def _search_lower_bound(
     except Stopped:
         pass
     candidates = range(1, (len(degrees) - 1) // 2 + 1)
-    expected = {n: lower_bound(degrees[2 * n], degree_above(degrees[n], _TANGENTS), n) for n in candidates}
-    bounds = {n: float(bound) for n, bound in expected.items() if bound is not None}
+    expected_bounds = {n: lower_bound(degrees[2 * n], degree_above(degrees[n], _TANGENTS), n) for n in candidates}
+    bounds = {n: float(bound) for n, bound in expected_bounds.items() if bound is not None}
     if not bounds:
         return None
     # Degrees along tangents are expensive: they are computed only for the number of steps that promises the best bound.
     steps = max(bounds, key=bounds.__getitem__)
     # Tangents of a random conic: the lines with coordinates (1 : s : s^2), moved by a random matrix.
-    p, largest = map_.field.characteristic, 0
+    p, max_tangent_degree = map_.field.characteristic, 0
     matrix = nmod_mat(3, 3, p)
     while not int(matrix.det()):
         matrix = nmod_mat(3, 3, [rng.randrange(p) for _ in range(9)], p)
@@ -211,9 +211,9 @@ def _search_lower_bound(
                 tangent.step(0)
         except Stopped:
             return None
-        largest = max(largest, tangent.degree)
-        progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {largest}")
-    upper = degree_above(largest, _TANGENTS)
+        max_tangent_degree = max(max_tangent_degree, tangent.degree)
+        progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {max_tangent_degree}")
+    upper = degree_above(max_tangent_degree, _TANGENTS)
     bound = lower_bound(degrees[2 * steps], upper, steps)
     if bound is None:
         return None
@@ -230,16 +230,16 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
         return
     # The forms are composed. Minors of composed rows would have a common factor, and far higher degrees.
     ring = forms[0].context()
-    *X, symbol = ring.gens()
-    degree = max(degree_in(entry, 3) for entry in forms)
+    *X, eps_variable = ring.gens()
+    degree = max(degree_in(form, 3) for form in forms)
     max_terms = min(_MAX_TERMS, _MAX_NEXT_TERMS // max(1, degree) ** 2)
     iterate = list(X)
     for _ in range(_MAX_FORMULAS):
-        image = [entry.compose(*iterate, symbol, ctx=ring) for entry in forms]
+        image = [form.compose(*iterate, eps_variable, ctx=ring) for form in forms]
         count_work(20 + 10 * sum(map(len, image)))  # includes the gcd
-        common = reduce(fmpq_mpoly.gcd, image)
-        iterate = [entry / common for entry in image]
-        yield max(degree_in(entry, 3) for entry in iterate)
+        common_factor = reduce(fmpq_mpoly.gcd, image)
+        iterate = [form / common_factor for form in image]
+        yield max(degree_in(form, 3) for form in iterate)
         if budget.is_spent or max(map(len, iterate)) > max_terms:
             return
 

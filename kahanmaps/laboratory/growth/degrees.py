@@ -35,7 +35,7 @@ from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import ITERATE_DEGREE, budget_for
-from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
+from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduce_map
 from kahanmaps.laboratory.growth.degree_bounds import DynamicalDegreeBounds, bound_dynamical_degree
 from kahanmaps.laboratory.growth.proofs import (
     GrowthProof,
@@ -125,10 +125,10 @@ class DegreeGrowth(PrintableResult):
                 "degrees drop although no exceptional hypersurface is mapped into the indeterminacy locus; "
                 "try another --seed"
             )
-        if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
-            longest = max(self.patterns.lengths)
-            pattern = f"a singularity pattern of {longest} steps"
-            return f"{pattern} calls for {needed - 1} iterates; raise --effort or --max-degree"
+        if len(self.degrees) < (needed_terms := self.patterns.terms_needed(self.fitted.order)):
+            longest_pattern = max(self.patterns.lengths)
+            pattern_text = f"a singularity pattern of {longest_pattern} steps"
+            return f"{pattern_text} calls for {needed_terms - 1} iterates; raise --effort or --max-degree"
         return ""
 
     @property
@@ -198,20 +198,20 @@ class DegreeGrowth(PrintableResult):
                 return "exponential growth" + (
                     f", dynamical degree {source.rate.text}" if source.rate is not None else ""
                 )
-            power = f" of degree {source.power}" if source.growth is Growth.POLYNOMIAL else ""
-            return f"{source.growth} growth{power}, dynamical degree 1"
-        terms = counted(len(self.degrees), "term")
+            power_text = f" of degree {source.power}" if source.growth is Growth.POLYNOMIAL else ""
+            return f"{source.growth} growth{power_text}, dynamical degree 1"
+        terms_text = counted(len(self.degrees), "term")
         if self.looks_exponential:
-            why = self.unconfirmed or f"no recurrence in {terms}"
+            reason = self.unconfirmed or f"no recurrence in {terms_text}"
             quotients = sorted(d / c for c, d in zip(self.degrees[-4:], self.degrees[-3:], strict=False))
-            spread = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}"
-            growth = "exponential growth" if self.enclosure is None else "exponential growth (proved),"
-            return f"{growth} by a factor of about {self.estimate} (estimated: {spread}; {why})"
+            quotients_text = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}"
+            growth_text = "exponential growth" if self.enclosure is None else "exponential growth (proved),"
+            return f"{growth_text} by a factor of about {self.estimate} (estimated: {quotients_text}; {reason})"
         if self.fitted is not None:
-            return f"{terms} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
+            return f"{terms_text} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
         n = len(self.degrees) - 1
-        estimate = f"; d_n^(1/n) is {self.estimate} for n = {n}, an estimate only" if self.estimate else ""
-        return f"no recurrence found in {terms}{estimate}"
+        estimate_text = f"; d_n^(1/n) is {self.estimate} for n = {n}, an estimate only" if self.estimate else ""
+        return f"no recurrence found in {terms_text}{estimate_text}"
 
     @property
     def basis(self) -> str:
@@ -323,8 +323,8 @@ def degree_growth(
     ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
     """
     eps = resolve_eps(eps, time_step, h)
-    exact = None if eps is None else rational(eps)
-    if exact == 0:
+    exact_eps = None if eps is None else rational(eps)
+    if exact_eps == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if max_terms is not None and not 0 <= integer(max_terms, "max_terms") <= MAX_TERMS:
         raise InputError(f"found {max_terms} terms, expected 0 to {MAX_TERMS}")
@@ -332,7 +332,7 @@ def degree_growth(
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    search = _Search(as_map(system), exact, budget_for("degrees", effort), max_degree, seed, steps, patterns)
+    search = _Search(as_map(system), exact_eps, budget_for("degrees", effort), max_degree, seed, steps, patterns)
     try:
         return search.run(max_terms, enclosed, progress)
     except TimeLimit as stop:
@@ -392,28 +392,28 @@ class _Search:
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
             # The degrees of a monomial map are exact: powers of its exponent matrix give them.
-            power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
+            power, ending, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
             while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
                 recurrence = find_recurrence(self.degrees) if max_terms is None else None
                 if recurrence is not None and recurrence.checked >= max(6, recurrence.order):
                     break
                 degree = monomial_degree(power)
                 if degree > self.max_degree:
-                    ended = Ended.DEGREE
+                    ending = Ended.DEGREE
                     message = f"the degree of iterate {len(self.degrees)} is above {self.max_degree}"
                     break
                 self.degrees.append(degree)
                 power = power * matrix
             iterates = counted(len(self.degrees) - 1, "iterate")
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
-            return self.result(ended, message, proof=period_proof or proof)
+            return self.result(ending, message, proof=period_proof or proof)
 
         rng = random.Random(f"degrees {derive_seed(self.seed, self.map.subject, self.eps)}")
 
         def new_line() -> Line:
             while True:
                 try:
-                    return Line(reduced(self.map, self.eps, rng), rng, self.budget, self.max_degree)
+                    return Line(reduce_map(self.map, self.eps, rng), rng, self.budget, self.max_degree)
                 except BadPrime:
                     continue
 
@@ -430,10 +430,10 @@ class _Search:
                 if self.degrees[-1] == 0 and max_terms is None:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as stop:
-            ended, message = stop.ended, stop.message
-        if ended is Ended.DEGREE:  # there may be too few degrees for a recurrence
+            ending, message = stop.ended, stop.message
+        if ending is Ended.DEGREE:  # there may be too few degrees for a recurrence
             self._compute_patterns()
-        result = self.result(ended, message)
+        result = self.result(ending, message)
         patterns = self.patterns
         if patterns is not None and patterns.at and self.eps is None and not self.budget.is_spent:
             exceptional = with_eps(self.map, rational(patterns.at), patterns.exceptional)  # polynomials over Q[eps]
@@ -446,14 +446,14 @@ class _Search:
         self.measured = result
         enclosure = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
         if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
-            unproved = "work limit reached before bounds of the dynamical degree were proved; raise --effort"
-            return replace(result, notes=(*result.notes, unproved))
+            note = "work limit reached before bounds of the dynamical degree were proved; raise --effort"
+            return replace(result, notes=(*result.notes, note))
         return replace(result, enclosure=enclosure)
 
-    def result(self, ended: str, message: str, **proofs: Any) -> DegreeGrowth:
+    def result(self, ending: str, message: str, **proofs: Any) -> DegreeGrowth:
         primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)
         fields: dict[str, Any] = {"patterns": self.patterns, "notes": tuple(self.notes), **proofs}
-        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **fields)
+        return DegreeGrowth(tuple(self.degrees), self.eps, ending, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
         """Compute the singularity patterns once they are useful, and raise Stopped when a recurrence is confirmed."""
@@ -469,11 +469,11 @@ class _Search:
             return
         patterns = self.patterns
         is_confirmed = recurrence is not None and recurrence.checked >= max(6, recurrence.order)
-        derived = self.result(Ended.TERMS, "").derived
-        if derived is not None:
-            longest = max(patterns.lengths, default=0) if patterns is not None else 0
-            agrees = recurrence is not None and recurrence.characteristic == derived.characteristic
-            if (is_confirmed and agrees) or term_count > 2 * longest + _AGREEING or self.degrees[-1] > _LARGE:
+        derived_recurrence = self.result(Ended.TERMS, "").derived
+        if derived_recurrence is not None:
+            longest_pattern = max(patterns.lengths, default=0) if patterns is not None else 0
+            is_equal = recurrence is not None and recurrence.characteristic == derived_recurrence.characteristic
+            if (is_confirmed and is_equal) or term_count > 2 * longest_pattern + _AGREEING or self.degrees[-1] > _LARGE:
                 raise Stopped(
                     Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
                 )
@@ -496,20 +496,20 @@ class _Search:
 
     def _step(self, new_line: Callable[[], Line]) -> None:
         """Replace all curves by their images, and lines in special position by new lines."""
-        n, earlier = len(self.degrees), self.degrees
+        n, degrees = len(self.degrees), self.degrees
 
         def degree_on(curve: Line) -> int:
             """The degree of iterate n on a line; -1 if this line does not give the degree."""
             try:
                 while curve.steps < n:
                     k = curve.steps + 1
-                    guess = earlier[k] if k < n else self.map.dim if k == 1 else earlier[1] * earlier[-1]
-                    if k == n > 1 and earlier[-2]:
+                    guess = degrees[k] if k < n else self.map.dim if k == 1 else degrees[1] * degrees[-1]
+                    if k == n > 1 and degrees[-2]:
                         # Degrees are almost log-concave: the last ratio is nearly a bound of the next one. A guess that
                         # is too low requires a second attempt.
-                        guess = min(guess, earlier[-1] * earlier[-1] // earlier[-2] + 4)
+                        guess = min(guess, degrees[-1] * degrees[-1] // degrees[-2] + 4)
                     curve.step(guess)
-                    if k < n and curve.degree != earlier[k]:
+                    if k < n and curve.degree != degrees[k]:
                         return -1
             except ZeroDivisionError:
                 return -1
@@ -517,21 +517,21 @@ class _Search:
 
         while True:
             degrees_on_lines = [degree_on(curve) for curve in self.lines]
-            best = max(degrees_on_lines)
-            if best >= 0 and min(degrees_on_lines) == best:
-                self.degrees.append(best)
+            max_line_degree = max(degrees_on_lines)
+            if max_line_degree >= 0 and min(degrees_on_lines) == max_line_degree:
+                self.degrees.append(max_line_degree)
                 return
             self.replaced += 1
-            if best < 0 and self.replaced > _LINES:
+            if max_line_degree < 0 and self.replaced > _LINES:
                 raise Stopped(
                     Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
             if self.replaced > _REPLACEMENTS:
                 raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees_on_lines}")
-            if best >= 0:
+            if max_line_degree >= 0:
                 self.notes.append(
                     f"a line gave a smaller degree of iterate {n} and was replaced by another: {degrees_on_lines}"
                 )
-            for k, degree in enumerate(degrees_on_lines):
-                if degree < best or best < 0:
+            for k, line_degree in enumerate(degrees_on_lines):
+                if line_degree < max_line_degree or max_line_degree < 0:
                     self.lines[k] = new_line()

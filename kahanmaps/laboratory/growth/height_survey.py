@@ -85,27 +85,28 @@ class HeightSurvey(PrintableResult):
     def kind(self) -> Growth:
         """The kind of growth on all decided orbits; UNDECIDED if they differ, or if an eps has no decided orbit."""
         all_eps = {orbit.eps for orbit in self.orbits}
-        decided = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
-        return self.kinds[0] if len(self.kinds) == 1 and decided == all_eps else Growth.UNDECIDED
+        decided_eps = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
+        return self.kinds[0] if len(self.kinds) == 1 and decided_eps == all_eps else Growth.UNDECIDED
 
     @property
     def text(self) -> str:
         """A sentence with the kind of growth and the number of orbits of this kind, or with the different kinds."""
-        total, cut = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
+        total, note = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # If the kinds agree for each single eps, they differ only between the eps.
             decided_kinds = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
-            which = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
-            return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)}){cut}"
-        decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
+            cause_text = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
+            return f"heights of exact orbits are undecided: {cause_text} disagree ({', '.join(counts)}){note}"
+        decided_count = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
-            return f"heights of exact orbits are undecided: {decided} of {counted(total, 'orbit')} decided{cut}"
+            return f"heights of exact orbits are undecided: {decided_count} of {counted(total, 'orbit')} decided{note}"
         eps = {orbit.eps for orbit in self.orbits}
-        many = f"{decided} of {total}" if decided < total else f"all {total}" if total > 1 else "the"
-        at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
-        of = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
-        return f"{_GROWTH_TEXTS[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}{cut}"
+        count_text = f"{decided_count} of {total}" if decided_count < total else f"all {total}" if total > 1 else "the"
+        eps_text = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
+        field_text = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
+        orbits = f"{count_text} exact {'orbit' if total == 1 else 'orbits'} tried"
+        return f"{_GROWTH_TEXTS[self.kind]} on {orbits}{eps_text}{field_text}{note}"
 
     def rows(self) -> list[dict[str, str]]:
         """Return a row for each orbit, for example for `pandas.DataFrame(survey.rows())`."""
@@ -167,21 +168,21 @@ def height_survey(
     is_stage, budget = isinstance(effort, Budget), budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
-    field = "" if map_.root is None else map_.root.number_field.name
-    given_eps = DEFAULT_EPS if eps is None else (rational(eps),)  # refuses text that is no number, for every map
-    for value in given_eps if map_.has_eps else (fmpq(1),):
+    field_name = "" if map_.root is None else map_.root.number_field.name
+    eps_values = DEFAULT_EPS if eps is None else (rational(eps),)  # refuses text that is no number, for every map
+    for value in eps_values if map_.has_eps else (fmpq(1),):
         map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
-        points = (
+        initial_points = (
             [None] * starts
             if isinstance(starts, int)
             else [coordinates(start, QQ, map_.variables, map_.dim) for start in as_points(starts, map_.variables)]
         )
-        for k, start in enumerate(points):
+        for k, start in enumerate(initial_points):
             if orbits and budget.is_spent:
-                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field_name)
             try:
-                progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(points)}")
+                progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(initial_points)}")
                 for _ in range(_MAX_DRAWS if start is None else 1):
                     # Many maps have invariant curves with short equations, such as eps^2 x^2 = 1. To avoid these,
                     # numerators are primes: a coordinate is no simple multiple of 1/eps.
@@ -197,8 +198,8 @@ def height_survey(
             except TimeLimit:
                 if is_stage or not orbits:
                     raise
-                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field_name)
             orbits.append(SurveyedOrbit(value, tuple(candidate), growth))
             if growth.end.status == "interrupted":
-                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
-    return HeightSurvey(tuple(orbits), True, map_.has_eps, field)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field_name)
+    return HeightSurvey(tuple(orbits), True, map_.has_eps, field_name)

@@ -76,17 +76,17 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
     n = map_.dim
     product = fmpz_mat([[int(i == j) for j in range(n)] for i in range(n)])
     for equation in equations:  # each row must have the form m x~_j = r with monomials m and r
-        rows = {}
-        for *entries, right in equation.terms:
+        rows_by_variable = {}
+        for *entries, right_side in equation.terms:
             columns = [j for j, entry in enumerate(entries) if entry]
-            if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right) != 1:
+            if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right_side) != 1:
                 return None
-            ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right
+            ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right_side
             left_exponents, right_exponents = equation.exponents[left_monomial], equation.exponents[right_monomial]
-            rows[columns[0]] = [right_exponents[k] - left_exponents[k] for k in range(n)]
-        if len(rows) < n:
+            rows_by_variable[columns[0]] = [right_exponents[k] - left_exponents[k] for k in range(n)]
+        if len(rows_by_variable) < n:
             return None
-        product = fmpz_mat([rows[j] for j in range(n)]) * product
+        product = fmpz_mat([rows_by_variable[j] for j in range(n)]) * product
     return None if product.det() == 0 else product  # it is singular only at special eps
 
 
@@ -125,8 +125,8 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
     If A^n = 1, the n-th iterate multiplies each variable by a number or a function of eps. The map is then periodic
     only if this iterate has order 1 or 2.
     """
-    one = matrix**0
-    order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
+    identity = matrix**0
+    order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == identity), None)
     periods = [] if order is None else [order, 2 * order]
     proofs = (linear_iterate(map_, eps, period) for period in periods)
     proof_of_period = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
@@ -143,27 +143,27 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     >>> spectral_radius(fmpz_mat([[0, 1, 0], [0, 0, 1], [-1, -1, 0]])).text
     '1.21060779440608593277, root of t^6 - t^4 - 1'
     """
-    minimal = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
+    minimal_factors = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
     # The polynomial with all products of two eigenvalues as roots has |e|^2 = e conj(e) as a root for every eigenvalue
     # e. Its largest real root is the radius squared.
     rows = matrix.tolist()
-    kronecker_square = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
-    products = [factor for factor, _ in kronecker_square.charpoly().factor()[1]]
-    numbers = [g for factor in products for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
+    kronecker_square = fmpz_mat([[a * b for a in row for b in other_row] for row in rows for other_row in rows])
+    product_factors = [factor for factor, _ in kronecker_square.charpoly().factor()[1]]
+    polynomials = [g for factor in product_factors for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
     bits = _BITS
     while True:
         with flint.ctx.workprec(bits):
-            isolated: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
-            reals = [(root.real, g) for g, roots in isolated for root, _ in roots if root.imag == 0]
-            (radius, polynomial), *others = sorted(reals, key=lambda pair: pair[0].mid().fmpq(), reverse=True)
-            eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
+            polynomials_with_roots: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in polynomials]
+            real_roots = [(root.real, g) for g, roots in polynomials_with_roots for root, _ in roots if root.imag == 0]
+            (radius, polynomial), *other_roots = sorted(real_roots, key=lambda pair: pair[0].mid().fmpq(), reverse=True)
+            eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal_factors]
             moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
-            largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
+            largest_moduli = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
             # Moduli are among the real roots. So a modulus whose ball meets the ball of only one root is that root.
-            if all(radius > other for other, _ in others) and not any(
-                modulus.overlaps(other) for modulus, _ in largest for other, _ in others
+            if all(radius > other for other, _ in other_roots) and not any(
+                modulus.overlaps(other) for modulus, _ in largest_moduli for other, _ in other_roots
             ):
-                return growth_rate(polynomial, radius, max(k for _, k in largest))
+                return growth_rate(polynomial, radius, max(k for _, k in largest_moduli))
         bits *= 2
 
 
@@ -178,28 +178,28 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
     is_generic = eps is None and map_.has_eps
     field = FunctionField([*map_.variables, *(["eps"] if is_generic else [])], _BUDGET, reduces=True)
     n = map_.dim
-    start = tuple(field.variables[:n])
+    variables = tuple(field.variables[:n])
     try:
         map_over_field = map_.at(field.variables[-1] if is_generic else fmpq(1) if eps is None else eps, field)
-        point: tuple[Any, ...] = start
+        point: tuple[Any, ...] = variables
         for _ in range(period):
             point = map_over_field.step(point)
-        is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
+        is_identity = all(field.equal(x, y) for x, y in zip(point, variables, strict=True))
     except (BudgetExceeded, SingularStep):
         return None
-    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.denominator for entry in point))
-    forms = [entry.numerator * (common / entry.denominator) for entry in point] + [common]
+    denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.denominator for entry in point))
+    forms = [entry.numerator * (denominator / entry.denominator) for entry in point] + [denominator]
     # The forms have no common factor, so that their degree is the degree on projective space.
     if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None
-    first_linear = period
+    linear_period = period
     with suppress(BudgetExceeded, SingularStep):
-        while not is_identity and period < _MAX_ORDER * first_linear:
-            for _ in range(first_linear):
+        while not is_identity and period < _MAX_ORDER * linear_period:
+            for _ in range(linear_period):
                 point = map_over_field.step(point)
-            period += first_linear
-            is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
-    period = period if is_identity else first_linear
+            period += linear_period
+            is_identity = all(field.equal(x, y) for x, y in zip(point, variables, strict=True))
+    period = period if is_identity else linear_period
     iterate = "the map" if period == 1 else f"iterate {period}"
     reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
     return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)

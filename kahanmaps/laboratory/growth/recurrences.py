@@ -148,7 +148,7 @@ class Recurrence(ResultPart):
         if self.is_polynomial:
             return GrowthRate(fmpz_poly([-1, 1]), "1", "1", max(k for _, k in self.factors))
         # The largest positive root; balls certify that no other root has a larger modulus.
-        best: tuple[arb, fmpz_poly, int] | None = None
+        largest_root: tuple[arb, fmpz_poly, int] | None = None
         with flint.ctx.workprec(_BITS):
             moduli = []
             for factor, multiplicity in self.factors:
@@ -156,12 +156,12 @@ class Recurrence(ResultPart):
                 for root, _ in roots:
                     moduli.append(abs(root))
                     # FLINT recognizes real roots: their imaginary part is exactly 0.
-                    if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
-                        best = (root.real, factor, multiplicity)
-            if best is None or any(modulus > best[0] for modulus in moduli):
+                    if root.imag == 0 and root.real > 0 and (largest_root is None or root.real > largest_root[0]):
+                        largest_root = (root.real, factor, multiplicity)
+            if largest_root is None or any(modulus > largest_root[0] for modulus in moduli):
                 return None
-            value, factor, multiplicity = best
-            return growth_rate(factor, value, multiplicity)
+            ball, factor, multiplicity = largest_root
+            return growth_rate(factor, ball, multiplicity)
 
     @cached_property
     def closed_form(self) -> str | None:
@@ -177,8 +177,8 @@ class Recurrence(ResultPart):
             return None
         polynomials = []
         for residue in range(period):
-            first = next(n for n in count(self.preperiod) if n % period == residue)
-            nodes = [first + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
+            n0 = next(n for n in count(self.preperiod) if n % period == residue)
+            nodes = [n0 + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
             powers = fmpq_mat(size, size, [fmpq(n) ** k for n in nodes for k in range(size)])
             column = fmpq_mat(size, 1, [fmpq(self.predict(n)) for n in nodes])
             polynomials.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
@@ -191,10 +191,10 @@ class Recurrence(ResultPart):
     @property
     def closed_form_text(self) -> str | None:
         """The closed form; if it does not hold from n = 0 on, with the first n for which it holds."""
-        after = f" for n >= {self.preperiod}"
+        condition = f" for n >= {self.preperiod}"
         if not self.closed_form or not self.preperiod:
             return self.closed_form
-        return f"{self.closed_form}, all" + after if ";" in self.closed_form else self.closed_form + after
+        return f"{self.closed_form}, all" + condition if ";" in self.closed_form else self.closed_form + condition
 
     @property
     def characteristic_text(self) -> str:
@@ -220,12 +220,12 @@ class Recurrence(ResultPart):
     @property
     def equation(self) -> str:
         """The recurrence as an equation."""
-        numbers = [(-self.characteristic[k], self.order - k) for k in range(self.order - 1, -1, -1)]
-        terms = [f"{'+' if number >= 0 else ''}{number}*a(n-{k})" for number, k in numbers]
+        numbers_with_lag = [(-self.characteristic[k], self.order - k) for k in range(self.order - 1, -1, -1)]
+        terms = [f"{'+' if number >= 0 else ''}{number}*a(n-{k})" for number, k in numbers_with_lag]
         terms = [term for term in terms if not term.startswith(("+0*", "-0*"))]
-        right = "".join(terms).replace("+1*", "+").replace("-1*", "-").removeprefix("+") or "0"
-        after = f" for n >= {self.order}"
-        return f"a(n) = {right}{after}"
+        right_side = "".join(terms).replace("+1*", "+").replace("-1*", "-").removeprefix("+") or "0"
+        condition_text = f" for n >= {self.order}"
+        return f"a(n) = {right_side}{condition_text}"
 
     def predict(self, n: int) -> int:
         """Return a_n; beyond the given terms the recurrence continues the sequence.
@@ -235,8 +235,8 @@ class Recurrence(ResultPart):
         """
         values, coefficients = list(self.values), [int(c) for c in self.characteristic.coeffs()[:-1]]
         while len(values) <= n:
-            last = values[len(values) - self.order :]
-            values.append(-sum(c * value for c, value in zip(coefficients, last, strict=True)))
+            last_values = values[len(values) - self.order :]
+            values.append(-sum(c * value for c, value in zip(coefficients, last_values, strict=True)))
         return values[n]
 
     def to_json(self) -> dict[str, Any]:
@@ -272,12 +272,12 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
         return None
     # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
     # # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
-    lifted = [int(c) for c in polynomial.coeffs()]
-    lifted = [c - _PRIME if 2 * c > _PRIME else c for c in lifted]
+    integer_coefficients = [int(c) for c in polynomial.coeffs()]
+    integer_coefficients = [c - _PRIME if 2 * c > _PRIME else c for c in integer_coefficients]
     for n in range(len(values) - order):
-        if sum(c * value for c, value in zip(lifted, values[n : n + order + 1], strict=True)) != 0:
+        if sum(c * value for c, value in zip(integer_coefficients, values[n : n + order + 1], strict=True)) != 0:
             return None
-    return Recurrence(tuple(values), fmpz_poly(lifted))
+    return Recurrence(tuple(values), fmpz_poly(integer_coefficients))
 
 
 def needed_checks(order: int) -> int:

@@ -31,7 +31,7 @@ def degree_series(
         degrees: the degree d_1 of the map; for a composition, whose maps are applied periodically, the degree of each
             of its maps.
         hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
-            columns nu are in the same order. Multiplicities that are not known must not be `needed`.
+            columns nu are in the same order. Multiplicities that are not known must not belong to needed hypersurfaces.
         stages: for a composition, the index (from 0) of the map that contracts each hypersurface. The series then has
             the degrees of the iterates of the whole composition only, while the exponent of z counts single maps.
 
@@ -48,55 +48,55 @@ def degree_series(
     """
     z, one, zero = fmpz_poly([0, 1]), fmpz_poly([1]), fmpz_poly([])
     patterns = [pattern for _, pattern in hypersurfaces]
-    needed_indices = needed(patterns)
-    if needed_indices is None:
+    indices = needed_hypersurfaces(patterns)
+    if indices is None:
         raise ValueError("expected known multiplicities of all hypersurfaces that are needed")
     # The unknowns are the series S_i of the needed C_i, then the series D of the stages 1, 2, ..., 0, and 1.
-    maps, rows = len(degrees), []
+    period, rows = len(degrees), []
     stages = stages or [0] * len(patterns)
 
-    def add(row: list[Fraction], k: int, term: fmpz_poly) -> None:
+    def add_term(row: list[Fraction], k: int, term: fmpz_poly) -> None:
         numerator, denominator = row[k]
         row[k] = numerator + term * denominator, denominator
 
-    for i, k in enumerate(needed_indices):
-        row = [_through_returns(patterns, j, k + 1) for j in needed_indices] + [(zero, one)] * (maps + 1)
-        add(row, i, one)
-        add(row, len(needed_indices) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
+    for i, k in enumerate(indices):
+        row = [_continued_series(patterns, j, k + 1) for j in indices] + [(zero, one)] * (period + 1)
+        add_term(row, i, one)
+        add_term(row, len(indices) + (stages[k] - 1) % period, fmpz_poly([-hypersurfaces[k][0]]))
         rows.append(row)
     for stage, degree in enumerate(degrees, 1):
         mu = []
-        for j in needed_indices:
-            series, first_exponent = _through_returns(patterns, j, 0), (stage - stages[j]) % maps
-            if maps > 1:  # the terms with the exponents first_exponent + k maps
-                numerator, denominator = (part(z**maps) for part in every_nth(series, maps, first_exponent))
+        for j in indices:
+            series, first_exponent = _continued_series(patterns, j, 0), (stage - stages[j]) % period
+            if period > 1:  # the terms with the exponents first_exponent + k maps
+                numerator, denominator = (f(z**period) for f in every_nth(series, period, first_exponent))
                 series = numerator * z**first_exponent, denominator
             mu.append(series)
-        row = [*mu, *[(zero, one)] * maps, (-one if stage == maps else zero, one)]
-        add(row, len(needed_indices) + stage - 1, one)
-        add(row, len(needed_indices) + (stage - 2) % maps, -degree * z)
+        row = [*mu, *[(zero, one)] * period, (-one if stage == period else zero, one)]
+        add_term(row, len(indices) + stage - 1, one)
+        add_term(row, len(indices) + (stage - 2) % period, -degree * z)
         rows.append(row)
     cleared_rows = []
     for row in rows:
-        common = one
+        common_denominator = one
         for _, denominator in row:
-            common = common * (denominator // common.gcd(denominator))
-        cleared_rows.append([numerator * (common // denominator) for numerator, denominator in row])
+            common_denominator = common_denominator * (denominator // common_denominator.gcd(denominator))
+        cleared_rows.append([numerator * (common_denominator // denominator) for numerator, denominator in row])
     # Fraction-free Gaussian elimination (Bareiss). No pivot is zero: at z = 0 the matrix of the S_i is diagonal.
-    previous = one
+    previous_pivot = one
     for k, pivot in enumerate(cleared_rows[:-1]):
         for entries in cleared_rows[k + 1 :]:
             factor, pairs = entries[k], zip(entries[k + 1 :], pivot[k + 1 :], strict=True)
-            entries[k + 1 :] = [(pivot[k] * entry - factor * other) // previous for entry, other in pairs]
-        previous = pivot[k]
+            entries[k + 1 :] = [(pivot[k] * e - factor * p) // previous_pivot for e, p in pairs]
+        previous_pivot = pivot[k]
     denominator, numerator = cleared_rows[-1][-2], -cleared_rows[-1][-1]
-    common = numerator.gcd(denominator)
-    numerator, denominator = numerator // common, denominator // common
+    common_factor = numerator.gcd(denominator)
+    numerator, denominator = numerator // common_factor, denominator // common_factor
     sign = 1 if denominator[0] > 0 else -1
     return numerator * sign, denominator * sign
 
 
-def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
+def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
     """Return the hypersurfaces on which the degrees depend; None if one of their multiplicities is unknown.
 
     These are the hypersurfaces that lower the degree, the hypersurfaces with images in one of these, and so on. An
@@ -104,8 +104,10 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
 
     >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
     >>> lowering = OrbitData(((1, 0),), (), 9, True)
-    >>> needed([attracted]), needed([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))])
-    ([], None)
+    >>> needed_hypersurfaces([attracted])
+    []
+    >>> needed_hypersurfaces([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))]) is None
+    True
     """
     # Each hypersurface, followed by those onto which it is mapped, in this order.
     chains = [[k] for k in range(len(patterns))]
@@ -116,8 +118,8 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     for i in indices:
         if any(i in patterns[j].eventually_in for chain in chains for j in chain):
             return None
-        met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in patterns[j].rows))
-        indices += [k for k in met_by if k not in indices]
+        sources = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in patterns[j].rows))
+        indices += [k for k in sources if k not in indices]
     return sorted(indices)
 
 
@@ -161,24 +163,24 @@ def coefficients(series: Fraction, count: int) -> list[int]:
     denominator_coefficients = [int(c) for c in denominator.coeffs()]
     values: list[int] = []
     for n in range(count):
-        earlier = sum(c * values[n - k] for k, c in enumerate(denominator_coefficients[1 : n + 1], 1))
-        values.append((int(numerator[n]) - earlier) // denominator_coefficients[0])
+        earlier_sum = sum(c * values[n - k] for k, c in enumerate(denominator_coefficients[1 : n + 1], 1))
+        values.append((int(numerator[n]) - earlier_sum) // denominator_coefficients[0])
     return values
 
 
-def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
+def _continued_series(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
     """Return the generating function of a column of orbit data of `start`, continued according to `continues_as`."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}
     while k not in visited:
         visited[k] = shift, numerator
-        own_numerator, denominator = patterns[k].generating_function(column)
+        pattern_numerator, denominator = patterns[k].generating_function(column)
         continuation = patterns[k].continues_as
         if continuation is None:
-            return numerator * denominator + z**shift * own_numerator, denominator
-        numerator += z**shift * own_numerator
+            return numerator * denominator + z**shift * pattern_numerator, denominator
+        numerator += z**shift * pattern_numerator
         shift, k = shift + continuation[0], continuation[1]
     earlier_shift, earlier_numerator = visited[k]
-    one_round = 1 - z ** (shift - earlier_shift)
-    return earlier_numerator * one_round + numerator - earlier_numerator, one_round
+    cycle_factor = 1 - z ** (shift - earlier_shift)
+    return earlier_numerator * cycle_factor + numerator - earlier_numerator, cycle_factor

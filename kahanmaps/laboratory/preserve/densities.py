@@ -59,7 +59,7 @@ class FoundDensity(FoundFunction):
 
     def degree(self, dim: int) -> int:
         """The larger of the degrees of numerator and denominator in the variables."""
-        return max(degree_in(part, dim) for part in (self.function.numerator, self.function.denominator))
+        return max(degree_in(polynomial, dim) for polynomial in (self.function.numerator, self.function.denominator))
 
     @property
     def text(self) -> str:
@@ -119,18 +119,18 @@ class DensitySearch(Search):
         """A sentence on the densities that are not shown; empty if all are shown."""
         if len(self.densities) < 2:
             return ""
-        others = len(self.densities) - 1
-        kind = f"{counted(others, 'further polynomial')} of this kind"
+        count = len(self.densities) - 1
+        kind = f"{counted(count, 'further polynomial')} of this kind"
         return f"phi times any integral is a density again; --json lists {kind}"
 
     @property
     def note(self) -> str:
         """Sentences on an anti-invariant density and on the period of the map; empty if there is neither."""
-        periodic = closing_note(self.period, self.eps, self.file.map)
+        period_text = closing_note(self.period, self.eps, self.file.map)
         if self.anti_invariant is None:
-            return periodic
+            return period_text
         sentence = f"|dx/phi| is invariant for phi = {self.anti_invariant.text}: phi(x~) = -det dPhi(x) phi(x)"
-        return "; ".join(filter(None, (f"{sentence} ({self.anti_invariant.verdict})", periodic)))
+        return "; ".join(filter(None, (f"{sentence} ({self.anti_invariant.verdict})", period_text)))
 
     def rows(self) -> list[dict[str, str]]:
         """Return one row for each formula, e.g. for `pandas.DataFrame(result.rows())`."""
@@ -221,26 +221,26 @@ def densities_of(
         return DensitySearch(*laboratory.request, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
     product = anti_invariant = None
-    theorem, dim, cut = _hamiltonian_density(laboratory), laboratory.map.dim, ""
-    if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
-        densities, tried = [theorem], theorem.degree(dim)
+    hamiltonian_density, dim, reason = _find_hamiltonian_density(laboratory), laboratory.map.dim, ""
+    if hamiltonian_density is not None and (max_degree is None or hamiltonian_density.degree(dim) <= max_degree):
+        densities, degree = [hamiltonian_density], hamiltonian_density.degree(dim)
     else:
         progress("densities that are products")
-        stages = budget.share([1, 2, 2])  # the stages: products; polynomials; integrals, whose factors are tried
-        product, anti_invariant = _products(laboratory, max_degree, next(stages))
-        so_far = () if product is None else (product,)
-        on_result(DensitySearch(*laboratory.request, so_far, -1, UNFINISHED, period, anti_invariant, flow=flow))
+        budgets = budget.share([1, 2, 2])  # the stages: products; polynomials; integrals, whose factors are tried
+        product, anti_invariant = _find_product_density(laboratory, max_degree, next(budgets))
+        products = () if product is None else (product,)
+        on_result(DensitySearch(*laboratory.request, products, -1, UNFINISHED, period, anti_invariant, flow=flow))
         # Reserve a share for the search for integrals, unless the caller gives them or a product is known already.
-        polynomial_budget = budget if integrals is not None or product is not None else next(stages)
-        densities, tried, cut = _search(laboratory, product, max_degree, polynomial_budget, progress)
-        none_proved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
-        if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
+        polynomial_budget = budget if integrals is not None or product is not None else next(budgets)
+        densities, degree, reason = _search_polynomials(laboratory, product, max_degree, polynomial_budget, progress)
+        are_unproved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
+        if are_unproved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
             # The lemma on Lotka-Volterra systems may prove phi = x_1 ... x_n in any dimension n.
             x = ring(laboratory.map.names).gens()
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
-    result = DensitySearch(*laboratory.request, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
+    result = DensitySearch(*laboratory.request, tuple(densities), degree, reason, period, anti_invariant, flow=flow)
     if result.may_use_integrals:
         on_result(replace(result, cut=UNFINISHED))
         if integrals is None:
@@ -264,7 +264,7 @@ def with_factors(
     if laboratory.defect:
         return result
     # The budget is not used: `candidates` needs it only for flows, and this laboratory is that of a map.
-    product, anti_invariant = _products(laboratory, max_degree, Budget(), integrals)
+    product, anti_invariant = _find_product_density(laboratory, max_degree, Budget(), integrals)
     if product is None:
         return replace(result, anti_invariant=anti_invariant)
     return replace(
@@ -272,7 +272,7 @@ def with_factors(
     )
 
 
-def _search(
+def _search_polynomials(
     laboratory: Laboratory,
     product: FoundDensity | None,
     max_degree: int | None,
@@ -293,25 +293,25 @@ def _search(
         # With a product higher degrees are not needed, and the lower degrees get only a part of the budget.
         degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
     # If the space of a degree is 0, the spaces of lower degrees are 0: each degree tried doubles the monomials.
-    degrees, tried = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
+    degrees, tried_degree = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
-        smaller = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
-        degrees.insert(0, next(smaller, degrees[0] - 1))
+        low_degrees = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
+        degrees.insert(0, next(low_degrees, degrees[0] - 1))
     try:
-        while tried < last_degree and not degree_budget.is_spent:
-            degree = next(d for d in degrees if d > tried)
+        while tried_degree < last_degree and not degree_budget.is_spent:
+            degree = next(d for d in degrees if d > tried_degree)
             progress(f"densities of degree {degree}")
-            model = _space(laboratory.maps[0], degree)
-            if model.basis and degree > tried + 1:
+            model = _compute_space(laboratory.maps[0], degree)
+            if model.basis and degree > tried_degree + 1:
                 degrees = list(range(last_degree + 1))  # search again for the least degree with a density
                 continue
-            if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
+            if model.basis and len(model.basis) == len(_compute_space(laboratory.maps[1], degree, model).basis):
                 densities, reason = list[FoundDensity](), ""
 
                 def spaces_on(
                     map_: ModularMap, degree: int = degree, model: DarbouxSpace = model
                 ) -> list[DarbouxSpace]:
-                    return [_space(map_, degree, model)]
+                    return [_compute_space(map_, degree, model)]
 
                 closed_forms = laboratory.formulas([model], spaces_on, budget)
                 if closed_forms.bases is None:
@@ -319,19 +319,20 @@ def _search(
                     reason += f", but no closed form: {closed_forms.reason}"
                 for P in [] if closed_forms.bases is None else closed_forms.bases[0]:
                     phi = RationalFunction(P, P.context().constant(1))
-                    verdict, evidence = _certified(laboratory, phi)
+                    verdict, evidence = _certify(laboratory, phi)
                     densities += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
                     reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
                 if densities or product is None:
                     return densities, degree, "" if densities else reason
-            tried = degree
+            tried_degree = degree
     except NoPoint as error:
-        return [], tried, str(error)
-    cut = "" if tried == last_degree else f"polynomials of degree {tried + 1} and more were not tried: {SPENT}"
-    return ([], tried, cut) if product is None else ([product], product.degree(dim), cut)
+        return [], tried_degree, str(error)
+    ending = f"polynomials of degree {tried_degree + 1} and more were not tried: {SPENT}"
+    ending = "" if tried_degree == last_degree else ending
+    return ([], tried_degree, ending) if product is None else ([product], product.degree(dim), ending)
 
 
-def _products(
+def _find_product_density(
     laboratory: Laboratory, max_degree: int | None, budget: Budget, integrals: Sequence[FoundIntegral] = ()
 ) -> tuple[FoundDensity | None, FoundDensity | None]:
     """Search for a density that is a product of powers of known polynomials; return (invariant, anti-invariant).
@@ -345,14 +346,14 @@ def _products(
         return None, None
     if product is None or (phi := product.function) is None:
         return None, None
-    verdict, evidence = _certified(laboratory, phi, product.constant)
+    verdict, evidence = _certify(laboratory, phi, product.constant)
     density = FoundDensity(phi, verdict, evidence, product.text)
     if not verdict.holds or (max_degree is not None and density.degree(laboratory.map.dim) > max_degree):
         return None, None
     return (density, None) if product.constant.numerator == product.constant.denominator else (None, density)
 
 
-def _certified(
+def _certify(
     laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
 ) -> tuple[Certainty, Evidence]:
     """Certify that dx/phi is invariant, by the lemma on Lotka-Volterra systems or as an identity."""
@@ -363,7 +364,7 @@ def _certified(
     return laboratory.verdict_on(phi, is_density=True, factor=factor)
 
 
-def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
+def _find_hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
     """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for other systems."""
     if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
@@ -373,11 +374,11 @@ def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
     if D is None:
         return None
     if laboratory.eps is not None:
-        at_eps: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
-        D = D.subs(at_eps)
+        substitution: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+        D = D.subs(substitution)
     if D.is_zero():
         return None
-    content = reduce(lambda common, c: common.gcd(c), coefficients_in(D, laboratory.system.dim))
+    content = reduce(lambda divisor, c: divisor.gcd(c), coefficients_in(D, laboratory.system.dim))
     _, phi = primitive_part(D / content)
     evidence = Evidence(
         "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
@@ -385,7 +386,7 @@ def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
     return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Certainty.PROVED, evidence)
 
 
-def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
+def _compute_space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
     """Compute the space of P of degree at most `degree` with P(x~) = det dPhi P(x), on the monomials of the model."""
     sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
     return cofactor_space(sample, _FIRST_POWER, degree, model)

@@ -33,7 +33,7 @@ from kahanmaps.algebra.modular_matrices import (
     multiply,
     null_space,
     rank,
-    reduced,
+    reduced_echelon_form,
     split_columns,
 )
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
@@ -46,8 +46,8 @@ from kahanmaps.laboratory.modular_points import (
     Point,
     exponents_up_to,
     monomial_derivatives,
+    monomial_index,
     monomial_tables,
-    places_of,
 )
 
 _SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at each with probability 1/p
@@ -145,48 +145,48 @@ def relations_on_orbit(
     if orbits meet the singular set.
     """
     exponents = exponents_up_to(map_.dim, degree)
-    support = _not_multiples(map_.dim, degree, leading)
+    support = _indices_of_non_multiples(map_.dim, degree, leading)
     rank_bound = len(support) if rank_bound is None else min(rank_bound, len(support))
-    selected = support if len(support) < len(exponents) else None
-    rows, point, period = map_.along_orbit(degree, rank_bound + _SPARE, selected)
-    form, independent = reduced(matrix(rows, map_.prime))
-    pivot_columns, free = split_columns(form, independent)
-    new_leading = frozenset(exponents[support[k]] for k in free)
-    if independent > rank_bound or not leading <= new_leading:
+    evaluated_support = support if len(support) < len(exponents) else None
+    rows, point, period = map_.along_orbit(degree, rank_bound + _SPARE, evaluated_support)
+    form, row_rank = reduced_echelon_form(matrix(rows, map_.prime))
+    pivot_columns, free_columns = split_columns(form, row_rank)
+    new_leading = frozenset(exponents[support[k]] for k in free_columns)
+    if row_rank > rank_bound or not leading <= new_leading:
         return relations_on_orbit(map_, degree)  # `rank_bound` or `leading` came from a special orbit
     # The gradient of a relation: its dependent monomial minus a combination of independent ones, differentiated.
     count_work(len(exponents) / 2 + map_.dim * len(support) / 3)
     monomial_gradients = [[row[k] for k in support] for row in monomial_derivatives(point, degree, map_.prime)]
-    at_pivots = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - independent) for row in monomial_gradients]
-    gradients = matrix(monomial_gradients, map_.prime) - multiply(matrix(at_pivots, map_.prime), form)
+    pivot_gradients = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - row_rank) for row in monomial_gradients]
+    gradients = matrix(monomial_gradients, map_.prime) - multiply(matrix(pivot_gradients, map_.prime), form)
     normals = echelon(integers(gradients.transpose()), map_.prime)
-    return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, new_leading)
+    return OrbitRelations(form, row_rank, len(exponents) - row_rank, normals, period, point, new_leading)
 
 
-def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
+def _indices_of_non_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
     """Return the indices in `exponents_up_to` of the monomials that are no proper multiples of one in `leading`."""
     exponents = exponents_up_to(dim, degree)
     is_multiple: list[bool] = []  # of a leading monomial, or equal to one
     support = []
     for k, (exponent, factors) in enumerate(zip(exponents, monomial_tables(dim, degree), strict=True)):
-        is_proper = any(is_multiple[place] for _, _, place in factors)
-        is_multiple.append(is_proper or exponent in leading)
-        if not is_proper:
+        is_proper_multiple = any(is_multiple[quotient_index] for _, _, quotient_index in factors)
+        is_multiple.append(is_proper_multiple or exponent in leading)
+        if not is_proper_multiple:
             support.append(k)
     return support
 
 
-def span_of_relations(map_: ModularMap, degree: int, largest: float = inf) -> list[list[int]]:
+def span_of_relations(map_: ModularMap, degree: int, max_dimension: float = inf) -> list[list[int]]:
     """Return the reduced echelon basis of the span of the relations of all orbits.
 
-    Orbits are added until two successive ones do not enlarge the span, or its dimension exceeds `largest`.
+    Orbits are added until two successive ones do not enlarge the span, or its dimension exceeds `max_dimension`.
     """
-    first, unchanged = relations_on_orbit(map_, degree), 0
-    basis, rank_bound = first.vectors, first.independent
-    while basis and unchanged < 2 and len(basis) <= largest:
-        enlarged = echelon([*basis, *relations_on_orbit(map_, degree, rank_bound).vectors], map_.prime)
-        unchanged = unchanged + 1 if len(enlarged) == len(basis) else 0
-        basis = enlarged
+    first_orbit, unchanged_count = relations_on_orbit(map_, degree), 0
+    basis, rank_bound = first_orbit.vectors, first_orbit.independent
+    while basis and unchanged_count < 2 and len(basis) <= max_dimension:
+        enlarged_basis = echelon([*basis, *relations_on_orbit(map_, degree, rank_bound).vectors], map_.prime)
+        unchanged_count = unchanged_count + 1 if len(enlarged_basis) == len(basis) else 0
+        basis = enlarged_basis
     return basis
 
 
@@ -227,25 +227,28 @@ def orbit_profile(
     nullities: list[int] = []
     codimensions: list[int] = []
     with_known = 0
-    agree, period, cut = True, None, ""
-    leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
+    maps_agree, period, reason = True, None, ""
+    leading_by_map: list[frozenset[Exponent]] = [frozenset()] * len(maps)
     last_degree = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         last_degree = max((d for d in range(1, last_degree + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
-    largest = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
+    max_support = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
     for degree in range(1, last_degree + 1):
         if comb(dim + degree, degree) > MAX_UNKNOWNS or any(
-            len(_not_multiples(dim, degree, lower)) > largest for lower in leading
+            len(_indices_of_non_multiples(dim, degree, leading)) > max_support for leading in leading_by_map
         ):
-            cut = "too many unknowns"
+            reason = "too many unknowns"
         elif budget.is_spent:
-            cut = SPENT
-        if cut:
+            reason = SPENT
+        if reason:
             break
         progress(f"relations of degree {degree} along orbits")
-        orbits = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
-        leading = [orbit.leading for orbit in orbits]
-        agree = agree and len({(orbit.dimension, orbit.codimension) for orbit in orbits}) == 1
+        orbits = [
+            relations_on_orbit(map_, degree, leading=leading)
+            for map_, leading in zip(maps, leading_by_map, strict=True)
+        ]
+        leading_by_map = [orbit.leading for orbit in orbits]
+        maps_agree = maps_agree and len({(orbit.dimension, orbit.codimension) for orbit in orbits}) == 1
         # A special orbit never has fewer relations than a generic one, so the minimum counts.
         nullities.append(min(orbit.dimension for orbit in orbits))
         codimensions.append(min(orbit.codimension for orbit in orbits))
@@ -259,7 +262,7 @@ def orbit_profile(
         # A closed orbit is a finite set, even if relations of low degree only show a curve through its points.
         if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
-    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, not cut, with_known, cut)
+    return Profile(dim, tuple(nullities), tuple(codimensions), period, maps_agree, not reason, with_known, reason)
 
 
 @dataclass(frozen=True)
@@ -278,7 +281,7 @@ class Basis:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        integrals = [[not same for same in row] for row in self.constant]
+        integrals = [[not is_constant for is_constant in row] for row in self.constant]
         agreement = attributes(self, orbits_agree="agree", period="period")
         return {**attributes(self, "functions", "dimension"), "integrals": integrals, **agreement}
 
@@ -308,39 +311,37 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     """
     bases: list[list[list[int]]] = []
     periods: set[int | None] = set()
-    count = len(functions) + _SPARE
-    iterates = len(names_of(functions[0])) // maps[0].dim - 1
-    constant: list[list[bool]] | None = None
+    point_count = len(functions) + _SPARE
+    max_shift = len(names_of(functions[0])) // maps[0].dim - 1
+    are_constant: list[list[bool]] | None = None
     for map_ in maps:
         field = GF(map_.prime)
         two_bases: list[list[list[int]]] = []
         for _ in range(2):
-            points = map_.orbit(count + iterates)
-            closed = len(points) < count + iterates  # a cycle, whose points are then repeated
-            periods.add(len(points) if closed else None)
-            continued = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
+            points = map_.orbit(point_count + max_shift)
+            is_closed = len(points) < point_count + max_shift  # a cycle, whose points are then repeated
+            periods.add(len(points) if is_closed else None)
+            orbit = [points[k % len(points)] for k in range(len(points) + max_shift * is_closed)]
             rows = [
                 [
                     int(evaluate(function, field, [field.convert(c) for x in segment for c in x]))
                     for function in functions
                 ]
-                for segment in zip(
-                    *(continued[k : k + len(continued) - iterates] for k in range(iterates + 1)), strict=True
-                )
+                for segment in zip(*(orbit[k : k + len(orbit) - max_shift] for k in range(max_shift + 1)), strict=True)
             ]
             two_bases.append(null_space(rows, len(functions), map_.prime))
         bases += two_bases
         # An entry of the reduced basis that is equal on two orbits of one map is a constant. Every other entry depends
         # on the orbit and is the value of an integral.
         if len(two_bases[0]) == len(two_bases[1]):
-            same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*two_bases, strict=True)]
-            constant = same if constant is None or len(constant) != len(same) else constant
+            are_equal = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*two_bases, strict=True)]
+            are_constant = are_equal if are_constant is None or len(are_constant) != len(are_equal) else are_constant
     dimension = min(len(basis) for basis in bases)
-    constant_entries = constant if constant is not None and len(constant) == dimension else []
+    constant = are_constant if are_constant is not None and len(are_constant) == dimension else []
     return Basis(
         tuple(names),
         dimension,
-        tuple(tuple(row) for row in constant_entries),
+        tuple(tuple(row) for row in constant),
         len({len(basis) for basis in bases}) == 1,
         periods.pop() if len(periods) == 1 else None,
     )
@@ -396,36 +397,38 @@ def sparse_relations(
     ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']
     """
     support = _descending_exponents(maps[0].dim, degree)
-    tables = [_relations(map_, degree) for map_ in (maps[0], maps[0], maps[1])]
+    tables = [_relation_basis(map_, degree) for map_ in (maps[0], maps[0], maps[1])]
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leads = []  # leading monomials of relations of lower degree, which imply the relations of their multiples
+    leading = []  # leading monomials of relations of lower degree, which imply the relations of their multiples
     if degree > 1:
-        lower = _descending_exponents(maps[0].dim, degree - 1)
-        leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
+        lower_exponents = _descending_exponents(maps[0].dim, degree - 1)
+        leading = [
+            lower_exponents[next(k for k, c in enumerate(row) if c)] for row in _relation_basis(maps[0], degree - 1)
+        ]
     relations, context = [], ring(variables)
     # Letters for the names c1, c2, ... and e1, e2, ... such that no variable has one of these names.
-    taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
+    letters_in_use = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
     integral_letter, eps_letter = (
-        next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES")
+        next((c for c in letters if c not in letters_in_use), f"{letters[0]}_") for letters in ("ckCK", "esES")
     )
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
     # Two orbits of the first map distinguish integrals from constants; constants are reconstructed from both maps.
-    for row, other_orbit, other_map in zip(*tables, strict=True):
+    for row, orbit_row, map_row in zip(*tables, strict=True):
         columns = [k for k, entry in enumerate(row) if entry]
-        is_implied = any(all(map(ge, support[columns[0]], lead)) for lead in leads)
+        is_implied = any(all(map(ge, support[columns[0]], divisor)) for divisor in leading)
         if is_implied or len(columns) > max_terms:
             continue
         terms = []
         for k in columns:
-            if row[k] != other_orbit[k]:
-                key = row[k], other_orbit[k], other_map[k]
+            if row[k] != orbit_row[k]:
+                key = row[k], orbit_row[k], map_row[k]
                 text = names.setdefault(key, f"{integral_letter}{first + len(names)}")
             else:
-                number = _number_text(row[k], other_map[k], maps[0], maps[1])
-                text = number or functions.setdefault((row[k], other_map[k]), f"{eps_letter}{first + len(functions)}")
+                number = _number_text(row[k], map_row[k], maps[0], maps[1])
+                text = number or functions.setdefault((row[k], map_row[k]), f"{eps_letter}{first + len(functions)}")
             terms.append((format_polynomial(context.from_dict({support[k]: 1})), text))
         relations.append(
             SparseRelation(
@@ -442,28 +445,28 @@ def _descending_exponents(dim: int, degree: int) -> list[tuple[int, ...]]:
     return sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
 
 
-def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
+def _relation_basis(map_: ModularMap, degree: int) -> list[list[int]]:
     """Return the reduced echelon basis of the relations of a random orbit, on `_descending_exponents`."""
-    order = [places_of(map_.dim, degree)[exponent] for exponent in _descending_exponents(map_.dim, degree)]
+    order = [monomial_index(map_.dim, degree)[exponent] for exponent in _descending_exponents(map_.dim, degree)]
     return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
 
 
-def _number_text(entry: int, other_entry: int, map_: ModularMap, other_map: ModularMap) -> str | None:
+def _number_text(coefficient: int, other_coefficient: int, map_: ModularMap, other_map: ModularMap) -> str | None:
     """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is none."""
     for power in _POWERS:
         residues = [
             [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]
-            for residue, modular_map in ((entry, map_), (other_entry, other_map))
+            for residue, modular_map in ((coefficient, map_), (other_coefficient, other_map))
         ]
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
         count_work(60)
         value = simple_fraction(residue, map_.prime * other_map.prime, _SPARE_BITS)
         if value is not None:
-            number, q = format_number(value), "" if value.q == 1 else f"{value.q}*"
+            text, q = format_number(value), "" if value.q == 1 else f"{value.q}*"
             if power == 0:
-                return number
-            eps = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
+                return text
+            eps_text = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
             if power < 0:
-                return f"{value.p}/({q}{eps})" if q else f"{value.p}/{eps}"
-            return f"{number}*{eps}".replace("1*", "", 1) if abs(value) == 1 else f"{number}*{eps}"
+                return f"{value.p}/({q}{eps_text})" if q else f"{value.p}/{eps_text}"
+            return f"{text}*{eps_text}".replace("1*", "", 1) if abs(value) == 1 else f"{text}*{eps_text}"
     return None

@@ -26,8 +26,8 @@ from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals_and_densities import normalized
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
-from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
+from kahanmaps.laboratory.laboratory import Laboratory, flow_preserves
+from kahanmaps.laboratory.modular_points import IndependentGradients, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, SpaceSearch, denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
@@ -76,10 +76,10 @@ class FoundIntegral(FoundFunction):
     @property
     def short_text(self) -> str:
         """The formula, or its number of terms if it has more than 500."""
-        sizes = len(self.function.numerator), len(self.function.denominator)
-        if sum(sizes) <= _SHOWN_TERMS:
+        term_counts = len(self.function.numerator), len(self.function.denominator)
+        if sum(term_counts) <= _SHOWN_TERMS:
             return self.text
-        return f"P/Q with {sizes[0]} and {sizes[1]} terms, which find-integrals writes out"
+        return f"P/Q with {term_counts[0]} and {term_counts[1]} terms, which find-integrals writes out"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -108,12 +108,12 @@ class TimeDependentIntegral(ResultPart):
     def text(self) -> str:
         """The formula."""
         I = self.integral.text
-        bracketed = I if I.isidentifier() else f"({I})"
+        bracketed_text = I if I.isidentifier() else f"({I})"
         if self.flow:
             rate = format_polynomial(-self.factor.numerator)
-            power = {"1": "t", "-1": "-t"}.get(rate, f"({rate})*t" if " " in rate else f"{rate}*t")
-            return f"exp({power})*{bracketed}"
-        return f"({format_rational_function(self.factor)})^-n*{bracketed}"
+            exponent = {"1": "t", "-1": "-t"}.get(rate, f"({rate})*t" if " " in rate else f"{rate}*t")
+            return f"exp({exponent})*{bracketed_text}"
+        return f"({format_rational_function(self.factor)})^-n*{bracketed_text}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -184,23 +184,23 @@ class IntegralSearch(Search):
 
         Relations of higher degrees could show more integrals, unless orbits lie on curves (or close).
         """
-        dim, measured = self.profile.dim, bool(self.profile.nullities)
-        closes = self.profile.period is not None or self.period_at_values is not None
-        return self.codimension >= (dim - 1 if measured and not closes else dim)
+        dim, has_profile = self.profile.dim, bool(self.profile.nullities)
+        is_closed = self.profile.period is not None or self.period_at_values is not None
+        return self.codimension >= (dim - 1 if has_profile and not is_closed else dim)
 
     @property
     def count_text(self) -> str:
         """The number of integrals, with the evidence for it."""
-        tried = f"relations of degree up to {self.profile.degree} along orbits"
+        scope = f"relations of degree up to {self.profile.degree} along orbits"
         if self.codimension == 0:
             if not self.profile.nullities:
                 return "orbits were not measured"
-            return f"there is no integral (measured, {tried})" if self.is_exact else f"none shows in {tried} (measured)"
+            return f"there is no integral (measured, {scope})" if self.is_exact else f"none shows in {scope} (measured)"
         phrases = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
         if self.profile.nullities:
-            shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
-            phrases.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
-            if self.formula_count > shown:
+            count = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
+            phrases.append(f"measured: {scope} show {'no more' if count == self.by_theorems else count}")
+            if self.formula_count > count:
                 phrases.append(f"{self.formula_count} have formulas")
         at_least = "" if self.is_exact else "at least "
         return f"in all {at_least}{self.codimension} independent ({'; '.join(phrases)})"
@@ -295,8 +295,8 @@ def integrals_of(
     flow, seed = laboratory.flow, laboratory.request[3]
     # The stages: orbits; fast searches and their formulas; products; larger relations and their formulas; iterates.
     # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
-    stages = budget.share([3, 4, 1, 3, 3])
-    collected = _Collected(laboratory, progress)
+    budgets = budget.share([3, 4, 1, 3, 3])
+    collection = _IntegralCollection(laboratory, progress)
     # The integrals that theorems give, for each map of the laboratory; without symbols all maps have the same.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
@@ -307,29 +307,29 @@ def integrals_of(
         inherited = [systems[map_.values] for map_ in laboratory.maps]
     theorems, by_theorems = "", 0
     if inherited:
-        at = ", ".join(laboratory.free_symbols)
-        theorems = inherited[0].text + (f", at random values of {at}" if at else "")
+        values_text = ", ".join(laboratory.free_symbols)
+        theorems = inherited[0].text + (f", at random values of {values_text}" if values_text else "")
         if not laboratory.defect:
             pairs = zip(inherited, laboratory.maps, strict=True)
             by_theorems = min(integrals.count(map_) for integrals, map_ in pairs)
     # The map modulo the first prime with the values that the file gives to the symbols, if it gives any.
-    at_values, values = None, [laboratory.file.parameters.get(name) for name in laboratory.symbols]
+    map_at_values, values = None, [laboratory.file.parameters.get(name) for name in laboratory.symbols]
     if values and None not in values:
         prime = laboratory.maps[0].prime
         residues = [int(GF(prime).convert(value)) for value in values]
-        at_values = laboratory.map_at(prime, residues, laboratory.maps[0].eps)
-    period_at_values = None if at_values is None or laboratory.defect else closing_period([at_values])
+        map_at_values = laboratory.map_at(prime, residues, laboratory.maps[0].eps)
+    period_at_values = None if map_at_values is None or laboratory.defect else closing_period([map_at_values])
 
-    def result(profile: Profile, reason: str) -> IntegralSearch:
+    def build_result(profile: Profile, reason: str) -> IntegralSearch:
         return IntegralSearch(
             *laboratory.request,
-            tuple(collected.integrals),
+            tuple(collection.integrals),
             profile,
             reason,
             by_theorems,
             theorems,
-            tuple(collected.time_dependent),
-            tuple(collected.in_iterates),
+            tuple(collection.time_dependent),
+            tuple(collection.in_iterates),
             period_at_values,
             flow=flow,
         )
@@ -337,88 +337,88 @@ def integrals_of(
     def known_gradients(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
-    cut = ""
+    note = ""
     empty_profile = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
-        return result(empty_profile, laboratory.defect)
+        return build_result(empty_profile, laboratory.defect)
     try:
         profile = orbit_profile(
             laboratory.maps,
             max_degree=max_degree,
-            budget=next(stages),
+            budget=next(budgets),
             known_gradients=known_gradients,
             progress=progress,
         )
-        on_result(result(profile, UNFINISHED))
-        stage = next(stages)
+        on_result(build_result(profile, UNFINISHED))
+        share = next(budgets)
         cofactors = laboratory.cofactors()
         # For a vector field there would be too many candidates. Most integrals have denominators with these factors.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
-        factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, stage)
+        factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
         denominators = denominators_among(factors, laboratory.map.dim)
 
         def quick_search(map_: ModularMap) -> SpaceSearch:
             # On each map half of the remaining work: the other half is for the formulas.
-            return search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
+            return search_spaces(map_, profile, cofactors, denominators, budget=share.part(0.5), progress=progress)
 
-        base = laboratory.maps[0]
-        base, space_search, formulas, reason = _formulas(
-            laboratory, base, quick_search(base), quick_search, stage, progress
+        base_map = laboratory.maps[0]
+        base_map, space_search, formulas, reason = _interpolate_formulas(
+            laboratory, base_map, quick_search(base_map), quick_search, share, progress
         )
     except NoPoint as error:
-        return result(empty_profile, str(error))
-    collected.offer(formulas)
+        return build_result(empty_profile, str(error))
+    collection.add_formulas(formulas)
     if inherited and not laboratory.symbols:
-        collected.add_by_theorems(inherited[0])
-    on_result(result(profile, UNFINISHED))
-    stage = next(stages)
-    if len(collected.integrals) < laboratory.map.dim - 1:
+        collection.add_by_theorems(inherited[0])
+    on_result(build_result(profile, UNFINISHED))
+    share = next(budgets)
+    if len(collection.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
-        collected.add_products(cofactors, stage)
-    result_so_far, stage = result(profile, ""), next(stages)
+        collection.add_products(cofactors, share)
+    result_so_far, share = build_result(profile, ""), next(budgets)
     on_result(replace(result_so_far, reason=UNFINISHED))
     if not result_so_far.is_complete:
         # This stage may take longer than all earlier stages, so it comes after their formulas.
         steps_before = len(space_search.steps)
-        cut = add_relation_spaces(base, profile, space_search, LARGEST_SPAN, stage.part(0.5), progress)
+        note = add_relation_spaces(base_map, profile, space_search, LARGEST_SPAN, share.part(0.5), progress)
         if len(space_search.steps) > steps_before:
 
             def thorough_search(map_: ModularMap) -> SpaceSearch:
                 second_search = search_spaces(
-                    map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress
+                    map_, profile, cofactors, denominators, budget=share.part(0.5), progress=progress
                 )
-                add_relation_spaces(map_, profile, second_search, LARGEST_SPAN, stage.part(0.5), progress)
+                add_relation_spaces(map_, profile, second_search, LARGEST_SPAN, share.part(0.5), progress)
                 return second_search
 
-            _, space_search, formulas, reason = _formulas(
-                laboratory, base, space_search, thorough_search, stage, progress
+            _, space_search, formulas, reason = _interpolate_formulas(
+                laboratory, base_map, space_search, thorough_search, share, progress
             )
-            collected.offer(formulas)
-            result_so_far = result(profile, "")
+            collection.add_formulas(formulas)
+            result_so_far = build_result(profile, "")
     if not flow and not result_so_far.is_complete and laboratory.root is None:
-        collected.add_in_iterates(result_so_far.codimension, next(stages))
-        result_so_far = result(profile, "")
-    missing = result_so_far.codimension - result_so_far.formula_count
-    if missing <= 0:
+        collection.add_in_iterates(result_so_far.codimension, next(budgets))
+        result_so_far = build_result(profile, "")
+    missing_count = result_so_far.codimension - result_so_far.formula_count
+    if missing_count <= 0:
         reason = ""
     elif not reason:
-        have = "has" if missing == 1 else "have"
-        reason = f"{missing} of the {result_so_far.codimension} independent integrals {have} no closed form P/Q"
+        verb = "has" if missing_count == 1 else "have"
+        reason = f"{missing_count} of the {result_so_far.codimension} independent integrals {verb} no closed form P/Q"
         reason += f" {space_search.tried}: coefficients of Hirota-Kimura bases are such integrals"
-    reasons = [reason, *([space_search.cut, cut] if missing > 0 else []), *collected.cut]
-    if at_values is not None:
+    reasons = [reason, *([space_search.cut, note] if missing_count > 0 else []), *collection.skipped_searches]
+    if map_at_values is not None:
         # At the values of the file, integrals with symbols may become dependent or vanish.
-        independent = Independent(at_values)
+        independent = IndependentGradients(map_at_values)
         rows = [independent.gradient(integral.function) for integral in result_so_far.integrals]
         point = independent.point
         rows += [
-            gradient_of(integral.ratio, laboratory.map, at_values, point) for integral in result_so_far.in_iterates
+            gradient_of(integral.ratio, laboratory.map, map_at_values, point) for integral in result_so_far.in_iterates
         ]
         rank = sum(map(independent.add, rows))
         if rank < len(rows):
-            at = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
-            how_many = f"only {rank} of the {len(rows)} formulas {'is' if rank == 1 else 'are'} independent"
-            reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
+            values_text = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
+            count_text = f"only {rank} of the {len(rows)} formulas {'is' if rank == 1 else 'are'} independent"
+            reasons.append(f"at {values_text} {count_text}: without --symbolic others may be found")
     if profile.cut and (profile.cut == SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
@@ -426,15 +426,15 @@ def integrals_of(
     return replace(result_so_far, reason="; ".join(filter(None, reasons)))
 
 
-def _formulas(
+def _interpolate_formulas(
     laboratory: Laboratory,
-    base: ModularMap,
+    base_map: ModularMap,
     result: SpaceSearch,
     search_on: Callable[[ModularMap], SpaceSearch],
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
-    """Interpolate the ratios of the polynomials that a search found on the map `base`.
+    """Interpolate the ratios of the polynomials that a search found on the map `base_map`.
 
     If their spaces may be conjugate over an extension of Q, `search_on` repeats the search on maps modulo other primes,
     until there are no conjugate spaces. Returns the map and the search that were used, the formulas, and the reason why
@@ -442,12 +442,12 @@ def _formulas(
     """
     if may_be_conjugate(result):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
-            if not budget.is_spent and repeat_search(result, map_, base.prime) is None:
-                base, result = map_, search_on(map_)
+            if not budget.is_spent and repeat_search(result, map_, base_map.prime) is None:
+                base_map, result = map_, search_on(map_)
     if not result.steps:
-        return base, result, [], ""
+        return base_map, result, [], ""
     progress("interpolating closed forms")
-    bases, reason = interpolate_bases(laboratory, base.prime, result, budget)
+    bases, reason = interpolate_bases(laboratory, base_map.prime, result, budget)
     origins = [step.text for step, spaces in zip(result.steps, result.spaces, strict=True) for _ in spaces]
     formulas = list[Formula]()
     for (Q, *numerators), origin in zip(bases, origins, strict=False):
@@ -455,32 +455,32 @@ def _formulas(
             P_is_number, Q_is_number = (substitute(F, {"eps": fmpq(0)}).is_constant() for F in (P, Q))
             is_inverse = P_is_number and not Q_is_number
             formulas.append((RationalFunction(Q, P) if is_inverse else RationalFunction(P, Q), origin, ""))
-    return base, result, formulas, reason
+    return base_map, result, formulas, reason
 
 
-class _Collected:
+class _IntegralCollection:
     """Functionally independent integrals with verdicts, none of them refuted.
 
-    `cut` names the searches that were skipped because the work limit was reached.
+    `skipped_searches` names the searches that were skipped because the work limit was reached.
     """
 
     def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:
         self._laboratory, self._progress = laboratory, progress
-        self.cut: list[str] = []
-        self._gradients = Independent(laboratory.maps[0])
+        self.skipped_searches: list[str] = []
+        self._gradients = IndependentGradients(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
         self.time_dependent: list[TimeDependentIntegral] = []
         self.in_iterates: list[IntegralInIterates] = []
 
-    def offer(self, formulas: Sequence[Formula]) -> None:
+    def add_formulas(self, formulas: Sequence[Formula]) -> None:
         """Add the formulas that are independent of the collected ones and not refuted, short formulas first."""
 
-        def size(formula: Formula) -> tuple[int, int, list[list[int]]]:
+        def sort_key(formula: Formula) -> tuple[int, int, list[list[int]]]:
             """Return the sort key: size, then monomials. The order must not depend on the primes."""
             P = formula[0].numerator
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
-        for function, origin, product in sorted(map(self._normalized, formulas), key=size):
+        for function, origin, product in sorted(map(self._normalize, formulas), key=sort_key):
             gradient = self._gradients.gradient(function)
             if not self._gradients.adds(gradient):
                 continue
@@ -489,14 +489,14 @@ class _Collected:
             n, monomials = laboratory.map.dim, function.numerator.monoms()
             is_affine = function.is_polynomial and all(sum(map(int, m[:n])) <= 1 and not m[-1] for m in monomials)
             system = None if laboratory.flow else laboratory.system
-            if is_affine and system is not None and is_kept_by_flow(system, function):
+            if is_affine and system is not None and flow_preserves(system, function):
                 verdict = Certainty.PROVED  # v.x with v.f = 0; v may contain the symbols
             else:
                 verdict, evidence = laboratory.verdict_on(function)
             if verdict.holds:
                 self._add(gradient, function, origin, verdict, evidence, product)
 
-    def _normalized(self, formula: Formula) -> Formula:
+    def _normalize(self, formula: Formula) -> Formula:
         """Normalize the formula so that it tends to an integral of the flow as eps -> 0, if that is possible."""
         function, origin, product = formula
         if not self._has_limit:
@@ -508,8 +508,8 @@ class _Collected:
     def _has_limit(self) -> bool:
         """Return whether the limit eps -> 0 is defined: for flows, and for maps of any eps that approximate a flow."""
         laboratory = self._laboratory
-        of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
-        return of_flow and laboratory.eps is None and laboratory.root is None
+        approximates_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
+        return approximates_flow and laboratory.eps is None and laboratory.root is None
 
     def _add(self, gradient: list[int], *fields: Any) -> None:
         self._gradients.add(gradient)
@@ -538,25 +538,25 @@ class _Collected:
                 continue  # too long to expand
             function = RationalFunction.reduced(value.numerator, value.denominator)
             is_hamiltonian = inherited.forms[k - affine_count].rank() == len(inherited.quotient.free)
-            form = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
-            summary = f"{form} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
+            form_text = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
+            summary = f"{form_text} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
             summary = f"{summary}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
             evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine_count))})
-            formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
+            formula = self._normalize((function, "modified Hamiltonian (cmoq-2013)", ""))
             self._add(gradient, *formula[:2], Certainty.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
         """Add products of powers of known polynomials, among them time-dependent integrals."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
         if budget.is_spent:
-            self.cut.append(f"products of powers of known polynomials were not tried: {SPENT}")
+            self.skipped_searches.append(f"products of powers of known polynomials were not tried: {SPENT}")
             return
         try:
             products = products_of(laboratory, candidates(laboratory, cofactors, budget))
         except NoPoint:
             return
-        expanded = ((product, product.function) for product in products.integrals)
-        self.offer([(function, origin, product.text) for product, function in expanded if function is not None])
+        pairs = ((product, product.function) for product in products.integrals)
+        self.add_formulas([(function, origin, product.text) for product, function in pairs if function is not None])
         for product in products.time_dependent:
             function = product.function
             if function is None or len(self.integrals) + len(self.time_dependent) >= laboratory.map.dim:
@@ -575,13 +575,15 @@ class _Collected:
         """Add integrals in iterates of x, and further integrals in x alone, until there are `required` of them."""
         laboratory = self._laboratory
         # Time-dependent integrals do not count here.
-        self._gradients = Independent(laboratory.maps[0], [integral.function for integral in self.integrals])
+        self._gradients = IndependentGradients(laboratory.maps[0], [integral.function for integral in self.integrals])
         try:
-            plain, ratios, cut = integrals_in_iterates(laboratory, required, self._gradients, budget, self._progress)
+            formulas, ratios, note = integrals_in_iterates(
+                laboratory, required, self._gradients, budget, self._progress
+            )
         except NoPoint:
             return
-        self.cut += filter(None, [cut])
-        self.offer(plain)
+        self.skipped_searches += filter(None, [note])
+        self.add_formulas(formulas)
         too_long = set[int]()
         for raw_ratio, origin in ratios:
             ratio = raw_ratio.with_limit(2 * laboratory.map.dim) if self._has_limit else raw_ratio

@@ -35,7 +35,7 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.integrals_and_densities import normalized, orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, certified
-from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
+from kahanmaps.laboratory.modular_points import IndependentGradients, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
@@ -80,27 +80,27 @@ class RatioOfIterates:
         """The ratio and, for rank 2, the definitions of the names F0, F1, ... that abbreviate functions in it."""
         if self.two_point_basis.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
-        taken = self.functions[0].context().names()
+        names_in_use = self.functions[0].context().names()
         letters = (c * k for k in count(1) for c in "FGKUVW")
-        letter = next(c for c in letters if not any(name.startswith(c) for name in taken))
+        letter = next(c for c in letters if not any(name.startswith(c) for name in names_in_use))
         names = [f"{letter}{k}" for k in range(len(self.functions))]
         gens = ring([*names, *(f"{name}~" for name in names)]).gens()
         F, F_next = gens[: len(names)], gens[len(names) :]
         P, Q = (F[a] * F_next[b] - F[b] * F_next[a] for a, b in (self.numerator, self.denominator))
-        occurring = sorted({*self.numerator, *self.denominator})
-        return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in occurring]
+        indices = sorted({*self.numerator, *self.denominator})
+        return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in indices]
 
     @property
     def text(self) -> str:
         """The formula; x~ is the image of x, and x~~ is the image of x~."""
-        ratio, letters = self.formula
-        return ", ".join([format_rational_function(ratio), *(f"{F} = {format_polynomial(P)}" for F, P in letters)])
+        ratio, definitions = self.formula
+        return ", ".join([format_rational_function(ratio), *(f"{F} = {format_polynomial(P)}" for F, P in definitions)])
 
     @property
     def latex(self) -> str:
         """The formula as LaTeX."""
-        ratio, letters = self.formula
-        return r",\quad ".join([latex(ratio), *(f"{latex(ring([F]).gens()[0])} = {latex(P)}" for F, P in letters)])
+        ratio, definitions = self.formula
+        return r",\quad ".join([latex(ratio), *(f"{latex(ring([F]).gens()[0])} = {latex(P)}" for F, P in definitions)])
 
     def numerator_and_denominator(
         self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]
@@ -166,21 +166,21 @@ def verdict_on_ratio(
             too_long.add(ratio.length)
             raise
         pairs = [ratio.numerator_and_denominator(field, points[k:], values) for k in (0, 1)]
-        (P, Q), (P_later, Q_later) = pairs
-        if field.is_zero(Q) or field.is_zero(Q_later):
+        (P, Q), (P_image, Q_image) = pairs
+        if field.is_zero(Q) or field.is_zero(Q_image):
             return None
-        return [P_later * Q], [P * Q_later]
+        return [P_image * Q], [P * Q_image]
 
     scopes = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
     scope = " and ".join([*scopes, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
-    subject = (map_.symbols, map_.subject, ratio.text, ratio.numerator, ratio.denominator)
+    identity_key = (map_.symbols, map_.subject, ratio.text, ratio.numerator, ratio.denominator)
     identity = Identity(
         n + len(map_.symbols),
         sides,
         eps,
         scope=f"for {scope}" if scope else "",
         has_eps=map_.has_eps,
-        subject=subject,
+        subject=identity_key,
     )
     return certified(
         identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in too_long)
@@ -190,7 +190,7 @@ def verdict_on_ratio(
 def integrals_in_iterates(
     laboratory: Laboratory,
     required: int,
-    independent: Independent,
+    independent: IndependentGradients,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:
@@ -211,16 +211,16 @@ def integrals_in_iterates(
     """
     independent = copy(independent)
     independent.rows = list(independent.rows)  # so that the argument does not change
-    plain, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
-    level = _level(laboratory)
-    level_laboratory, replace_levels = (laboratory, None) if level is None else level
+    integrals_in_x, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
+    restriction = _restrict_map(laboratory)
+    level_laboratory, replace_levels = (laboratory, None) if restriction is None else restriction
     modular_map = level_laboratory.maps[0]
-    cut = ""
-    for two_point_basis in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
+    omission_text = ""
+    for two_point_basis in TWO_POINT_BASES if restriction is not None else TWO_POINT_BASES[1:]:
         if len(independent.rows) >= required:
             break
         if budget.is_spent:
-            cut = f"{two_point_basis.text} were not tried: {SPENT}"
+            omission_text = f"{two_point_basis.text} were not tried: {SPENT}"
             break
         for basis_with_rank, spaces in bases_with_spaces(modular_map, [two_point_basis]):
             progress(basis_with_rank.text)
@@ -235,7 +235,7 @@ def integrals_in_iterates(
                 # These ratios generate all ratios of the functions.
                 candidates = [RatioOfIterates(basis_with_rank, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
                 if basis_with_rank.rank == 2:
-                    pairs = [(first, k) for k in range(2, len(functions)) for first in (0, 1)]
+                    pairs = [(index, k) for k in range(2, len(functions)) for index in (0, 1)]
                     candidates = [RatioOfIterates(basis_with_rank, tuple(functions), pair, (0, 1)) for pair in pairs]
                 for ratio in candidates:
                     if not independent.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], independent.point)):
@@ -246,11 +246,11 @@ def integrals_in_iterates(
                         context = ring(laboratory.map.names)
                         gens, n = context.gens(), laboratory.map.dim
                         P, Q = (F.compose(*gens[:n], *gens, ctx=context) for F in ratio.functions)
-                        plain.append((RationalFunction(P, Q), basis_with_rank.text, ""))
-    return plain, ratios, cut
+                        integrals_in_x.append((RationalFunction(P, Q), basis_with_rank.text, ""))
+    return integrals_in_x, ratios, omission_text
 
 
-def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
+def _names_in_formulas(map_: MapFamily, shift: int) -> tuple[str, ...]:
     """Return the names in formulas: variables, variables of the iterate, symbols, eps."""
     names = map_.variables
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
@@ -258,20 +258,20 @@ def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
 
 def _bilinear_function(P: fmpq_mpoly, two_point_basis: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
     """Return the bilinear function of x and its iterate that a polynomial of degree 2 encodes (`TwoPointBasis`)."""
-    n, context = map_.dim, ring(_letters(map_, two_point_basis.shift))
+    n, context = map_.dim, ring(_names_in_formulas(map_, two_point_basis.shift))
     one, gens = context.constant(1), context.gens()
     X, Y = (one, *gens[:n]), (one, *gens[n * min(two_point_basis.shift, 1) :][:n])
     pairs = dict(zip(exponents_up_to(n, TWO_POINT_DEGREE), pairs_of(n), strict=True))
-    total = context.constant(0)
+    bilinear = context.constant(0)
     for monomial, coefficient in P.terms():
         exponents = tuple(map(int, monomial))
         i, j = pairs[exponents[:n]]
         scalar = context.from_dict({(0,) * (2 * n) + exponents[n:]: coefficient})
-        total = total + scalar * (X[i] * Y[j] + two_point_basis.sign * X[j] * Y[i])
-    return primitive_part(total)[1]
+        bilinear = bilinear + scalar * (X[i] * Y[j] + two_point_basis.sign * X[j] * Y[i])
+    return primitive_part(bilinear)[1]
 
 
-def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
+def _restrict_map(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
     """Restrict the map to level sets of its affine integrals, whose values become symbols.
 
     Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result, or
@@ -282,45 +282,45 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
     quotient = quotient_by(integrals, n)
     if system is None or not integrals or len(quotient.free) < 2:
         return None
-    taken, levels = {*laboratory.map.names, *laboratory.file.parameters}, list[str]()
+    names_in_use, level_names = {*laboratory.map.names, *laboratory.file.parameters}, list[str]()
     for k in count(1):
-        if len(levels) == len(integrals):
+        if len(level_names) == len(integrals):
             break
-        levels += [f"c{k}"] if f"c{k}" not in taken else []
-    free = [laboratory.map.variables[k] for k in quotient.free]
-    context = ring((*free, *laboratory.symbols, *levels))
+        level_names += [f"c{k}"] if f"c{k}" not in names_in_use else []
+    free_names = [laboratory.map.variables[k] for k in quotient.free]
+    context = ring((*free_names, *laboratory.symbols, *level_names))
     gens = context.gens()
     forms = fmpq_mat([[*a, *b] for a, b in zip(quotient.section.tolist(), quotient.shift.tolist(), strict=True)])
-    x = linear_combinations(forms, [*gens[: len(free)], *gens[len(gens) - len(levels) :]])
-    symbols = gens[len(free) : len(free) + len(laboratory.symbols)]
+    x = linear_combinations(forms, [*gens[: len(free_names)], *gens[len(gens) - len(level_names) :]])
+    symbols = gens[len(free_names) : len(free_names) + len(laboratory.symbols)]
     rhs = [format_polynomial(system.rhs[k].compose(*x, *symbols, ctx=context)) for k in quotient.free]
     values = {name: format_number(laboratory.file.parameters[name]) for name in laboratory.symbols}
     document = {
         "name": laboratory.file.name,
-        "variables": free,
-        "parameters": {**values, **dict.fromkeys(levels, "1")},
+        "variables": free_names,
+        "parameters": {**values, **dict.fromkeys(level_names, "1")},
         "system": {"rhs": rhs},
     }
     file = SystemFile(**DocumentReader(document, laboratory.file.name, {}).read())
-    restricted = Laboratory(file, (*laboratory.symbols, *levels), laboratory.eps, laboratory.seed)
+    restricted_laboratory = Laboratory(file, (*laboratory.symbols, *level_names), laboratory.eps, laboratory.seed)
 
     def replace_levels(F: fmpq_mpoly, shift: int) -> fmpq_mpoly:
-        context = ring(_letters(laboratory.map, shift))
-        *letters, eps = context.gens()
-        x, iterate, symbols = letters[:n], letters[n : 2 * n], letters[2 * n :]
+        context = ring(_names_in_formulas(laboratory.map, shift))
+        *generators, eps = context.gens()
+        x, iterate, symbols = generators[:n], generators[n : 2 * n], generators[2 * n :]
         level_values = [sum((a * g for a, g in zip(v, x, strict=True)), context.constant(0)) for v in integrals]
         free_x, free_iterate = ([side[k] for k in quotient.free] for side in (x, iterate))
         return F.compose(*free_x, *free_iterate, *symbols, *level_values, eps, ctx=context)
 
-    return restricted, replace_levels
+    return restricted_laboratory, replace_levels
 
 
-def gradient_of(ratio: RatioOfIterates, exact: MapFamily, map_: ModularMap, point: Point) -> list[int]:
+def gradient_of(ratio: RatioOfIterates, exact_map: MapFamily, map_: ModularMap, point: Point) -> list[int]:
     """Return a multiple of the gradient of the ratio in the first point, on a map modulo a prime."""
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]
     eps = field.convert(map_.eps)
-    map_over_duals = exact.at(eps, field, values)
+    map_over_duals = exact_map.at(eps, field, values)
     gradient = []
     for k in range(map_.dim):
         points = [tuple(field.dual(c, int(i == k)) for i, c in enumerate(point))]

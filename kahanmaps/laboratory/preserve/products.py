@@ -95,52 +95,52 @@ class Products:
 
 
 def candidates(
-    laboratory: Laboratory, cofactors: Sequence[Cofactor], budget: Budget, further: Sequence[fmpq_mpoly] = ()
+    laboratory: Laboratory, cofactors: Sequence[Cofactor], budget: Budget, polynomials: Sequence[fmpq_mpoly] = ()
 ) -> list[fmpq_mpoly]:
     """Collect irreducible polynomials over Q in (variables, symbols, eps) as candidate factors of integrals.
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `further` polynomials. For a flow they are the Darboux polynomials that are found within the budget.
+    of the `polynomials` polynomials. For a flow they are the Darboux polynomials that are found within the budget.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     cofactor_polynomials = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
-    factors = _irreducible((*context.gens()[:n], *cofactor_polynomials), n, laboratory.eps)
+    factors = _irreducible_factors((*context.gens()[:n], *cofactor_polynomials), n, laboratory.eps)
     factors |= _jacobian_factors(laboratory.map, laboratory.eps, laboratory.system is not None)
-    factors |= _irreducible(further, n, laboratory.eps)
+    factors |= _irreducible_factors(polynomials, n, laboratory.eps)
     return sorted(factors.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
 
 
-def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
+def _irreducible_factors(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
     """Return the primitive irreducible factors that contain one of the first n variables; the keys are texts."""
     factors: dict[str, fmpq_mpoly] = {}
     for P in polynomials:
         if eps is not None:
-            at: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
-            P = P.subs(at)
+            substitution: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
+            P = P.subs(substitution)
         for factor, _ in [] if P.is_zero() else irreducible_factors(P):
             if degree_in(factor, n):
-                primitive = primitive_part(factor)[1]
-                factors.setdefault(str(primitive), primitive)
+                primitive_factor = primitive_part(factor)[1]
+                factors.setdefault(str(primitive_factor), primitive_factor)
     return factors
 
 
 @counted_cache(4)  # may take half a second; the searches for integrals and for densities call it
-def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
-    """Return the factors of numerator and denominator of det dPhi^-1 and, with `both`, of det dPhi."""
+def _jacobian_factors(map_: MapFamily, eps: fmpq | None, has_map_itself: bool) -> dict[str, fmpq_mpoly]:
+    """Return the factors of numerator and denominator of det dPhi^-1 and, with `has_map_itself`, of det dPhi."""
     n, fractions = map_.dim, list[Function]()
-    for backward in (False, True) if both else (True,):
+    for is_inverse in (False, True) if has_map_itself else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
         *x, eps_variable = field.variables
         try:
             map_over_field = map_.at(eps_variable, field, x[n:])
-            map_over_field = map_over_field.inverse if backward else map_over_field
+            map_over_field = map_over_field.inverse if is_inverse else map_over_field
             fractions += jacobian_determinant_fraction(map_over_field, x[:n], map_over_field.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-    return _irreducible((part for function in fractions for part in (function.numerator, function.denominator)), n, eps)
+    return _irreducible_factors((P for f in fractions for P in (f.numerator, f.denominator)), n, eps)
 
 
 class _Line:
@@ -173,26 +173,26 @@ class _Line:
             x = tuple(c / Z for c in X)
             return x, factor.step(x), int(Z)
 
-        def homogeneous(t: int) -> list[int]:
+        def homogeneous_image(t: int) -> list[int]:
             x, image, Z = step(t)
             denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         # The common factor is removed: its degree would multiply in each further map, and its zeros are no zeros of Z~.
-        undivided = _interpolated(homogeneous, n * map_degree * curve_degree, p)
-        common = reduce(nmod_poly.gcd, undivided)
-        self.image = [entry // common for entry in undivided]
-        self.denominator = self.denominator * undivided[-1]
+        forms = _interpolate(homogeneous_image, n * map_degree * curve_degree, p)
+        common_factor = reduce(nmod_poly.gcd, forms)
+        self.image = [entry // common_factor for entry in forms]
+        self.denominator = self.denominator * forms[-1]
         image_Z = self.image[-1]
 
-        def numerator(t: int) -> list[int]:
+        def numerator_at(t: int) -> list[int]:
             x, image, Z = step(t)
             scale = pow(Z, n * (map_degree - 1), p) * pow(int(image_Z(t)), n, p)
             return [int(det(factor.numerator_matrix(x, image))) * scale % p]
 
         image_degree = max(int(entry.degree()) for entry in self.image)
         self.numerator = (
-            self.numerator * _interpolated(numerator, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
+            self.numerator * _interpolate(numerator_at, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
         )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
@@ -202,28 +202,28 @@ class _Line:
         parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]
         degree_of_g = degree_in(g, n)
         powers = [list(accumulate(repeat(c, degree_of_g), mul, initial=nmod_poly([1], p))) for c in curve]
-        total = nmod_poly([0], p)
+        value = nmod_poly([0], p)
         count_work(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
             exponents = [int(e) for e in monomial]
             factors = (c**e for c, e in zip(parameters, exponents[n:], strict=True))
-            value = nmod_poly([int(prod(factors, start=field.convert(coefficient)))], p)
+            term = nmod_poly([int(prod(factors, start=field.convert(coefficient)))], p)
             tables_and_exponents = zip(powers, [*exponents[:n], degree_of_g - sum(exponents[:n])], strict=True)
-            total = total + reduce(mul, (row[e] for row, e in tables_and_exponents if e), value)
-        return total
+            value = value + reduce(mul, (table[e] for table, e in tables_and_exponents if e), term)
+        return value
 
 
-def _interpolated(values: Callable[[int], list[int]], max_degree: int, p: int) -> list[nmod_poly]:
+def _interpolate(function: Callable[[int], list[int]], max_degree: int, p: int) -> list[nmod_poly]:
     """Interpolate the polynomials of degree at most `max_degree` with these values at t = 1, 2, ... Raises NoPoint."""
-    nodes, rows, t, missed = list[int](), list[list[int]](), 0, 0
+    nodes, rows, t, failure_count = list[int](), list[list[int]](), 0, 0
     while len(nodes) <= max_degree:
         t += 1
         try:
-            rows.append(values(t))
+            rows.append(function(t))
             nodes.append(t)
         except SingularStep:
-            missed += 1
-            if missed > max_degree + 20:
+            failure_count += 1
+            if failure_count > max_degree + 20:
                 raise NoPoint("random points modulo a prime are indeterminacy points of the map") from None
     return [interpolated(nodes, column, p) for column in zip(*rows, strict=True)]
 
@@ -236,17 +236,17 @@ def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
     [1, 1]
     """
     base: list[nmod_poly] = []
-    waiting = list(polynomials)
-    while waiting:
-        P = waiting.pop()
+    remaining_polynomials = list(polynomials)
+    while remaining_polynomials:
+        P = remaining_polynomials.pop()
         if P.degree() < 1:
             continue
         for k, Q in enumerate(base):
-            common = P.gcd(Q)
+            common_factor = P.gcd(Q)
             count_work(2 + (P.degree() + Q.degree()) / 3)
-            if common.degree() > 0:
+            if common_factor.degree() > 0:
                 base.pop(k)
-                waiting += [P // common, Q // common, common]
+                remaining_polynomials += [P // common_factor, Q // common_factor, common_factor]
                 break
         else:
             base.append(P)
@@ -274,10 +274,10 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     """
     if not rows:
         return []
-    size, width = len(rows), len(rows[0])
-    count_work(10 + size**2 * (size + width) / 50)
-    augmented = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
-    return [[int(e) for e in row[width:]] for row in augmented.tolist() if not any(row[:width])]
+    row_count, column_count = len(rows), len(rows[0])
+    count_work(10 + row_count**2 * (row_count + column_count) / 50)
+    augmented_rows = fmpz_mat([[*row, *(int(i == k) for i in range(row_count))] for k, row in enumerate(rows)]).hnf()
+    return [[int(e) for e in row[column_count:]] for row in augmented_rows.tolist() if not any(row[:column_count])]
 
 
 def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
@@ -294,12 +294,12 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
     return [[row.get(m, 0) for m in support] for row in terms]
 
 
-def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
+def _reduce_basis(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
     """Return a short basis (LLL) of the lattice; each entry of a vector is multiplied by its weight in the length."""
     if not vectors:
         return []
-    weighted = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
-    return [[int(e) // w for e, w in zip(row, weights, strict=True)] for row in weighted.tolist()]
+    reduced_rows = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
+    return [[int(e) // w for e, w in zip(row, weights, strict=True)] for row in reduced_rows.tolist()]
 
 
 def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Products:
@@ -322,83 +322,83 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
             field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
             *(field.derivative(P) / P for P in polynomials),
         ]
-        numbers = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
-        parts_with_x = [K - c for K, c in zip(cofactors, numbers, strict=True)]
+        constant_parts = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
+        parts_with_x = [K - c for K, c in zip(cofactors, constant_parts, strict=True)]
         time_dependent = []
-        for vector in _reduced(relations(coefficient_rows(parts_with_x)), weights):
-            total = sum((k * c for k, c in zip(vector, numbers, strict=True)), context.constant(0))
-            if vector[0] == 0 and not total.is_zero():
-                time_dependent.append((vector, RationalFunction(total, context.constant(1))))
-        constant_one = _reduced(relations(coefficient_rows(cofactors)), weights)
-        return _assembled(polynomials, n, constant_one, [(one, constant_one)], time_dependent)
+        for vector in _reduce_basis(relations(coefficient_rows(parts_with_x)), weights):
+            constant = sum((k * c for k, c in zip(vector, constant_parts, strict=True)), context.constant(0))
+            if vector[0] == 0 and not constant.is_zero():
+                time_dependent.append((vector, RationalFunction(constant, context.constant(1))))
+        constant_one = _reduce_basis(relations(coefficient_rows(cofactors)), weights)
+        return _build_products(polynomials, n, constant_one, [(one, constant_one)], time_dependent)
     line = _Line(laboratory.maps[0])
-    on_line, on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
+    values_on_line, values_on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
     # det dPhi and the C_i on a random line, as vectors over a coprime base.
-    base = coprime_base([*on_line, *on_image, line.image[-1], line.numerator, line.denominator])
+    base = coprime_base([*values_on_line, *values_on_image, line.image[-1], line.numerator, line.denominator])
     Z, N, M = (_exponents(P, base) for P in (line.image[-1], line.numerator, line.denominator))
     rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]
-    for g, P, Q in zip(polynomials, on_line, on_image, strict=True):
+    for g, P, Q in zip(polynomials, values_on_line, values_on_image, strict=True):
         d = degree_in(g, n)
         rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
-    vectors = _reduced(relations(rows), weights)  # entry 0 is the exponent of det dPhi
+    vectors = _reduce_basis(relations(rows), weights)  # entry 0 is the exponent of det dPhi
 
-    def constants(map_: ModularMap) -> list[int]:
+    def evaluate_constants(map_: ModularMap) -> list[int]:
         """Return prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
-        p, residues, products = map_.prime, GF(map_.prime), list[int]()
-        parameters = [residues.convert(c) for c in (*map_.values, map_.eps)]
+        p, field_p, products = map_.prime, GF(map_.prime), list[int]()
+        parameters = [field_p.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
             count_work(50 + 10 * n)
-            total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
+            constant = pow(int(det(map_.map.jacobian(x))), vector[0], p)
             for g, k in zip(polynomials, vector[1:], strict=True):
                 if k:
-                    before, after = (
-                        int(evaluate(g, residues, [*map(residues.convert, point), *parameters])) for point in (x, image)
+                    value, image_value = (
+                        int(evaluate(g, field_p, [*map(field_p.convert, point), *parameters])) for point in (x, image)
                     )
-                    if not before or not after:
+                    if not value or not image_value:
                         raise NoPoint("a polynomial vanishes at a random point modulo a prime")
-                    total = total * pow(after, k, p) * pow(before, -k, p) % p
-            products.append(total)
+                    constant = constant * pow(image_value, k, p) * pow(value, -k, p) % p
+            products.append(constant)
         return products
 
-    values = constants_of(laboratory, constants)
-    reconstructed = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
+    values = constants_of(laboratory, evaluate_constants)
+    vectors_with_constant = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
-    def with_constant(allowed: list[RationalFunction]) -> list[list[int]]:
+    def select_vectors(allowed_constants: list[RationalFunction]) -> list[list[int]]:
         """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed constants."""
-        combinations = multiplicative_relations([*(c for _, c in reconstructed), *allowed])
-        chosen = [
-            _combined(a[: len(reconstructed)], [v for v, _ in reconstructed])
+        combinations = multiplicative_relations([*(c for _, c in vectors_with_constant), *allowed_constants])
+        combined_vectors = [
+            _linear_combination(a[: len(vectors_with_constant)], [v for v, _ in vectors_with_constant])
             for a in combinations
-            if any(a[: len(reconstructed)])
+            if any(a[: len(vectors_with_constant)])
         ]
-        return _reduced(chosen, weights)
+        return _reduce_basis(combined_vectors, weights)
 
-    constant_one = with_constant([])
-    time_dependent = [(v, c) for v, c in reconstructed if v[0] == 0 and c != one]
-    return _assembled(
-        polynomials, n, constant_one, [(one, constant_one), (minus_one, with_constant([minus_one]))], time_dependent
+    constant_one = select_vectors([])
+    time_dependent = [(v, c) for v, c in vectors_with_constant if v[0] == 0 and c != one]
+    return _build_products(
+        polynomials, n, constant_one, [(one, constant_one), (minus_one, select_vectors([minus_one]))], time_dependent
     )
 
 
-def _assembled(
+def _build_products(
     polynomials: Sequence[fmpq_mpoly],
     n: int,
     constant_one: Sequence[list[int]],
-    of_densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
+    densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
     time_dependent: Sequence[tuple[list[int], RationalFunction]],
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are the vectors with constant 1; `of_densities` are pairs of a constant, 1 or -1, and vectors of phi.
+    `constant_one` are the vectors with constant 1; `densities` are pairs of a constant, 1 or -1, and vectors of phi.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
     for v in (v for v in constant_one if v[0] == 0):
         # Choose between I and 1/I: positive degree or, for degree 0, positive first exponent.
-        total = sum(k * d for k, d in zip(v, degrees, strict=True))
-        integrals.append(v if (total, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
+        degree = sum(k * d for k, d in zip(v, degrees, strict=True))
+        integrals.append(v if (degree, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
 
-    def product(vector: Sequence[int], constant: RationalFunction) -> Product:
+    def build_product(vector: Sequence[int], constant: RationalFunction) -> Product:
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     def cost(vector: Sequence[int]) -> tuple[int, int, int]:
@@ -409,17 +409,19 @@ def _assembled(
         return denominator, numerator, sum(map(abs, vector))
 
     density = None
-    for constant, vectors in of_densities:
+    for constant, vectors in densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in vectors if abs(v[0]) == 1), None)
         while vector is not None and density is None:  # multiply by integrals while this lowers the cost
-            neighbours = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
-            best = min(neighbours, key=cost, default=vector)
-            if cost(best) >= cost(vector):
-                density = product(vector, constant)
-            vector = best
-    first_density = of_densities[0][0]
+            neighbours = [_linear_combination((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
+            best_neighbour = min(neighbours, key=cost, default=vector)
+            if cost(best_neighbour) >= cost(vector):
+                density = build_product(vector, constant)
+            vector = best_neighbour
+    first_density = densities[0][0]
     return Products(
-        tuple(product(v, first_density) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent)
+        tuple(build_product(v, first_density) for v in integrals),
+        density,
+        tuple(build_product(v, c) for v, c in time_dependent),
     )
 
 
@@ -434,19 +436,19 @@ def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[
         except (NoPoint, BadPrime):
             return None
 
-    is_one = [all(c == 1 for c in column) for column in zip(*map(constants, laboratory.maps), strict=True)]
-    if all(is_one):
-        return [one] * len(is_one)
+    are_one = [all(c == 1 for c in column) for column in zip(*map(constants, laboratory.maps), strict=True)]
+    if all(are_one):
+        return [one] * len(are_one)
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
-    answer = reconstruct_at(laboratory.root, constants_at, names, seed=laboratory.seed)
-    if answer.functions is None:
-        return [one if is_constant_one else None for is_constant_one in is_one]
+    reconstruction = reconstruct_at(laboratory.root, constants_at, names, seed=laboratory.seed)
+    if reconstruction.functions is None:
+        return [one if is_constant_one else None for is_constant_one in are_one]
     gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]
-    quotients = [over_one_denominator([c], context, gens) for c in answer.functions]
+    quotients = [over_one_denominator([c], context, gens) for c in reconstruction.functions]
     return [RationalFunction(numerator, denominator) for [numerator], denominator in quotients]
 
 
-def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
+def _linear_combination(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
     return [sum(w * e for w, e in zip(weights, column, strict=True)) for column in zip(*vectors, strict=True)]
 
 
@@ -461,18 +463,18 @@ def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list
     rows: list[dict[str, int]] = []
     for function in functions:
         row: dict[str, int] = {}
-        for part, sign in ((function.numerator, 1), (function.denominator, -1)):
-            number, factors = part.factor()
+        for polynomial, sign in ((function.numerator, 1), (function.denominator, -1)):
+            scalar, factors = polynomial.factor()
             for factor, k in factors:
                 c, primitive = primitive_part(factor)
-                number = number * c ** int(k)
+                scalar = scalar * c ** int(k)
                 row[str(primitive)] = row.get(str(primitive), 0) + sign * int(k)
-            row["sign"] = row.get("sign", 0) + (number < 0)
-            for integer, s in ((number.p, sign), (number.q, -sign)):
+            row["sign"] = row.get("sign", 0) + (scalar < 0)
+            for integer, s in ((scalar.p, sign), (scalar.q, -sign)):
                 for q, k in abs(integer).factor():
                     row[str(q)] = row.get(str(q), 0) + s * int(k)
         rows.append(row)
     keys = sorted({key for row in rows for key in row} | {"sign"})
     # Signs matter modulo 2 only, by an additional row 2 * sign. The exponent of this row is dropped from the result.
-    table = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
-    return [vector[:-1] for vector in relations(table)]
+    exponent_rows = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
+    return [vector[:-1] for vector in relations(exponent_rows)]

@@ -67,10 +67,10 @@ class Search(PrintableResult):
 def closing_period(maps: Sequence[ModularMap]) -> int | None:
     """Return the common period of random orbits of all maps; None if an orbit does not close within 64 points."""
     try:
-        [*others, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
+        [*other_periods, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
     except NoPoint:
         return None
-    return None if others or period == _CLOSES_WITHIN else period
+    return None if other_periods or period == _CLOSES_WITHIN else period
 
 
 def closing_note(period: int | None, eps: fmpq | None, map_: MapFamily) -> str:
@@ -82,9 +82,9 @@ def closing_note(period: int | None, eps: fmpq | None, map_: MapFamily) -> str:
     """
     if period is None:
         return ""
-    closes = f"orbits close after {period} step{'s' * (period != 1)}"
+    closing_text = f"orbits close after {period} step{'s' * (period != 1)}"
     if not map_.has_eps:
-        return f"{closes}: the map is periodic (measured)"
+        return f"{closing_text}: the map is periodic (measured)"
     if eps is None:
-        return f"{closes} at every eps that was tried: the map is periodic (measured)"
-    return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
+        return f"{closing_text} at every eps that was tried: the map is periodic (measured)"
+    return f"{closing_text}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"

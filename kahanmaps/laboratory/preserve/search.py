@@ -69,22 +69,22 @@ _SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction o
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern, distinguished by the coefficient at `place`, which is `roots[i]` for the space i."""
+    """Spaces of one zero pattern: their coefficients at `position` differ, and that of the space i is `roots[i]`."""
 
-    place: tuple[int, int]
+    position: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
     def in_order(self, spaces: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
         """Return the spaces on a map in the order of the roots; None if two roots are equal there or one is missing."""
         field = GF(map_.prime)
         parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
-        row, column = self.place
+        row, column = self.position
         by_value = {space.basis[row][column]: space for space in spaces}
         values = [root.value(field, parameters[: len(root.names)]) for root in self.roots]
         if len(by_value) < len(spaces) or None in values:
             return None
-        ordered = [by_value.get(int(value)) for value in values]
-        return None if None in ordered else [space for space in ordered if space is not None]
+        ordered_spaces = [by_value.get(int(value)) for value in values]
+        return None if None in ordered_spaces else [space for space in ordered_spaces if space is not None]
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
@@ -114,9 +114,9 @@ def search_spaces(
     """
     result, required = SpaceSearch(), profile.codimension
     is_of_vector_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
-    affine = affine_space(map_)
-    if affine is not None:
-        result.add(SearchStep("affine", 1, None, AFFINE if is_of_vector_field else "affine integral"), [affine])
+    span = affine_space(map_)
+    if span is not None:
+        result.add(SearchStep("affine", 1, None, AFFINE if is_of_vector_field else "affine integral"), [span])
     if is_of_vector_field:  # before cofactors: relations of small span are faster than factors of det(I - eps f')
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     if gradient_rank(map_, result.all_spaces) >= required:
@@ -148,8 +148,8 @@ def add_relation_spaces(
     Only degrees in which the relations of all orbits span at most `max_dimension` dimensions are tried. Returns a
     sentence on the degrees that were skipped because the work limit was reached; empty otherwise.
     """
-    small_nullities = takewhile(lambda size: size < max_dimension, profile.nullities)
-    for degree in [degree for degree, size in enumerate(small_nullities, 1) if size]:
+    small_nullities = takewhile(lambda nullity: nullity < max_dimension, profile.nullities)
+    for degree in [degree for degree, nullity in enumerate(small_nullities, 1) if nullity]:
         known_spaces = result.all_spaces
         independent_count = gradient_rank(map_, known_spaces)
         if independent_count >= profile.codimension:
@@ -181,12 +181,12 @@ def repeat_search(
     """
     repeated = SpaceSearch(cofactors=original.cofactors)
     steps = list(zip(original.steps, original.spaces, strict=True))
-    needed = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
-    sample = Sample.of(map_, original.cofactors, max(needed, default=0))
-    for number, (step, model) in enumerate(steps):
+    point_counts = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
+    sample = Sample.of(map_, original.cofactors, max(point_counts, default=0))
+    for step_index, (step, model) in enumerate(steps):
         if step.kind == "affine":
-            affine = affine_space(map_)
-            spaces = [affine] if affine is not None else []
+            affine_integrals = affine_space(map_)
+            spaces = [affine_integrals] if affine_integrals is not None else []
         elif step.product is not None:
             if step.up_to_numbers:
                 spaces = [space for _, space in cofactor_spaces(sample, step.product, step.degree, model)]
@@ -198,9 +198,9 @@ def repeat_search(
             spaces = darboux_spaces(map_, step.degree, repeated.all_spaces) or []
         # Sort as in the model: by zero pattern and, for equal patterns, by branches. There may be more spaces than in
         # the model, see `may_be_conjugate`.
-        by_pattern, step_branches, ordered = (
+        by_pattern, step_branches, ordered_spaces = (
             group_by_pattern(spaces),
-            branches.get(number, {}),
+            branches.get(step_index, {}),
             dict[Pattern, list[DarbouxSpace]](),
         )
         for pattern, model_spaces in group_by_pattern(model).items():
@@ -208,11 +208,11 @@ def repeat_search(
             if pattern in step_branches:
                 candidates = step_branches[pattern].in_order(candidates, map_) or []
             elif len(candidates) > len(model_spaces):
-                candidates = _most_similar(candidates, model_spaces, map_.prime, reference)
+                candidates = _most_similar_spaces(candidates, model_spaces, map_.prime, reference)
             if len(candidates) < len(model_spaces):
                 return None
-            ordered[pattern] = candidates
-        repeated.add(step, [ordered[space.pattern].pop(0) for space in model])
+            ordered_spaces[pattern] = candidates
+        repeated.add(step, [ordered_spaces[space.pattern].pop(0) for space in model])
     return repeated
 
 
@@ -232,25 +232,25 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
     return any(len(group_by_pattern(group)) < len(group) for group in result.spaces)
 
 
-def _most_similar(
+def _most_similar_spaces(
     spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
     """Return for each model the space that shares most coefficients with it; conjugate spaces share none of them.
 
     Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
-    remaining = list(spaces)
-    chosen = []
+    remaining_spaces = list(spaces)
+    similar_spaces = []
     for model in models:
         counts = []
-        for space in remaining:
+        for space in remaining_spaces:
             rows = zip(space.basis, model.basis, strict=True)
             pairs = [(a, b) for row in rows for a, b in zip(*row, strict=True) if b and b != 1]
             count_work(60 * len(pairs))
             residues = chinese([a for a, _ in pairs], prime, [b for _, b in pairs], reference)
             counts.append(sum(simple_fraction(c, prime * reference, _SPARE_BITS) is not None for c in residues))
-        chosen.append(remaining.pop(counts.index(max(counts))))
-    return chosen
+        similar_spaces.append(remaining_spaces.pop(counts.index(max(counts))))
+    return similar_spaces
 
 
 def interpolate_bases(
@@ -272,23 +272,23 @@ def interpolate_bases(
             return None
 
     branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, if several spaces have this pattern
-    for number, group in enumerate(result.spaces):
+    for step_index, group in enumerate(result.spaces):
         for pattern, model in group_by_pattern(group).items():
             if len(model) == 1:
                 continue
 
             def spaces_at(
-                prime: int, values: tuple[int, ...], number: int = number, pattern: Pattern = pattern
+                prime: int, values: tuple[int, ...], step_index: int = step_index, pattern: Pattern = pattern
             ) -> list[DarbouxSpace] | None:
-                other = repeat_at(prime, values)
-                return None if other is None else group_by_pattern(other.spaces[number])[pattern]
+                repetition = repeat_at(prime, values)
+                return None if repetition is None else group_by_pattern(repetition.spaces[step_index])[pattern]
 
-            distinguished = find_branches(model, spaces_at, names, laboratory.seed, budget, laboratory.root)
-            if distinguished is None:
-                cause = f"no rational coefficient distinguishes {len(model)} spaces of degree {model[0].degree}"
-                cause = SPENT if budget.is_spent else cause
-                return [], f"integrals were found modulo primes, but no closed form: {cause}"
-            branches.setdefault(number, {})[pattern] = distinguished
+            found_branches = find_branches(model, spaces_at, names, laboratory.seed, budget, laboratory.root)
+            if found_branches is None:
+                reason = f"no rational coefficient distinguishes {len(model)} spaces of degree {model[0].degree}"
+                reason = SPENT if budget.is_spent else reason
+                return [], f"integrals were found modulo primes, but no closed form: {reason}"
+            branches.setdefault(step_index, {})[pattern] = found_branches
 
     def repeated_spaces(map_: ModularMap) -> list[DarbouxSpace] | None:
         repetition = repeat_search(result, map_, reference, branches)
@@ -313,7 +313,7 @@ def find_branches(
     `model` holds the spaces on one map; `spaces_at(prime, values)` returns the spaces on another map in any order, or
     None at special values. Returns None if the spaces are conjugate over an extension of Q, or if the budget is spent.
     """
-    distinguishing_places = [
+    distinguishing_positions = [
         (i, k)
         for i, vector in enumerate(model[0].basis)
         for k in range(len(vector))
@@ -322,32 +322,32 @@ def find_branches(
     count, context = len(model), ring((*names, "T"))
     *gens, T = context.gens()
     at_zero = {"T": fmpq(0)}
-    for samples, place in cartesian(_SAMPLES, distinguishing_places[:_COEFFICIENTS]):
+    for samples, position in cartesian(_SAMPLES, distinguishing_positions[:_COEFFICIENTS]):
         if budget.is_spent:
             return None
 
         def symmetric_functions(
-            prime: int, values: tuple[int, ...], place: tuple[int, int] = place
+            prime: int, values: tuple[int, ...], position: tuple[int, int] = position
         ) -> list[int] | None:
             spaces = spaces_at(prime, values)
             if spaces is None or len(spaces) != count:
                 return None
             coefficients = [1]  # of prod (T - w), in descending order
             for space in spaces:
-                w = space.basis[place[0]][place[1]]
-                shifted = zip([*coefficients, 0], [0, *coefficients], strict=True)
-                coefficients = [(coefficient - w * previous) % prime for coefficient, previous in shifted]
+                w = space.basis[position[0]][position[1]]
+                pairs = zip([*coefficients, 0], [0, *coefficients], strict=True)
+                coefficients = [(coefficient - w * previous) % prime for coefficient, previous in pairs]
             return coefficients[1:]
 
-        answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, budget=budget)
-        if answer.functions is None:
+        reconstruction = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, budget=budget)
+        if reconstruction.functions is None:
             continue
-        numerators, denominator = over_one_denominator(answer.functions, context, gens)
+        numerators, denominator = over_one_denominator(reconstruction.functions, context, gens)
         chi = sum((P * T ** (count - k) for k, P in enumerate(numerators, 1)), denominator * T**count)
-        linear = [factor for factor, _ in irreducible_factors(chi) if factor.degrees()[-1] == 1]
+        linear_factors = [factor for factor, _ in irreducible_factors(chi) if factor.degrees()[-1] == 1]
         roots = tuple(
             RationalFunction(-substitute(factor, at_zero), substitute(factor.derivative(len(gens)), at_zero))
-            for factor in linear
+            for factor in linear_factors
         )
-        return Branches(place, roots) if len(roots) == count else None
+        return Branches(position, roots) if len(roots) == count else None
     return None

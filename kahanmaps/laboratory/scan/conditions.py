@@ -31,64 +31,68 @@ def conditions(
     lower dimension, from the points outside these hypersurfaces. `check` is called repeatedly, and may raise.
     """
     components: list[Component] = []
-    count = len(names)
+    parameter_count = len(names)
 
-    def modular_components(on_lines: bool) -> list[ModularComponents]:
-        modular = []
+    def find_reductions(on_lines: bool) -> list[ModularComponents]:
+        reductions = []
         for sweep in sweeps:
             if sweep.on_lines is on_lines and degrees in sweep.classes:
                 unassigned = points_outside(sweep.classes[degrees], components, sweep.prime)
-                min_dimension = 0 if sweep.complete else count - sweep.width
+                min_dimension = 0 if sweep.complete else parameter_count - sweep.width
                 if unassigned:
-                    modular.append(find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check))
-        if count > 1:  # the constant is last in rows of hyperplanes, but first in other forms
+                    reductions.append(
+                        find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check)
+                    )
+        if parameter_count > 1:  # the constant is last in rows of hyperplanes, but first in other forms
             hypersurfaces = {
-                at_prime.prime: [
-                    *((row[-1], *row[:-1]) for (row,) in at_prime.linear.get(count - 1, [])),
-                    *at_prime.hypersurfaces.get((), []),
+                reduction.prime: [
+                    *((row[-1], *row[:-1]) for (row,) in reduction.linear.get(parameter_count - 1, [])),
+                    *reduction.hypersurfaces.get((), []),
                 ]
-                for at_prime in modular
+                for reduction in reductions
             }
             components.extend(
-                Component((form,), count - 1, degrees, primes)
+                Component((form,), parameter_count - 1, degrees, primes)
                 for form, primes in lift_hypersurfaces(hypersurfaces, names)
             )
-        return modular
+        return reductions
 
-    modular_components(on_lines=True)
-    modular = modular_components(on_lines=False)
-    for dimension in range(max(1, count - 1)):
-        linear = {at_prime.prime: at_prime.linear[dimension] for at_prime in modular if at_prime.linear.get(dimension)}
-        if dimension == 0 and len(linear) > 1:
-            low, high = min(linear), max(linear)
-            few, many = len(linear[low]), len(linear[high])
+    find_reductions(on_lines=True)
+    reductions = find_reductions(on_lines=False)
+    for dimension in range(max(1, parameter_count - 1)):
+        subspaces = {
+            reduction.prime: reduction.linear[dimension] for reduction in reductions if reduction.linear.get(dimension)
+        }
+        if dimension == 0 and len(subspaces) > 1:
+            low_prime, high_prime = min(subspaces), max(subspaces)
+            low_count, high_count = len(subspaces[low_prime]), len(subspaces[high_prime])
             # The number of points grows like the prime: they lie on a curve that was not found, and are not isolated.
-            if few >= _SHARE * low and many - few >= _SHARE * (high - low):
+            if low_count >= _SHARE * low_prime and high_count - low_count >= _SHARE * (high_prime - low_prime):
                 continue
-        lifted = lift_linear(linear)
+        lifts = lift_linear(subspaces)
         components += [
-            Component(linear_equations(rows, names), dimension, degrees, primes) for rows, primes in lifted.items()
+            Component(linear_equations(rows, names), dimension, degrees, primes) for rows, primes in lifts.items()
         ]
         if dimension == 0:
-            points = {p: [tuple(-row[-1] % p for row in rows) for rows in at_p] for p, at_p in linear.items()}
-            unassigned = {p: points_outside(at_p, components, p) for p, at_p in points.items()}
+            points = {p: [tuple(-row[-1] % p for row in rows) for rows in items] for p, items in subspaces.items()}
+            unassigned = {p: points_outside(items, components, p) for p, items in points.items()}
             unassigned.update((sweep.prime, []) for sweep in sweeps if sweep.complete and sweep.prime not in unassigned)
-            conjugate = lift_conjugate_points(unassigned, names, rng, check)
-            components += [Component(equations, 0, degrees, primes) for equations, primes in conjugate]
-    for size in {len(rows) for at_prime in modular for rows in at_prime.hypersurfaces if rows}:
-        inside = {
-            at_prime.prime: [rows for rows in at_prime.hypersurfaces if len(rows) == size] for at_prime in modular
+            conjugate_points = lift_conjugate_points(unassigned, names, rng, check)
+            components += [Component(equations, 0, degrees, primes) for equations, primes in conjugate_points]
+    for size in {len(rows) for reduction in reductions for rows in reduction.hypersurfaces if rows}:
+        carriers = {
+            reduction.prime: [rows for rows in reduction.hypersurfaces if len(rows) == size] for reduction in reductions
         }
-        for rows in lift_linear(inside):
+        for rows in lift_linear(carriers):
             hypersurfaces = {
-                at_prime.prime: at_prime.hypersurfaces.get(residues(rows, at_prime.prime) or (), [])
-                for at_prime in modular
+                reduction.prime: reduction.hypersurfaces.get(residues(rows, reduction.prime) or (), [])
+                for reduction in reductions
             }
             equations = linear_equations(rows, names)
-            free = [name for k, name in enumerate(names) if k not in pivots(rows)]
-            for form, primes in lift_hypersurfaces(hypersurfaces, free):
+            free_names = [name for k, name in enumerate(names) if k not in pivots(rows)]
+            for form, primes in lift_hypersurfaces(hypersurfaces, free_names):
                 polynomial = form.project_to_context(ring(names))
-                components.append(Component((polynomial, *equations), len(free) - 1, degrees, primes))
+                components.append(Component((polynomial, *equations), len(free_names) - 1, degrees, primes))
     return components
 
 
@@ -96,19 +100,19 @@ def points_outside(points: Sequence[Point], components: Iterable[Component], pri
     """Return the points modulo a prime that lie on none of the components."""
     import numpy as np
 
-    outside = np.array(points, dtype=np.int64)
+    outside_points = np.array(points, dtype=np.int64)
     for component in components:
         terms = sum(map(len, component.equations))
-        count_work(10 * terms * (1 + len(outside) / 200))
-        is_on = np.ones(len(outside), dtype=bool)
+        count_work(10 * terms * (1 + len(outside_points) / 200))
+        is_on = np.ones(len(outside_points), dtype=bool)
         for equation in component.equations:
-            total = np.zeros(len(outside), dtype=np.int64)
+            total = np.zeros(len(outside_points), dtype=np.int64)
             for exponents, coefficient in equation.terms():
-                term = np.full(len(outside), int(coefficient.p) % prime)
+                term = np.full(len(outside_points), int(coefficient.p) % prime)
                 for k, exponent in enumerate(exponents):
                     for _ in range(int(exponent)):
-                        term = term * outside[:, k] % prime
+                        term = term * outside_points[:, k] % prime
                 total += term
             is_on &= total % prime == 0
-        outside = outside[~is_on]
-    return [tuple(x) for x in outside.tolist()]
+        outside_points = outside_points[~is_on]
+    return [tuple(x) for x in outside_points.tolist()]

@@ -58,27 +58,27 @@ def lift_linear(
     >>> lift_linear(modulo)
     {((1, 0, -1/2), (0, 1, -3)): (31, 37, 41)}
     """
-    sets = {p: set(rows) for p, rows in subspaces.items()}
-    lifted: dict[RationalRows, tuple[int, ...]] = {}
-    sizes = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
-    pairs = 0
+    subspace_sets = {p: set(rows) for p, rows in subspaces.items()}
+    lifted_subspaces: dict[RationalRows, tuple[int, ...]] = {}
+    pair_counts = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
+    pair_count = 0
     # Pairs of primes with the fewest pairs of subspaces first: the first pair that has a subspace over Q gives it.
-    for p, q in sorted(sizes, key=sizes.__getitem__):
-        pairs += sizes[p, q]
-        if pairs > _MAX_PAIRS:
+    for p, q in sorted(pair_counts, key=pair_counts.__getitem__):
+        pair_count += pair_counts[p, q]
+        if pair_count > _MAX_PAIRS:
             break
-        count_work(15 * sizes[p, q])
-        for at_p, at_q in product(subspaces[p], subspaces[q]):
-            rows = _lift_rows(at_p, p, at_q, q)
-            if rows is None or rows in lifted:
+        count_work(15 * pair_counts[p, q])
+        for rows_p, rows_q in product(subspaces[p], subspaces[q]):
+            rows = _lift_rows(rows_p, p, rows_q, q)
+            if rows is None or rows in lifted_subspaces:
                 continue
-            count_work(15 * len(sets))
-            primes = tuple(r for r in sorted(sets) if residues(rows, r) in sets[r])
+            count_work(15 * len(subspace_sets))
+            primes = tuple(r for r in sorted(subspace_sets) if residues(rows, r) in subspace_sets[r])
             height = max((max(abs(int(x.p)), int(x.q)) for row in rows for x in row), default=0)
-            missing = sum(r not in primes and residues(rows, r) is not None for r in sets)
-            if len(primes) >= _MIN_PRIMES and (not everywhere or missing <= (height <= _LOW_HEIGHT)):
-                lifted[rows] = primes
-    return lifted
+            missing_count = sum(r not in primes and residues(rows, r) is not None for r in subspace_sets)
+            if len(primes) >= _MIN_PRIMES and (not everywhere or missing_count <= (height <= _LOW_HEIGHT)):
+                lifted_subspaces[rows] = primes
+    return lifted_subspaces
 
 
 def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
@@ -89,13 +89,13 @@ def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpo
     """
     context = ring(names)
     variables = [*context.gens(), context.constant(1)]
-    sums = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
-    return tuple(primitive_part(equation)[1] for equation in sums)
+    equations = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
+    return tuple(primitive_part(equation)[1] for equation in equations)
 
 
-def _lift_rows(at_p: Rows, p: int, at_q: Rows, q: int) -> RationalRows | None:
+def _lift_rows(rows_p: Rows, p: int, rows_q: Rows, q: int) -> RationalRows | None:
     rows = []
-    for a, b in zip(at_p, at_q, strict=True):
+    for a, b in zip(rows_p, rows_q, strict=True):
         row = [value for entry in chinese(a, p, b, q) if (value := rational_reconstruction(entry, p * q)) is not None]
         if len(row) < len(a):
             return None
@@ -126,25 +126,25 @@ def lift_hypersurfaces(
     >>> lift_hypersurfaces(lines, ["a", "b"])
     [(a^2 - 2*b^2, (7, 17, 23))]
     """
-    lifted: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
-    remaining = {p: [tuple(form) for form in forms] for p, forms in hypersurfaces.items()}
+    lifted_hypersurfaces: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
+    pool = {p: [tuple(form) for form in forms] for p, forms in hypersurfaces.items()}
     for group_size in (1, 2):
         products_by_length: dict[int, dict[int, dict[Rows, tuple[tuple[int, ...], ...]]]] = {}
-        for p, forms in remaining.items():
+        for p, forms in pool.items():
             if group_size > 1 and len(forms) > _MAX_CONJUGATES:
                 continue
             for group in combinations(forms, group_size):
                 row = tuple(_multiply(group, p, len(names)))
                 products_by_length.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
-        used: dict[int, set[tuple[int, ...]]] = {p: set() for p in remaining}
+        used_forms: dict[int, set[tuple[int, ...]]] = {p: set() for p in pool}
         for by_prime in products_by_length.values():
             for rows, primes in lift_linear({p: list(groups) for p, groups in by_prime.items()}, False).items():
-                lifted += [(factor, primes) for factor in _factor(rows[0], names)]
+                lifted_hypersurfaces += [(factor, primes) for factor in _factor(rows[0], names)]
                 for p in primes:
-                    used[p].update(by_prime[p][residues(rows, p) or ()])
-        remaining = {p: [form for form in forms if form not in used[p]] for p, forms in remaining.items()}
-    factors, primes = _lift_product(remaining, names)
-    return lifted + [(factor, primes) for factor in factors]
+                    used_forms[p].update(by_prime[p][residues(rows, p) or ()])
+        pool = {p: [form for form in forms if form not in used_forms[p]] for p, forms in pool.items()}
+    factors, primes = _lift_product(pool, names)
+    return lifted_hypersurfaces + [(factor, primes) for factor in factors]
 
 
 def _lift_product(
@@ -154,16 +154,16 @@ def _lift_product(
     products = {p: _multiply(forms, p, len(names)) for p, forms in hypersurfaces.items() if forms}
     if not products:
         return [], ()
-    size = Counter(map(len, products.values())).most_common(1)[0][0]
-    products = {p: form for p, form in products.items() if len(form) == size}
-    pivots = {next(k for k, c in enumerate(form) if c) for form in products.values()}
-    if len(products) < _MIN_PRIMES or len(pivots) > 1:
+    length = Counter(map(len, products.values())).most_common(1)[0][0]
+    products = {p: form for p, form in products.items() if len(form) == length}
+    pivot_indices = {next(k for k, c in enumerate(form) if c) for form in products.values()}
+    if len(products) < _MIN_PRIMES or len(pivot_indices) > 1:
         return [], ()
     *primes, last_prime = sorted(products)
-    combined, modulus = products[primes[0]], primes[0]
+    combined_form, modulus = products[primes[0]], primes[0]
     for p in primes[1:]:
-        combined, modulus = chinese(combined, modulus, products[p], p), modulus * p
-    values = rational_vector(combined, modulus)
+        combined_form, modulus = chinese(combined_form, modulus, products[p], p), modulus * p
+    values = rational_vector(combined_form, modulus)
     if values is None or residues([values], last_prime) != (tuple(products[last_prime]),):
         return [], ()
     return _factor(values, names), (*primes, last_prime)
@@ -176,15 +176,15 @@ def _factor(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
     return [primitive_part(factor)[1] for factor, _ in ring(names).from_dict(terms).factor()[1]]
 
 
-def _multiply(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int]:
+def _multiply(forms: Sequence[Sequence[int]], p: int, variable_count: int) -> list[int]:
     """Return the coefficients of the product of polynomials, scaled so that the first nonzero one is 1."""
 
     def degree_of(form: Sequence[int]) -> int:
-        return next(d for d in range(100) if len(exponents_up_to(variables, d)) == len(form))
+        return next(d for d in range(100) if len(exponents_up_to(variable_count, d)) == len(form))
 
     degree = sum(map(degree_of, forms))
-    count_work(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, degree))) * len(forms))
-    row = reduce(lambda a, b: product_of(a, b, variables, degree, p) or [], forms, [1])
+    count_work(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variable_count, degree))) * len(forms))
+    row = reduce(lambda a, b: product_of(a, b, variable_count, degree, p) or [], forms, [1])
     scale = pow(next(c for c in row if c), -1, p)
     return [c * scale % p for c in row]
 
@@ -204,31 +204,42 @@ def lift_conjugate_points(
     >>> equations
     (a^3 - 2, a^2 - b)
     """
-    point_sets = {p: {tuple(x) for x in at_p} for p, at_p in points.items()}
-    remaining = {p: set(at_p) for p, at_p in point_sets.items() if len(at_p) <= _MAX_POINTS}
-    lifted = []
-    failures = 0
-    while failures < _MAX_FAILURES and sum(map(bool, remaining.values())) >= _MIN_PRIMES:
+    point_sets = {p: {tuple(x) for x in points_p} for p, points_p in points.items()}
+    remaining_points = {p: set(points_p) for p, points_p in point_sets.items() if len(points_p) <= _MAX_POINTS}
+    lifted_points = []
+    failure_count = 0
+    while failure_count < _MAX_FAILURES and sum(map(bool, remaining_points.values())) >= _MIN_PRIMES:
         check()
-        failures += 1
-        candidates = [p for p in remaining if remaining[p]]
+        failure_count += 1
+        candidate_primes = [p for p in remaining_points if remaining_points[p]]
         # Combine one random point modulo each of a few primes until small relations appear.
         values: Sequence[int] = [0] * len(names)
         modulus, equations = 1, None
-        for p in rng.sample(candidates, min(len(candidates), _MAX_PRIMES)):
-            values, modulus = chinese(values, modulus, rng.choice(sorted(remaining[p])), p), modulus * p
+        for p in rng.sample(candidate_primes, min(len(candidate_primes), _MAX_PRIMES)):
+            values, modulus = chinese(values, modulus, rng.choice(sorted(remaining_points[p])), p), modulus * p
             if (equations := _search_equations(values, modulus, names)) is not None:
                 break
         # If the points are not conjugate, the relation of the first coordinate is reducible.
         if equations is None or len(equations[0].factor()[1]) > 1:
             continue
-        solution_sets = {p: _solve_modulo(equations, p) for p in point_sets}
+        size = len(names)
+        leading_coefficients = [
+            equation[tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))]
+            for k, equation in enumerate(equations)
+        ]
+        # Modulo a prime that divides a leading coefficient no solutions are counted: some of them are at infinity.
+        solution_sets = {
+            p: set[tuple[int, ...]]()
+            if any(int(c.p) % p == 0 for c in leading_coefficients)
+            else {tuple(map(int, x)) for x in solutions(equations, range(size), [0] * size, GF(p))}
+            for p in point_sets
+        }
         primes = tuple(p for p in sorted(solution_sets) if solution_sets[p] and solution_sets[p] <= point_sets[p])
         if len(primes) >= _MIN_PRIMES and sum(map(bool, solution_sets.values())) <= len(primes) + 1:
-            lifted.append((equations, primes))
-            remaining = {p: at_p - solution_sets[p] for p, at_p in remaining.items()}
-            failures = 0
-    return lifted
+            lifted_points.append((equations, primes))
+            remaining_points = {p: points_p - solution_sets[p] for p, points_p in remaining_points.items()}
+            failure_count = 0
+    return lifted_points
 
 
 def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
@@ -237,40 +248,30 @@ def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str])
     basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products with residues
     equations = []
     for x, value in zip(context.gens(), values, strict=True):
-        lower, (power, residue) = list(basis), (x, value)
-        spare = SPARE_BITS // len(names)
-        while (relation := _search_relation([r for _, r in lower] + [residue], modulus, spare)) is None:
-            lower += [(a * power, r * residue % modulus) for a, r in basis]
+        lower_monomials, (power, residue) = list(basis), (x, value)
+        spare_bits = SPARE_BITS // len(names)
+        while (relation := _search_relation([r for _, r in lower_monomials] + [residue], modulus, spare_bits)) is None:
+            lower_monomials += [(a * power, r * residue % modulus) for a, r in basis]
             power, residue = power * x, residue * value % modulus
-            if len(lower) > MAX_FIELD_DEGREE:
+            if len(lower_monomials) > MAX_FIELD_DEGREE:
                 return None
-        products = [*(a for a, _ in lower), power]
-        equations.append(primitive_part(sum((c * a for c, a in zip(relation, products, strict=True)), 0 * x))[1])
-        basis = lower
+        monomials = [*(a for a, _ in lower_monomials), power]
+        equations.append(primitive_part(sum((c * a for c, a in zip(relation, monomials, strict=True)), 0 * x))[1])
+        basis = lower_monomials
     return tuple(equations)
 
 
-def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | None:
+def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits: int) -> list[int] | None:
     """Return small integers c_i with sum c_i r_i = 0 modulo `modulus`, the last one not 0; None if there are none.
 
-    The first residue must be 1. Small means `spare` bits smaller than expected for random residues r_i.
+    The first residue must be 1. Small means `spare_bits` bits smaller than expected for random residues r_i.
     """
-    size = len(residues)
+    size = len(monomial_residues)
     rows = [[modulus, *[0] * (size - 1)]]
-    rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(residues[1:], 1)]
+    rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(monomial_residues[1:], 1)]
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
-    shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
-    height = max(abs(int(c)) for c in shortest)
+    shortest_row = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
+    height = max(abs(int(c)) for c in shortest_row)
     # Any residues have a relation of a height with (2 height + 1)^size about the modulus; it must be much smaller.
-    is_small = (2 * height + 1) ** size << spare <= modulus
-    return [int(c) for c in shortest] if is_small and shortest[-1] else None
-
-
-def _solve_modulo(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
-    """Return the solutions modulo a prime; no solutions if the prime divides a leading coefficient."""
-    size = len(equations)
-    for k, equation in enumerate(equations):
-        leading = tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))
-        if int(equation[leading].p) % p == 0:
-            return set()
-    return {tuple(map(int, x)) for x in solutions(equations, range(size), [0] * size, GF(p))}
+    is_small = (2 * height + 1) ** size << spare_bits <= modulus
+    return [int(c) for c in shortest_row] if is_small and shortest_row[-1] else None

@@ -78,7 +78,7 @@ def solutions(
 
 
 @dataclass(frozen=True)
-class Scanned:
+class ScannedFamily:
     """A scanned family: the file and its map with the parameters `names` as symbols; the last name may be eps.
 
     `eps` is an exact number, or None for generic eps.

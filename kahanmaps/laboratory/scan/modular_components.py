@@ -66,78 +66,87 @@ def find_components(
     """
     import numpy as np
 
-    count = len(points[0])
+    dim = len(points[0])
     components = ModularComponents(prime)
     unassigned = np.array(points, dtype=np.int64)
 
-    def affine_subspaces(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
-        """Yield affine subspaces with at least `needed` of the points, each with a mask of the points in it."""
-        for _ in range(_TRIES if count <= 3 else _TRIES_MANY_PARAMETERS):
+    def affine_subspaces(dimension: int, min_count: float) -> Iterator[tuple[Rows, Any]]:
+        """Yield affine subspaces with at least `min_count` of the points, each with a mask of the points in it."""
+        for _ in range(_TRIES if dim <= 3 else _TRIES_MANY_PARAMETERS):
             check()
-            if len(unassigned) < needed:
+            if len(unassigned) < min_count:
                 return
-            count_work(10 + len(unassigned) * (count - dimension) / 100)
+            count_work(10 + len(unassigned) * (dim - dimension) / 100)
             sample = [[*unassigned[i].tolist(), 1] for i in rng.sample(range(len(unassigned)), dimension + 1)]
-            rows = null_space(sample, count + 1, prime)
-            if len(rows) == count - dimension:
+            rows = null_space(sample, dim + 1, prime)
+            if len(rows) == dim - dimension:
                 ones = np.ones((len(unassigned), 1), dtype=np.int64)
                 is_inside = ~(np.hstack([unassigned, ones]) @ np.array(rows).T % prime).any(axis=1)
-                if is_inside.sum() >= needed:
+                if is_inside.sum() >= min_count:
                     yield tuple(map(tuple, rows)), is_inside
 
-    for dimension in range(count - 1, max(min_dimension, 1) - 1, -1):
+    for dimension in range(dim - 1, max(min_dimension, 1) - 1, -1):
         # Affine subspaces first, then hypersurfaces of affine subspaces of one dimension more. The largest dimension
         # comes first, so that the points of a hyperplane do not appear as many smaller components.
-        needed = max(_SHARE * measured / prime ** (count - dimension), dimension + 3)
-        for rows, inside in affine_subspaces(dimension, needed):
+        min_count = max(_SHARE * measured / prime ** (dim - dimension), dimension + 3)
+        for rows, mask in affine_subspaces(dimension, min_count):
             components.linear.setdefault(dimension, []).append(rows)
-            unassigned = unassigned[~inside]
-        if dimension == count - 1:
-            for form, inside in _hypersurfaces(unassigned, needed, prime, rng, check):
+            unassigned = unassigned[~mask]
+        if dimension == dim - 1:
+            for form, mask in _find_hypersurfaces(unassigned, min_count, prime, rng, check):
                 components.hypersurfaces.setdefault((), []).append(form)
-                unassigned = unassigned[~inside]
+                unassigned = unassigned[~mask]
             continue
-        for rows, inside in affine_subspaces(dimension + 1, needed):
-            free = [k for k in range(count) if k not in pivots(rows)]
-            indices, is_unassigned = np.flatnonzero(inside), np.ones(len(unassigned), dtype=bool)
-            for form, on_form in _hypersurfaces(unassigned[inside][:, free], needed, prime, rng, check):
+        for rows, mask in affine_subspaces(dimension + 1, min_count):
+            free_indices = [k for k in range(dim) if k not in pivots(rows)]
+            indices, is_unassigned = np.flatnonzero(mask), np.ones(len(unassigned), dtype=bool)
+            for form, form_mask in _find_hypersurfaces(unassigned[mask][:, free_indices], min_count, prime, rng, check):
                 components.hypersurfaces.setdefault(rows, []).append(form)
-                is_unassigned[indices[on_form]] = False
-                indices = indices[~on_form]
+                is_unassigned[indices[form_mask]] = False
+                indices = indices[~form_mask]
             unassigned = unassigned[is_unassigned]
     if not min_dimension and len(unassigned) <= _MAX_SINGLE_POINTS:
-        equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in unassigned.tolist())
-        single = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
-        components.linear.setdefault(0, []).extend(single)
+        equations = ([[*(int(i == j) for j in range(dim)), -y] for i, y in enumerate(x)] for x in unassigned.tolist())
+        single_points = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
+        components.linear.setdefault(0, []).extend(single_points)
     return components
 
 
-def _hypersurfaces(
-    points: Any, needed: float, prime: int, rng: random.Random, check: Callable[[], None]
+def _find_hypersurfaces(
+    points: Any, min_count: float, prime: int, rng: random.Random, check: Callable[[], None]
 ) -> Iterator[tuple[Form, Any]]:
-    """Yield irreducible hypersurfaces with at least `needed` of the points, each with a mask of the points on it.
+    """Yield irreducible hypersurfaces with at least `min_count` of the points, each with a mask of the points on it.
 
     The first attempt interpolates more points than there are coefficients, and gives the product of all hypersurfaces.
     Further attempts interpolate as many points as determine one hypersurface, if all of them happen to lie on it.
     """
+    dim = points.shape[1]
+    context = nmod_mpoly_ctx.get([f"a{k}" for k in range(dim)], modulus=prime, ordering=Ordering.degrevlex)
     for degree in range(2, _MAX_PRODUCT_DEGREE + 1):
-        size = len(exponents_up_to(points.shape[1], degree))
-        sample_size = int(_SPARE * size) + 2
-        table = _monomials(points, degree, prime)
+        coefficient_count = len(exponents_up_to(dim, degree))
+        sample_size = int(_SPARE * coefficient_count) + 2
+        table = _evaluate_monomials(points, degree, prime)
         for attempt in range(_TRIES if degree == 2 else _TRIES_HIGH_DEGREE if degree <= MAX_DEGREE else 1):
             check()
-            if len(points) < max(sample_size, needed):
+            if len(points) < max(sample_size, min_count):
                 break
-            count_work(size * len(points) / 500)
-            chosen = rng.sample(range(len(points)), size - 1 if attempt else sample_size)
-            basis = null_space(table[chosen].tolist(), size, prime)
-            if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(sample_size, needed):
+            count_work(coefficient_count * len(points) / 500)
+            sample = rng.sample(range(len(points)), coefficient_count - 1 if attempt else sample_size)
+            basis = null_space(table[sample].tolist(), coefficient_count, prime)
+            if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(sample_size, min_count):
                 continue
-            for factor, factor_degree in _factors(basis[0], degree, points.shape[1], prime):
-                inside = _monomials(points, factor_degree, prime) @ factor % prime == 0
-                if inside.sum() >= needed:
-                    yield factor, inside
-                    points, table = points[~inside], table[~inside]
+            terms = {e: c for e, c in zip(exponents_up_to(dim, degree), basis[0], strict=True) if c}
+            count_work(50 + 5 * len(terms))
+            for factor, _ in context.from_dict(terms).factor()[1]:
+                coefficients = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
+                factor_degree = max(map(sum, coefficients))
+                row = [coefficients.get(e, 0) for e in exponents_up_to(dim, factor_degree)]
+                scale = pow(next(c for c in row if c), -1, prime)  # makes the first nonzero coefficient 1
+                form = tuple(c * scale % prime for c in row)
+                is_inside = _evaluate_monomials(points, factor_degree, prime) @ form % prime == 0
+                if is_inside.sum() >= min_count:
+                    yield form, is_inside
+                    points, table = points[~is_inside], table[~is_inside]
 
 
 def degree_reached(points: float, count: int) -> int:
@@ -146,11 +155,11 @@ def degree_reached(points: float, count: int) -> int:
     >>> degree_reached(53, 2), degree_reached(11, 2)
     (6, 2)
     """
-    sizes = (len(exponents_up_to(count, degree)) for degree in range(1, MAX_DEGREE + 1))
-    return sum(_SPARE * size + 2 <= points for size in sizes)
+    coefficient_counts = (len(exponents_up_to(count, degree)) for degree in range(1, MAX_DEGREE + 1))
+    return sum(_SPARE * coefficient_count + 2 <= points for coefficient_count in coefficient_counts)
 
 
-def _monomials(points: Any, degree: int, prime: int) -> Any:
+def _evaluate_monomials(points: Any, degree: int, prime: int) -> Any:
     """Return the values of all monomials up to a degree, one row for each point."""
     import numpy as np
 
@@ -161,18 +170,3 @@ def _monomials(points: Any, degree: int, prime: int) -> Any:
         variable, _, index = divisors_of_monomial[-1]
         table[:, k] = table[:, index] * points[:, variable] % prime
     return table
-
-
-def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[tuple[Form, int]]:
-    """Return the irreducible factors of a polynomial, scaled to first nonzero coefficient 1, and their degrees."""
-    context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
-    terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
-    factors = []
-    count_work(50 + 5 * len(terms))
-    for factor, _ in context.from_dict(terms).factor()[1]:
-        values = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
-        power = max(map(sum, values))
-        row = [values.get(e, 0) for e in exponents_up_to(count, power)]
-        scale = pow(next(c for c in row if c), -1, prime)
-        factors.append((tuple(c * scale % prime for c in row), power))
-    return factors

@@ -38,20 +38,20 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
     [('b', 'a'), ('a', '-b')]
     """
-    complete = [(sweep.prime, sweep.special) for sweep in sweeps if sweep.complete]
-    if not complete or not components:
+    special_members = [(sweep.prime, sweep.special) for sweep in sweeps if sweep.complete]
+    if not special_members or not components:
         return []
     generators: list[Change] = []
     group = _generate_group(generators, len(names))
     for change in _candidate_changes(len(names), components):
-        if change in group or not all(_permutes_members(change, p, special) for p, special in complete):
+        if change in group or not all(_permutes_members(change, p, special) for p, special in special_members):
             continue
         if _is_reportable(change, components, names):
             generators.append(change)
             group = _generate_group(generators, len(names))
     texts = []
     for change in generators:  # a denominator is a constant or a multiple of one parameter
-        *numerators, denominator = map(format_polynomial, _images(change, names))
+        *numerators, denominator = map(format_polynomial, _images_of_parameters(change, names))
         if denominator == "1":
             texts.append(tuple(numerators))
         else:
@@ -75,8 +75,8 @@ def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[
     """Yield the changes to be tried; their shifts and factors map a rational point component to another one."""
     signed_permutations = [
         tuple(
-            tuple(fmpq(sign * (k == position)) for k in range(count + 1))
-            for position, sign in zip(permutation, (*signs, 1), strict=True)
+            tuple(fmpq(sign * (k == index)) for k in range(count + 1))
+            for index, sign in zip(permutation, (*signs, 1), strict=True)
         )
         for signs in sorted(product((1, -1), repeat=count), key=lambda signs: signs.count(-1))
         for permutation in permutations(range(count + 1))
@@ -86,7 +86,7 @@ def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[
     rational_components = [component for component in components if component.is_rational_point][:_MAX_POINTS]
     points = [(*(component.values or {}).values(), fmpq(1)) for component in rational_components]
     for change, point in product(affine_changes, points):
-        image = _times(change, points[0])
+        image = _apply_change(change, points[0])
         yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, image, point, strict=True))
         if all(image) and all(point):
             yield tuple(tuple(y / x * c for c in row) for row, x, y in zip(change, image, point, strict=True))
@@ -94,11 +94,11 @@ def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[
         yield from signed_permutations
 
 
-def _times(change: Change, vector: Sequence[fmpq]) -> Row:
+def _apply_change(change: Change, vector: Sequence[fmpq]) -> Row:
     return tuple(sum((c * x for c, x in zip(row, vector, strict=True)), fmpq(0)) for row in change)
 
 
-def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
+def _images_of_parameters(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
     """Return the numerators of the images of the parameters, and as the last entry their common denominator."""
     context = ring(names)
     vector = [*context.gens(), context.constant(1)]
@@ -107,7 +107,7 @@ def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
 
 def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
     """Return whether a change preserves hypersurfaces with degrees, and some component moves or is not affine."""
-    *images, denominator = _images(change, names)
+    *images, denominator = _images_of_parameters(change, names)
 
     def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:
         """Return the equation of the preimage of a component; a constant if it has only points at infinity."""
@@ -136,12 +136,12 @@ def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
     """Return the group that changes generate; it is finite, because it permutes points."""
 
     def compose(first: Change, second: Change) -> Change:
-        rows = tuple(zip(*(_times(second, column) for column in zip(*first, strict=True)), strict=True))
+        rows = tuple(zip(*(_apply_change(second, column) for column in zip(*first, strict=True)), strict=True))
         scale = next(c for c in rows[-1] if c != 0)
         return tuple(tuple(c / scale for c in row) for row in rows)
 
-    group = new = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
-    while new and len(group) < 2000:
-        new = {compose(change, generator) for change in new for generator in generators} - group
-        group = group | new
+    group = new_elements = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
+    while new_elements and len(group) < 2000:
+        new_elements = {compose(change, generator) for change in new_elements for generator in generators} - group
+        group = group | new_elements
     return group

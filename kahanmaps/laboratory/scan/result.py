@@ -126,15 +126,15 @@ class Scan(PrintableResult):
     @property
     def height(self) -> int:
         """The largest numerator and denominator for which conditions are found; 0 with too few primes."""
-        bounds = [height_bound([sweep.prime for sweep in sweeps]) for sweeps in self._kinds if len(sweeps) > 2]
+        bounds = [height_bound([sweep.prime for sweep in sweeps]) for sweeps in self._grouped_sweeps if len(sweeps) > 2]
         return min(bounds, default=0)
 
     @property
-    def _kinds(self) -> tuple[list[Sweep], ...]:
+    def _grouped_sweeps(self) -> tuple[list[Sweep], ...]:
         """The sweeps over all members, over random lines of parameter space, and over random planes."""
         return (
             [sweep for sweep in self.sweeps if sweep.complete],
-            *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == width] for width in (1, 2)),
+            *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == k] for k in (1, 2)),
         )
 
     @property
@@ -143,7 +143,7 @@ class Scan(PrintableResult):
         count = len(self.over)
         degrees = [
             degree_reached(0.75 * min(sweep.measured / sweep.prime for sweep in sweeps), count)
-            for sweeps in self._kinds
+            for sweeps in self._grouped_sweeps
             if len(sweeps) > 2
         ]
         return max(degrees, default=0)
@@ -160,38 +160,40 @@ class Scan(PrintableResult):
     def coverage(self) -> str:
         """A sentence on the members that were measured and on the components that can be found from them."""
         if not self.height:
-            tried = counted(len(self.sweeps), "prime")
-            return f"conditions need members modulo three primes, and those modulo {tried} were tried"
-        complete, lines, planes = (_abbreviate([str(sweep.prime) for sweep in sweeps]) for sweeps in self._kinds)
+            primes_text = counted(len(self.sweeps), "prime")
+            return f"conditions need members modulo three primes, and those modulo {primes_text} were tried"
+        complete, lines, planes = (
+            _abbreviate([str(sweep.prime) for sweep in sweeps]) for sweeps in self._grouped_sweeps
+        )
         phrases = [f"all members with parameters modulo {complete}"] if complete else []
-        for width, subspaces, primes in ((1, "lines", lines), (2, "planes", planes)):
+        for k, subspaces, primes in ((1, "lines", lines), (2, "planes", planes)):
             if primes:
-                count = round(min(sweep.measured / sweep.prime**width for sweep in self._kinds[width]))
-                members = "those" if phrases else "members"
-                phrases.append(f"{members} on {count} random {subspaces} of parameter space modulo {primes}")
+                subspace_count = round(min(sweep.measured / sweep.prime**k for sweep in self._grouped_sweeps[k]))
+                noun = "those" if phrases else "members"
+                phrases.append(f"{noun} on {subspace_count} random {subspaces} of parameter space modulo {primes}")
         small_components = (
             "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
         )
-        kinds = [small_components] if complete else []
+        loci = [small_components] if complete else []
         if len(self.over) > 1:
-            kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
-        where = f"where one of the first {len(self.generic)} degrees is smaller"
+            loci.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
+        condition = f"where one of the first {len(self.generic)} degrees is smaller"
         if planes:
-            kinds.append("affine spaces of codimension 2, and hypersurfaces of affine spaces that have codimension 2")
+            loci.append("affine spaces of codimension 2, and hypersurfaces of affine spaces that have codimension 2")
         if not complete:
-            kinds.append("nothing of smaller dimension, which would need all members")
-        over_fields = []
+            loci.append("nothing of smaller dimension, which would need all members")
+        number_field_phrases = []
         if complete:
-            over_fields.append(
+            number_field_phrases.append(
                 f"points over number fields of degree d up to {MAX_FIELD_DEGREE}, with coefficients up to H where "
                 f"2^{SPARE_BITS // len(self.over)} (2 H + 1)^(d + 1) is below the product of the primes modulo which "
                 "they have residues"
             )
         if len(self.over) > 1:
-            over_fields.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
+            number_field_phrases.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
         return (
-            f"{', and '.join(phrases)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
-            f"denominators up to {self.height}; {', and '.join(over_fields)}"
+            f"{', and '.join(phrases)}; found are {', and '.join(loci)}, {condition}, over Q with numerators and "
+            f"denominators up to {self.height}; {', and '.join(number_field_phrases)}"
         )
 
     @property
@@ -205,60 +207,60 @@ class Scan(PrintableResult):
             ]
             lines = [*lines, ("searched", self.coverage), *self._omitted_lines]
             return "\n".join(f"{label}\t{value}" for label, value in lines)
-        names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
+        names_text = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("generic", ", ".join(map(str, self.generic)))]
         for degrees, components in self.classes:
             growth = growth_on(components)
-            sequence = ", ".join("none" if d < 0 else str(d) for d in degrees)
+            degrees_text = ", ".join("none" if d < 0 else str(d) for d in degrees)
             certainty_text = "" if growth is None or growth.recurrence is None else f", {growth.known}"
             lines.append(
-                ("degrees", sequence + (f"\t{growth.kind_text}{certainty_text}" if growth is not None else ""))
+                ("degrees", degrees_text + (f"\t{growth.kind_text}{certainty_text}" if growth is not None else ""))
             )
-            for label, separator, is_point in (("where", "; ", False), (f"at {names} =", ", ", True)):
-                for mark, is_confirmed in (("", True), ("\tnot confirmed", False)):
+            for label, separator, is_point in (("where", "; ", False), (f"at {names_text} =", ", ", True)):
+                for suffix, is_confirmed in (("", True), ("\tnot confirmed", False)):
                     texts = [
                         component.text
                         for component in components
                         if (component.is_rational_point, component.is_confirmed) == (is_point, is_confirmed)
                     ]
                     if texts:
-                        lines.append((label, separator.join(texts) + mark))
+                        lines.append((label, separator.join(texts) + suffix))
             lines += [
-                ("verdict", f"{names} = {component.member_text}: {component.verdict.sentence}")
+                ("verdict", f"{names_text} = {component.member_text}: {component.verdict.sentence}")
                 for component in components
                 if component.verdict is not None
             ]
         if self.components:
             lines.append(("growth", f"that of one member; singularities were traced for {STEPS} steps"))
         else:
-            where = f"where one of the first {len(self.generic)} degrees is smaller"
-            lines.append(("found", f"no condition on the parameters {where}"))
+            condition = f"where one of the first {len(self.generic)} degrees is smaller"
+            lines.append(("found", f"no condition on the parameters {condition}"))
         for images in self.symmetric:
-            image = f"({', '.join(images)})" if len(images) > 1 else images[0]
-            lines.append(("symmetry", f"{names} -> {image} permutes the special members"))
+            image_text = f"({', '.join(images)})" if len(images) > 1 else images[0]
+            lines.append(("symmetry", f"{names_text} -> {image_text} permutes the special members"))
         lines.append(("searched", self.coverage))
         if any(self.unassigned):
-            counts = list(zip(self.unassigned, self.sweeps, strict=True))
-            shown = [f"{n} modulo {sweep.prime}" for n, sweep in counts if n or len(counts) <= _MAX_LISTED]
+            pairs = list(zip(self.unassigned, self.sweeps, strict=True))
+            count_texts = [f"{n} modulo {sweep.prime}" for n, sweep in pairs if n or len(pairs) <= _MAX_LISTED]
             missed_dimension = 0  # the largest dimension of a variety with at most about n points
-            for n, sweep in counts:
+            for n, sweep in pairs:
                 dimension = len(self.over) - 1
                 while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (
                     len(self.over) - dimension
                 ):
                     dimension -= 1
                 missed_dimension = dimension
-            variety = "a curve" if missed_dimension == 1 else f"a variety of dimension {missed_dimension}"
-            missed = f"; as many as {variety} has, so one may have been missed" if missed_dimension else ""
-            lines.append(("unassigned", f"special members on no component: {_abbreviate(shown)}{missed}"))
+            variety_text = "a curve" if missed_dimension == 1 else f"a variety of dimension {missed_dimension}"
+            warning = f"; as many as {variety_text} has, so one may have been missed" if missed_dimension else ""
+            lines.append(("unassigned", f"special members on no component: {_abbreviate(count_texts)}{warning}"))
         elif not self.omitted:
             lines.append(("unassigned", "none: every special member that was seen is on a component"))
         return "\n".join(f"{label}\t{value}" for label, value in [*lines, *self._omitted_lines])
 
     @property
     def _omitted_lines(self) -> list[tuple[str, str]]:
-        why = "the scan was interrupted" if self.ended == "interrupted" else SPENT
-        return [("not done", f"{', '.join(self.omitted)}: {why}")] if self.omitted else []
+        reason = "the scan was interrupted" if self.ended == "interrupted" else SPENT
+        return [("not done", f"{', '.join(self.omitted)}: {reason}")] if self.omitted else []
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

@@ -29,7 +29,7 @@ from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.scan.conditions import conditions, points_outside
-from kahanmaps.laboratory.scan.members import Scanned, point_on
+from kahanmaps.laboratory.scan.members import ScannedFamily, point_on
 from kahanmaps.laboratory.scan.parameter_symmetries import symmetries
 from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Degrees, Sweep, TimeOver, sweep
@@ -135,100 +135,96 @@ def scan(
         raise InputError(f"found {len(names)} parameters to scan over, expected at most {MAX_PARAMETERS}")
     symbols = [name for name in names if name != "eps"]
     map_ = map_with_symbols(file, symbols)
-    exact = None if eps is None else rational(eps)
-    if exact is not None and "eps" in names:
+    exact_eps = None if eps is None else rational(eps)
+    if exact_eps is not None and "eps" in names:
         raise InputError("found eps both as a number and as a parameter to scan over, expected one of the two")
     if "eps" in names and not map_.has_eps:
         raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
-    if exact == 0:
+    if exact_eps == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     names = (*symbols, *(["eps"] if "eps" in names else []))
-    family = Scanned(file, names, map_, exact, seed)
+    family = ScannedFamily(file, names, map_, exact_eps, seed)
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
-    composite = [p for p in primes or () if not fmpz(p).is_prime()]
-    if composite:
-        raise InputError(f"found {composite[0]} among the primes to scan modulo, expected a prime number")
+    composites = [p for p in primes or () if not fmpz(p).is_prime()]
+    if composites:
+        raise InputError(f"found {composites[0]} among the primes to scan modulo, expected a prime number")
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         primes_text = ", ".join(map(str, primes))
         raise InputError(f"found the primes {primes_text}, expected at least three different ones, from 5 on")
-    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact)}")
-    terms, max_length, cost = _choose_terms(map_, len(names), exact, terms, rng)
+    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact_eps)}")
+    terms, max_length, cost = _choose_terms(map_, len(names), exact_eps, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
     max_members = _SWEEP_SHARE * budget.units / cost
     run = _ScanRun(
         family, seed_prefix, {"terms": terms, "max_length": max_length, "jobs": jobs}, budget, cost, progress
     )
     run.sweep(_choose_plan(len(names), primes, max_members))
-    components, missed = run.components(rng)
-    for plan_more in (run.more_lines, run.more_primes):
-        if not (missed or run.omitted) and (plan := plan_more(components, primes, max_members)):
+    components, omitted_count = run.components(rng)
+    for plan_further_members in (run.plan_lines, run.plan_primes):
+        if not (omitted_count or run.omitted) and (plan := plan_further_members(components, primes, max_members)):
             run.sweep(plan)
-            components, missed = run.components(rng)
-    run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
+            components, omitted_count = run.components(rng)
+    run.omit(omitted_count, f"all conditions for {counted(omitted_count, 'sequence')} of degrees")
     candidates = components
-    components, missed = run.apply(
+    components, omitted_count = run.apply(
         candidates,
         "confirms component",
         _STAGE_ENDS[2],
         lambda component, check: _confirm(component, family, candidates, rng, check),
     )
-    run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
+    run.omit(omitted_count, f"the confirmation of {counted(omitted_count, 'component')}")
     components.sort(key=lambda component: component.degrees[::-1])
     # Growth that is measured on one component; other components with the same degrees share it if more degrees agree.
-    shared: dict[Degrees, DegreeGrowth] = {}
-
-    def with_growth(component: Component, _: Callable[[], None]) -> Component:
-        if component.degrees[-1] < 0 or _continues_as(component, shared.get(component.degrees), family):
-            return component
-        growth = _measure_growth(component, family, budget)
-        if growth is not None and growth.growth not in _MEASURED_ON_EACH:
-            shared[component.degrees] = growth
-        return replace(component, growth=growth)
-
-    components, missed = run.apply(
-        components, "growth on component", 1 if analysis is None else _STAGE_ENDS[3], with_growth
+    shared_growths: dict[Degrees, DegreeGrowth] = {}
+    components, omitted_count = run.apply(
+        components,
+        "growth on component",
+        1 if analysis is None else _STAGE_ENDS[3],
+        lambda component, _: run.with_growth(component, shared_growths),
     )
-    run.omit(missed, f"the growth on {missed} components")
-    kinds = {component.degrees: Growth.UNKNOWN for component in components}
-    kinds |= {
+    run.omit(omitted_count, f"the growth on {omitted_count} components")
+    growth_kinds = {component.degrees: Growth.UNKNOWN for component in components}
+    growth_kinds |= {
         component.degrees: component.growth.growth for component in reversed(components) if component.growth is not None
     }
-    components.sort(key=lambda c: (OF_DEGREES.index(kinds[c.degrees]), c.degrees[::-1], c.text))
+    components.sort(key=lambda c: (OF_DEGREES.index(growth_kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
-        analyzed: set[Degrees] = set()  # the degree sequences of points that were analyzed
+        analyzed_degrees: set[Degrees] = set()  # the degree sequences of points that were analyzed
 
-        def with_verdict(component: Component, _: Callable[[], None]) -> Component:
+        def add_verdict(component: Component, _: Callable[[], None]) -> Component:
             is_exponential = component.growth is None or component.growth.growth is Growth.EXPONENTIAL
-            if component.values is None or is_exponential or component.degrees in analyzed:
+            if component.values is None or is_exponential or component.degrees in analyzed_degrees:
                 return component
             if component.dimension == 0:
-                analyzed.add(component.degrees)
+                analyzed_degrees.add(component.degrees)
             member, eps_of_member = family.member(component.values)
             result = analyze(member, eps=eps_of_member, effort=analysis, seed=family.seed)
             return replace(component, verdict=result.conclusion)
 
-        components, missed = run.apply(components, "analysis of a member on component", 1, with_verdict)
-        run.omit(missed, f"{missed} verdicts")
+        components, omitted_count = run.apply(components, "analysis of a member on component", 1, add_verdict)
+        run.omit(omitted_count, f"{omitted_count} verdicts")
     sweeps = tuple(run.sweeps)
     unassigned = tuple(_count_unassigned(result, components) for result in sweeps)
-    symmetric: tuple[tuple[str, ...], ...] = ()
+    changes: tuple[tuple[str, ...], ...] = ()
     try:
-        symmetric = tuple(symmetries(sweeps, components, names))
+        changes = tuple(symmetries(sweeps, components, names))
     except TimeLimit:
         run.is_interrupted = True
         run.omit(1, "changes of parameters that permute the special members")
     ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
-    generic = sweeps[0].generic if sweeps else ()
+    generic_degrees = sweeps[0].generic if sweeps else ()
     omitted = tuple(run.omitted)
-    return Scan(file, names, exact, seed, generic, tuple(components), sweeps, unassigned, symmetric, ended, omitted)
+    return Scan(
+        file, names, exact_eps, seed, generic_degrees, tuple(components), sweeps, unassigned, changes, ended, omitted
+    )
 
 
 @dataclass
 class _ScanRun:
     """The state of one scan: its sweeps so far, its budget, and what was omitted."""
 
-    family: Scanned
+    family: ScannedFamily
     seed_prefix: str  # of all random choices
     sweep_options: dict[str, Any]
     budget: Budget
@@ -261,9 +257,9 @@ class _ScanRun:
 
         return check
 
-    def omit(self, missed: int, text: str) -> None:
-        """Record `text`, a phrase on what was omitted, if `missed` is not 0."""
-        if missed:
+    def omit(self, count: int, text: str) -> None:
+        """Record `text`, a phrase on what was omitted, if `count` is not 0."""
+        if count:
             self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
@@ -275,16 +271,16 @@ class _ScanRun:
                 f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.planned_members} members"
             )
 
-        for k, (p, lines, width) in enumerate(plan):
+        for index, (p, subspace_count, dimension) in enumerate(plan):
             try:
                 result = sweep(
                     self.family.map,
                     len(self.family.names),
                     p,
                     self.family.eps,
-                    on=None if lines is None else (lines, width),
+                    on=None if subspace_count is None else (subspace_count, dimension),
                     units=self.cost,
-                    seed=f"{self.seed_prefix} {p} {lines} {width}",
+                    seed=f"{self.seed_prefix} {p} {subspace_count} {dimension}",
                     check=self.check_until(_STAGE_ENDS[0]),
                     progress=on_progress,
                     **self.sweep_options,
@@ -294,26 +290,26 @@ class _ScanRun:
                 continue
             except (TimeOver, TimeLimit) as stop:
                 self.is_interrupted |= isinstance(stop, TimeLimit)
-                self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
+                self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[index:])}")
                 break
         generic = max((sweep.generic for sweep in self.sweeps), default=())
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
-    def more_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
+    def plan_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
         """Plan more random lines, all new, if a hypersurface was probably missed on the lines so far.
 
         A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
         plan is empty if none was missed, or if the plan would need more than `max_members` members.
         """
-        lines = [sweep for sweep in self.sweeps if sweep.on_lines]
-        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
-        is_lacking = any(_count_unassigned(sweep, components) >= 0.5 * sweep.measured / sweep.prime for sweep in lines)
-        if not is_lacking or _count_members(len(self.family.names), plan) > max_members:
+        sweeps = [sweep for sweep in self.sweeps if sweep.on_lines]
+        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in sweeps]
+        is_missing = any(_count_unassigned(sweep, components) >= 0.5 * sweep.measured / sweep.prime for sweep in sweeps)
+        if not is_missing or _count_members(len(self.family.names), plan) > max_members:
             return []
         self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
         return plan
 
-    def more_primes(
+    def plan_primes(
         self, components: Sequence[Component], primes: Sequence[int] | None, max_members: float
     ) -> list[Choice]:
         """Plan further primes if points were probably missed, with at most `max_members` members in total.
@@ -321,9 +317,9 @@ class _ScanRun:
         Points were probably missed if there are unassigned members, but fewer than a curve (on random lines: a
         hypersurface) has points. The plan is empty if no points were missed, or if the user gave the primes.
         """
-        sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
+        pairs = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(
-            0 < _count_unassigned(sweep, components) < 0.5 * size for sweep, size in sizes
+            0 < _count_unassigned(sweep, components) < 0.5 * size for sweep, size in pairs
         ):
             return []
         plan: list[Choice] = [(p, None, 1) for p in _FURTHER_PRIMES.get(len(self.family.names), ())]
@@ -344,7 +340,7 @@ class _ScanRun:
 
         Returns the results and the number of items for which `fallback` was used.
         """
-        results, missed, check = [], 0, self.check_until(share)
+        results, fallback_count, check = [], 0, self.check_until(share)
         for k, item in enumerate(items):
             try:
                 self.stage = f"scan: {stage_text} {k + 1} of {len(items)}"
@@ -352,54 +348,64 @@ class _ScanRun:
                 results.append(function(item, check))
             except (TimeOver, TimeLimit) as stop:
                 self.is_interrupted |= isinstance(stop, TimeLimit)
-                missed += 1
+                fallback_count += 1
                 results.append(fallback(item))
-        return results, missed
+        return results, fallback_count
 
     def components(self, rng: random.Random) -> tuple[list[Component], int]:
         """Return the components, smaller degrees first, and the number of degree sequences that were not searched."""
         names, classes = self.family.names, sorted({degrees for sweep in self.sweeps for degrees in sweep.classes})
-        components, missed = self.apply(
+        components, skipped_count = self.apply(
             classes,
             "conditions for sequence of degrees",
             _STAGE_ENDS[1],
             lambda degrees, check: conditions(degrees, self.sweeps, names, rng, check),
             fallback=lambda _: [],
         )
-        return list(chain.from_iterable(components)), missed
+        return list(chain.from_iterable(components)), skipped_count
+
+    def with_growth(self, component: Component, shared_growths: dict[Degrees, DegreeGrowth]) -> Component:
+        """Add the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees.
+
+        Nothing is added if the component shares the growth of another one, or if an iterate is nowhere defined.
+        """
+        family = self.family
+        if component.degrees[-1] < 0 or _continues_as(component, shared_growths.get(component.degrees), family):
+            return component
+        growth = None
+        if component.values is not None:
+            member, eps_of_member = family.member(component.values)
+            for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
+                growth = degree_growth(
+                    member.map,
+                    eps_of_member,
+                    seed=family.seed + attempt,
+                    effort=Budget(min(_GROWTH_UNITS, self.budget.left)),
+                    steps=STEPS,
+                    enclosed=False,
+                )
+                if growth.growth is not Growth.UNKNOWN:
+                    break
+        if growth is None or not _agree(growth.degrees, (1, *component.degrees)):
+            growth = _fit_growth(component, family)
+        if growth is not None and growth.growth not in _MEASURED_ON_EACH:
+            shared_growths[component.degrees] = growth
+        return replace(component, growth=growth)
 
 
-def _measure_growth(component: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
-    """Return the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees."""
-    growth = None
-    if component.values is not None:
-        member, eps_of_member = family.member(component.values)
-        for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
-            growth = degree_growth(
-                member.map,
-                eps_of_member,
-                seed=family.seed + attempt,
-                effort=Budget(min(_GROWTH_UNITS, budget.left)),
-                steps=STEPS,
-                enclosed=False,
-            )
-            if growth.growth is not Growth.UNKNOWN:
-                break
-    is_typical = growth is not None and _agree(growth.degrees, (1, *component.degrees))
-    return growth if is_typical else _fit_growth(component, family)
-
-
-def _fit_growth(component: Component, family: Scanned, max_degree: int = _MAX_FITTED_DEGREE) -> DegreeGrowth | None:
+def _fit_growth(
+    component: Component, family: ScannedFamily, max_degree: int = _MAX_FITTED_DEGREE
+) -> DegreeGrowth | None:
     """Return the growth fitted to more degrees, measured modulo a prime; None if no member was found."""
-    like = [component.degrees[-1]] * _FITTED_TERMS
-    degrees = family.degrees_on(component.equations, like, random.Random(family.seed), max_degree)
+    expected_degrees = [component.degrees[-1]] * _FITTED_TERMS
+    degrees = family.degrees_on(component.equations, expected_degrees, random.Random(family.seed), max_degree)
     if degrees is None:
         return None
     message = f"{len(degrees)} iterates measured"
     return DegreeGrowth((1, *degrees), family.eps, Ended.TERMS, message, family.seed, (), ())
 
 
-def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: Scanned) -> bool:
+def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: ScannedFamily) -> bool:
     """Return whether further degrees agree with the growth on another component with the same first degrees."""
     if other_growth is None:
         return False
@@ -407,8 +413,8 @@ def _continues_as(component: Component, other_growth: DegreeGrowth | None, famil
     return growth is not None and _agree(growth.degrees, other_growth.degrees)
 
 
-def _agree(first: Degrees, second: Degrees) -> bool:
-    return all(a == b for a, b in zip(first, second, strict=False))
+def _agree(degrees: Degrees, other_degrees: Degrees) -> bool:
+    return all(a == b for a, b in zip(degrees, other_degrees, strict=False))
 
 
 def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members: float) -> list[Choice]:
@@ -417,17 +423,18 @@ def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members
     Returns the largest plan that needs at most `max_members` members.
     """
     plans: list[list[Choice]]
-    lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(parameter_count, _MANY_LINES)]
+    on_lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(parameter_count, _MANY_LINES)]
     if parameter_count in _PRIMES:
-        complete: list[list[Choice]] = [
-            [(p, None, 1) for p in choices] for choices in (_PRIMES[parameter_count] if primes is None else (primes,))
+        full_plans: list[list[Choice]] = [
+            [(p, None, 1) for p in group] for group in (_PRIMES[parameter_count] if primes is None else (primes,))
         ]
         plans = [
-            [*first, *(second if parameter_count > 1 else ())] for first, second in product(complete, [*lines, []])
+            [*main_plan, *(line_plan if parameter_count > 1 else ())]
+            for main_plan, line_plan in product(full_plans, [*on_lines, []])
         ]
     else:
         planes: list[Choice] = [(p, _PLANES, 2) for p in _PLANE_PRIMES]
-        plans = [[*first, *planes] for first in lines] + lines
+        plans = [[*main_plan, *planes] for main_plan in on_lines] + on_lines
         plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
     return next((plan for plan in plans if _count_members(parameter_count, plan) <= max_members), plans[-1])
 
@@ -452,28 +459,28 @@ def _choose_terms(
     degrees = family.degrees(members, eps, terms or _MAX_TERMS, max_length, rng).max(axis=0).tolist()
     if degrees[0] == NOWHERE:
         raise InputError("the map is not defined at any point, for all parameters")
-    measured = sum(degree >= 0 for degree in degrees)
-    if measured == 0 or (terms is not None and measured < terms):
+    term_count = sum(degree >= 0 for degree in degrees)
+    if term_count == 0 or (terms is not None and term_count < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
-    max_length = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: measured - 1]])
+    max_length = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: term_count - 1]])
     # Compile the kernel now, since Ctrl-C during the compilation loses no results.
     family.degrees(np.resize(members, (LONG, parameter_count)), eps, 1, max_length, random.Random(0))
-    return measured, max_length, family.units([1, *degrees[:measured]])
+    return term_count, max_length, family.units([1, *degrees[:term_count]])
 
 
 def _confirm(
     component: Component,
-    family: Scanned,
-    others: Sequence[Component],
+    family: ScannedFamily,
+    other_components: Sequence[Component],
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> Component:
     """Measure random members on a component, and search for a rational member outside of smaller components."""
-    sequences, names = [], family.names
+    degree_sequences, names = [], family.names
     for _ in range(_CONFIRMING_MEMBERS):
         check()
-        sequences.append(family.degrees_on(component.equations, component.degrees, rng))
-    defined = [degrees for degrees in sequences if degrees is not None]
+        degree_sequences.append(family.degrees_on(component.equations, component.degrees, rng))
+    sequences = [degrees for degrees in degree_sequences if degrees is not None]
     values = None
     for _ in range(_TRIES):
         point = point_on(component.equations, len(names), QQ, rng)
@@ -481,19 +488,19 @@ def _confirm(
             break
         if names[-1] == "eps" and point[-1] == 0:
             continue
-        if not any(other.dimension < component.dimension and other.contains(point) for other in others):
+        if not any(other.dimension < component.dimension and other.contains(point) for other in other_components):
             values = dict(zip(names, point, strict=True))
             break
-    return replace(component, tried=len(defined), confirmed=defined.count(component.degrees), values=values)
+    return replace(component, tried=len(sequences), confirmed=sequences.count(component.degrees), values=values)
 
 
 def _count_unassigned(sweep: Sweep, components: Sequence[Component]) -> int:
     """Count the special members modulo a prime that are on no component with their degrees."""
     return sum(
-        len(points_outside(points, [other for other in components if other.degrees == degrees], sweep.prime))
+        len(points_outside(points, [c for c in components if c.degrees == degrees], sweep.prime))
         for degrees, points in sweep.classes.items()
     )
 
 
-def _count_members(count: int, plan: Sequence[Choice]) -> int:
-    return sum(int(p**count if lines is None else p**width * lines) for p, lines, width in plan)
+def _count_members(dim: int, plan: Sequence[Choice]) -> int:
+    return sum(int(p**dim if count is None else p**k * count) for p, count, k in plan)

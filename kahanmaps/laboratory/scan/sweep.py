@@ -64,10 +64,10 @@ def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.R
     if on is None:
         yield from product(range(prime), repeat=count)
         return
-    subspaces, width = on
-    for _ in range(subspaces):
-        base, *directions = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
-        for multipliers in product(range(prime), repeat=width):
+    subspace_count, dimension = on
+    for _ in range(subspace_count):
+        base, *directions = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + dimension))
+        for multipliers in product(range(prime), repeat=dimension):
             yield tuple(
                 (b + sum(s * d for s, d in zip(multipliers, direction, strict=True))) % prime
                 for b, *direction in zip(base, *directions, strict=True)
@@ -87,7 +87,7 @@ def sweep(
     seed: str = "",
     jobs: int = 1,
     check: Callable[[], None] = lambda: None,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sweep:
     """Search for the special members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
 
@@ -115,7 +115,7 @@ def sweep(
 
     family, rng = Family(map_, prime), random.Random(seed)
 
-    def measure(points: Sequence[Point], on_progress: Callable[[int, int], None] = lambda done, of: None) -> Any:
+    def measure(points: Sequence[Point], on_progress: Callable[[int, int], None] = lambda done, total: None) -> Any:
         batches = []
         for start in range(0, len(points), _BATCH_SIZE):
             check()
@@ -131,27 +131,27 @@ def sweep(
     degrees = measure(points, progress)
     if (degrees == TOO_LARGE).any():
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
-    generic = degrees.max(axis=0)
-    if generic[0] < 0:
+    generic_degrees = degrees.max(axis=0)
+    if generic_degrees[0] < 0:
         raise InputError("the map is not defined at any point, for all parameters")
-    special, false_alarms = np.flatnonzero((degrees != generic).any(axis=1)), 0
-    for line in range(1, _MAX_LINES):
-        if not len(special):
+    special_indices, false_alarms = np.flatnonzero((degrees != generic_degrees).any(axis=1)), 0
+    for line_count in range(1, _MAX_LINES):
+        if not len(special_indices):
             break
         # The degree of an iterate is the largest degree on all lines; a line in special position can only lower it.
-        earlier, on_new_line = degrees[special], measure([points[i] for i in special])
-        degrees[special] = np.maximum(earlier, on_new_line)
-        still_special = special[(degrees[special] != generic).any(axis=1)]
-        false_alarms += len(special) - len(still_special)
-        if line >= _MIN_LINES and (earlier == degrees[special]).all():
+        earlier_degrees, new_degrees = degrees[special_indices], measure([points[i] for i in special_indices])
+        degrees[special_indices] = np.maximum(earlier_degrees, new_degrees)
+        remaining_indices = special_indices[(degrees[special_indices] != generic_degrees).any(axis=1)]
+        false_alarms += len(special_indices) - len(remaining_indices)
+        if line_count >= _MIN_LINES and (earlier_degrees == degrees[special_indices]).all():
             break
-        special = still_special
+        special_indices = remaining_indices
     classes: dict[Degrees, list[Point]] = {}
-    for i in special:
+    for i in special_indices:
         classes.setdefault(tuple(int(d) for d in degrees[i]), []).append(points[i])
     return Sweep(
         prime,
-        tuple(int(d) for d in generic),
+        tuple(int(d) for d in generic_degrees),
         classes,
         len(points),
         on is None,

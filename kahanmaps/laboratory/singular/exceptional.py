@@ -30,7 +30,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided_powers
+from kahanmaps.laboratory.singular.following import AlongCurves, StepLimits, TestCurve, divided_powers
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
@@ -59,10 +59,10 @@ class HypersurfaceComponent:
     def roots(self, t: int) -> list[int]:
         """The coordinates u in GF(p) of the points of the hypersurface with this t."""
         p = int(self.equation.context().modulus())
-        on_line = [0] * (self.degree + 1)
+        coefficients = [0] * (self.degree + 1)
         for (i, j), c in self.equation.terms():
-            on_line[j] += int(c) * pow(t, i, p)
-        return [int(u) for u, _ in nmod_poly(on_line, p).roots()]
+            coefficients[j] += int(c) * pow(t, i, p)
+        return [int(u) for u, _ in nmod_poly(coefficients, p).roots()]
 
 
 def components(
@@ -81,8 +81,8 @@ def components(
     ]
     image = equation.image(X, ring.constant(0), counted_product)
     count_work(2 * sum(map(len, image)))
-    common = reduce(nmod_mpoly.gcd, image)
-    image = [entry / common for entry in image]
+    common_factor = reduce(nmod_mpoly.gcd, image)
+    image = [entry / common_factor for entry in image]
     multiplicities: dict[str, tuple[nmod_mpoly, list[int]]] = {}
     for k, (form, at_image) in enumerate(forms):
         value = modulo(form, field).compose(*(image if at_image else X), ctx=ring)
@@ -128,16 +128,16 @@ class _Forms:
     @property
     def all(self) -> list[tuple[Any, bool]]:
         """Pairs of a form and whether it is evaluated at the image, in the order of columns; a form may occur twice."""
-        at_points = [(form, False) for form in self.poles]
-        return [*at_points, *((form, True) for form in self.images), (self.infinity, False)]
+        poles = [(form, False) for form in self.poles]
+        return [*poles, *((form, True) for form in self.images), (self.infinity, False)]
 
 
 @dataclass(frozen=True)
 class _Curve:
     """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
-    `across` is a random vector that spans surfaces through the curve. `minor_exponents` are the exponents of the forms
-    in the common factor of the minors of the equation, which is not part of the map. `limits` bound the number of
+    `transversal` is a random vector that spans surfaces through the curve. `minor_exponents` are the exponents of the
+    forms in the common factor of the minors of the equation, which is not part of the map. `limits` bound the number of
     steps.
     """
 
@@ -145,11 +145,11 @@ class _Curve:
     inverse: Equation
     point: tuple[int, ...]
     direction: tuple[int, ...]
-    across: tuple[int, ...]
+    transversal: tuple[int, ...]
     functions: tuple[Function, ...]
     minor_exponents: tuple[int, ...]
     forms: _Forms
-    limits: Range
+    limits: StepLimits
 
     def test_curve(self, tracked: AlongCurves) -> TestCurve:
         """The curve with the functions tracked along it."""
@@ -201,24 +201,25 @@ class _Curve:
 
     def form_orders(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
-        poles, form_orders = len(self.forms.poles), []
-        orders = [self.initial_orders, *(step.orders for step in run)]
-        for mu, here, there in zip(
-            divided_powers(run, self.initial_orders, self.minor_exponents), orders, orders[1:], strict=False
-        ):
-            images = zip(self.forms.images, there[poles:-1], strict=True)
-            form_orders.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
+        size, form_orders = len(self.forms.poles), []
+        run_orders = [self.initial_orders, *(step.orders for step in run)]
+        powers = divided_powers(run, self.initial_orders, self.minor_exponents)
+        for mu, orders, next_orders in zip(powers, run_orders, run_orders[1:], strict=False):
+            images = zip(self.forms.images, next_orders[size:-1], strict=True)
+            form_orders.append((*orders[:size], *(k + mu * int(form.total_degree()) for form, k in images), orders[-1]))
         return form_orders
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
-        """Return the components of the forms on the surface that `across` spans through `curve`."""
-        return components(self.equation, self.forms.all, curve, self.across)
+        """Return the components of the forms on the surface that `transversal` spans through `curve`."""
+        return components(self.equation, self.forms.all, curve, self.transversal)
 
-    def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
+    def curve_through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
         """Return such a curve through a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
-                point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
+                point = tuple(
+                    (int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.transversal, strict=True)
+                )
                 return replace(self, point=point)
         raise OrbitDataUnknown("a hypersurface has no point modulo a prime")
 
@@ -226,13 +227,13 @@ class _Curve:
     def components_with_points(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
         """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
         try:
-            return [(component, self.through(component, self.line)) for component in self.components(self.line)]
+            return [(component, self.curve_through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:
             return []
 
 
 @dataclass(frozen=True)
-class _Resolved:
+class _Orders:
     """The rows of `OrbitData`: the orders of hypersurfaces along a curve, computed from the orders of forms.
 
     `exponents` is the matrix of the exponents of hypersurfaces in the forms. Its `left_inverse` turns orders of forms
@@ -260,7 +261,9 @@ class _Resolved:
             column = fmpq_mat(len(orders_of_forms), 1, list(orders_of_forms))
             if t not in self.multiplicities:
                 self.multiplicities[t] = (
-                    self._on_surface(column, run[t].curve) if self.left_inverse is None else self.left_inverse * column
+                    self._orders_on_surface(column, run[t].curve)
+                    if self.left_inverse is None
+                    else self.left_inverse * column
                 )
             nu = self.multiplicities[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
@@ -268,31 +271,31 @@ class _Resolved:
             rows.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(rows)
 
-    def _on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
+    def _orders_on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
         """Return orders of hypersurfaces along a curve, from factors of forms on a surface. Raises OrbitDataUnknown."""
-        nu, largest = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
-        if largest == 0:
+        nu, max_order = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
+        if max_order == 0:
             return nu
         # Equal orders of forms often have the same multiplicities. If not, take the fewest terms that suffice.
-        known = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
-        if len(known) >= _REPEATED and all(column == known[0] for column in known):
-            return known[0]
-        terms = 1 + max((int(max(column.entries())) for column in known), default=1)
+        columns = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
+        if len(columns) >= _REPEATED and all(column == columns[0] for column in columns):
+            return columns[0]
+        term_count = 1 + max((int(max(column.entries())) for column in columns), default=1)
         while True:
-            truncated = [entry.truncate(terms) for entry in curve]
-            components = self.curve.components(truncated)
-            if all(component.order is not None and component.order < terms for component in components):
+            truncated_curve = [entry.truncate(term_count) for entry in curve]
+            components = self.curve.components(truncated_curve)
+            if all(component.order is not None and component.order < term_count for component in components):
                 break
-            if terms > largest:
+            if term_count > max_order:
                 raise OrbitDataUnknown("the image of a curve lies on a critical hypersurface")
-            terms *= 2
+            term_count *= 2
         for component in components:
             if component.order:
                 candidate_keys = self.keys_of_kind.get(component.kind, set())
                 key = (
                     next(iter(candidate_keys))
                     if len(candidate_keys) == 1
-                    else self.curve.through(component, truncated).key
+                    else self.curve.curve_through(component, truncated_curve).key
                 )
                 if key not in self.keys:
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
@@ -301,7 +304,7 @@ class _Resolved:
 
 
 def exceptional_hypersurfaces(
-    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits
 ) -> tuple[int, list[Hypersurface]]:
     """Return the degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
@@ -311,15 +314,15 @@ def exceptional_hypersurfaces(
     """
     map_at_eps = map_.at(eps)
 
-    def factors(equation: Equation) -> tuple[Any, ...]:
+    def determinant_factors(equation: Equation) -> tuple[Any, ...]:
         form = kernel_minors([[*row[:-1], None] for row in equation.polynomials()], counted_product)[-1]
         return (form,) if map_.digits > _MAX_DIGITS else tuple(factor for factor, _ in factored(form))
 
     infinity = map_at_eps.equations[0].polynomials()[0][0].context().gens()[-1]
-    poles = tuple(form for form in factors(map_at_eps.equations[0]) if form != infinity)
-    forms = _Forms(poles, factors(map_at_eps.inverse.equations[0]), infinity)
+    poles = tuple(form for form in determinant_factors(map_at_eps.equations[0]) if form != infinity)
+    forms = _Forms(poles, determinant_factors(map_at_eps.inverse.equations[0]), infinity)
     curves_by_key: dict[Key, list[_Curve]] = {}
-    for line in range(_MAX_LINES):
+    for i in range(_MAX_LINES):
         if limits.budget.is_spent:
             break
         field = GF(random_prime(rng, _BITS))
@@ -328,40 +331,42 @@ def exceptional_hypersurfaces(
             functions = tuple(form_order(form, field) for form, _ in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(map_at_prime.factors[0], forms, functions, limits, rng)
+        degree, zeros, curves = _search_line(map_at_prime.factors[0], forms, functions, limits, rng)
         for curve in curves:
             curves_by_key.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension of Q has points in GF(p) for some primes p only.
-        if line >= _MIN_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in curves_by_key.values()):
+        if i >= _MIN_LINES and all(len({curve.prime for curve in group}) > 1 for group in curves_by_key.values()):
             curves_by_key = dict(sorted(curves_by_key.items()))  # an order that does not depend on random choices
             try:
-                return degree, _resolved(curves_by_key, forms, degree, zeros)
+                return degree, _find_patterns(curves_by_key, forms, degree, zeros)
             except OrbitDataUnknown:
                 continue  # some hypersurface has no points modulo the primes so far
-    if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in curves_by_key.values()):
+    if limits.budget.is_spent or any(len({curve.prime for curve in group}) < 2 for group in curves_by_key.values()):
         raise OrbitDataUnknown("the exceptional hypersurfaces could not be distinguished by random points")
-    followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
+    curves_with_functions: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in curves_by_key.items()
     }
-    return degree, _followed(followed, [0] * len(curves_by_key), range(len(forms.all)))
+    return degree, _follow(curves_with_functions, [0] * len(curves_by_key), range(len(forms.all)))
 
 
-def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
+def _find_patterns(
+    curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int
+) -> list[Hypersurface]:
     """Return the exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
     keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     form_degrees = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
     total_degrees, degrees = fmpq_mat(len(form_degrees), 1, form_degrees), fmpq_mat(len(keys), 1)
-    followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {key: [] for key in keys}
+    pairs: dict[Key, list[tuple[_Curve, AlongCurves]]] = {key: [] for key in keys}
     if exponents.rank() == len(keys):
         left_inverse = (exponents.transpose() * exponents).inv() * exponents.transpose()
         degrees = left_inverse * total_degrees
         for key, curves in curves_by_key.items():
-            followed[key] = [(curve, _Resolved(curve, exponents, left_inverse, keys, {})) for curve in curves]
+            pairs[key] = [(curve, _Orders(curve, exponents, left_inverse, keys, {})) for curve in curves]
     else:
         lines = {curve.prime: curve for curves in curves_by_key.values() for curve in curves}
-        on_planes = [line.components_with_points for line in lines.values() if line.components_with_points]
-        for components_with_points in on_planes[:2]:
+        planes = [line.components_with_points for line in lines.values() if line.components_with_points]
+        for components_with_points in planes[:2]:
             keys_of_kind: dict[Kind, set[Key]] = {}
             degrees = fmpq_mat(len(keys), 1)
             for component, curve in components_with_points:
@@ -369,75 +374,76 @@ def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
                 keys_of_kind.setdefault(component.kind, set()).add(curve.key)
                 degrees[keys.index(curve.key), 0] += component.degree
-                followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, keys_of_kind)))
+                pairs[curve.key].append((curve, _Orders(curve, exponents, None, keys, keys_of_kind)))
     if exponents * degrees != total_degrees or sum(degrees.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
     # Orders in hypersurfaces that are not contracted are not needed.
-    contracted = [k for k, key in enumerate(keys) if key[0]]
-    return _followed(followed, [int(size) for size in degrees.entries()], contracted)
+    columns = [k for k, key in enumerate(keys) if key[0]]
+    return _follow(pairs, [int(degree) for degree in degrees.entries()], columns)
 
 
-def _followed(
+def _follow(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], degrees: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
     """Return the exceptional hypersurfaces with these columns of their patterns, modulo two primes."""
     hypersurfaces = []
-    for degree, (key, pairs) in zip(degrees, curves.items(), strict=True):
+    for degree, (key, curves_with_functions) in zip(degrees, curves.items(), strict=True):
         if key[0]:
-            by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
-            data = [
+            by_prime = {curve.prime: (curve, tracked) for curve, tracked in curves_with_functions}
+            patterns = [
                 curve.test_curve(tracked).orbit_data(_DISTINGUISHING_STEPS)
                 for curve, tracked in list(by_prime.values())[:2]
             ]
-            if len(data) < 2:
+            if len(patterns) < 2:
                 raise OrbitDataUnknown("a hypersurface has points modulo one prime only")
-            if data[0].compared != data[1].compared:
+            if patterns[0].compared != patterns[1].compared:
                 raise OrbitDataUnknown(POINTS_DIFFER)
-            orbit_data = data[0].of(columns)
+            orbit_data = patterns[0].of(columns)
             status = CONFINED if any(row[0] for row in orbit_data.rows) else NOT_CONFINED
             hypersurface = Hypersurface(
                 "Z" if key[2] else "?", degree, any(key[1]), 1, status, 1, orbit_data=orbit_data
             )
-            settled = orbit_data.settled_at if orbit_data.is_settled else None
+            settled_at = orbit_data.settled_at if orbit_data.is_settled else None
             hypersurfaces.append(
-                replace(hypersurface, primes=tuple(by_prime)[:2], followed=orbit_data.followed, settled_at=settled)
+                replace(hypersurface, primes=tuple(by_prime)[:2], followed=orbit_data.followed, settled_at=settled_at)
             )
     return hypersurfaces
 
 
-def _on_line(
-    map_: ElementaryMap, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
+def _search_line(
+    map_: ElementaryMap, forms: _Forms, functions: tuple[Function, ...], limits: StepLimits, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
     """Return the degree of the map on a random line, and the number of zeros of the forms over the closure of GF(p).
 
     Also returns the zeros in GF(p), each with the line as a curve through it.
     """
     equation, p = map_.equation, map_.field.characteristic
-    a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
-    line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+    base, direction, transversal = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
+    line = [nmod_poly([x, v], p) for x, v in zip(base, direction, strict=True)]
     image = equation.image(line, nmod_poly([], p), counted_product)
     count_work(sum(gcd_units(len(entry)) for entry in image))
-    common = reduce(nmod_poly.gcd, image)
-    image = [entry // common for entry in image]
+    common_factor = reduce(nmod_poly.gcd, image)
+    image = [entry // common_factor for entry in image]
     degree = max(int(entry.degree()) for entry in image)
-    at_points = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
-    at_images = [evaluate(form, map_.field, image) for form in forms.images]
+    values = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
+    image_values = [evaluate(form, map_.field, image) for form in forms.images]
     point_exponents = []  # the exponent of each form in the common factor
-    for value in at_points:
-        quotient, exponent = common, 0
+    for value in values:
+        quotient, exponent = common_factor, 0
         while value.degree() > 0 and (quotient % value).is_zero():
             quotient, exponent = quotient // value, exponent + 1
         point_exponents.append(exponent)
-    if sum(k * int(value.degree()) for k, value in zip(point_exponents, at_points, strict=True)) != common.degree():
+    if sum(k * int(value.degree()) for k, value in zip(point_exponents, values, strict=True)) != common_factor.degree():
         raise OrbitDataUnknown("the minors of the equation have a common factor of another kind")
-    product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
+    product = reduce(nmod_poly.__mul__, [*values, *image_values])
     if product.is_zero():
         raise OrbitDataUnknown("the map or its inverse is defined nowhere")
     radical = product // product.gcd(product.derivative())
     minor_exponents = (*point_exponents[:-1], *([0] * len(forms.images)), point_exponents[-1])
-    points = [tuple((x + s * v) % p for x, v in zip(a, b, strict=True)) for s in roots_modulo(radical)]
+    points = [tuple((x + s * v) % p for x, v in zip(base, direction, strict=True)) for s in roots_modulo(radical)]
     (inverse,) = map_.inverse.equations
     curves = [
-        _Curve(equation, inverse, point, b, across, functions, minor_exponents, forms, limits) for point in points
+        _Curve(equation, inverse, point, direction, transversal, functions, minor_exponents, forms, limits)
+        for point in points
     ]
     return degree, int(radical.degree()), curves

@@ -20,7 +20,7 @@ from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.jets import (
     Function,
     JetStep,
-    Letters,
+    MapSequence,
     NotGeneric,
     PrecisionTooLow,
     equations_of,
@@ -85,8 +85,8 @@ class OrbitData:
         if self.eventually_in:
             names = ", ".join(f"C{k + 1}" for k in self.eventually_in)
             incidences.append(f"{names} at all later steps, which lowers no degree")
-        lowers = f"lowers the degree by {_shortened(drops)}" if drops else "lowers no degree"
-        return [lowers, f"its image lies in {_shortened(incidences) or 'no exceptional hypersurface'}"]
+        drops_text = f"lowers the degree by {_shorten(drops)}" if drops else "lowers no degree"
+        return [drops_text, f"its image lies in {_shorten(incidences) or 'no exceptional hypersurface'}"]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -123,7 +123,7 @@ class OrbitData:
         return fmpz_poly([0, 1]) * numerator, denominator
 
 
-def _shortened(events: Sequence[str]) -> str:
+def _shorten(events: Sequence[str]) -> str:
     return ", ".join(events[:_SHOWN]) + (", ..." if len(events) > _SHOWN else "")
 
 
@@ -142,7 +142,7 @@ class AlongCurves(Protocol):
 
 
 @dataclass(frozen=True)
-class Tracked:
+class TrackedFunctions:
     """The functions whose orders are measured along curves through a hypersurface.
 
     `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
@@ -168,19 +168,19 @@ def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_
 
     `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
     """
-    before = [initial_orders, *(step.orders for step in run)]
+    orders_before = [initial_orders, *(step.orders for step in run)]
     return [
         step.common - sum(k * order for k, order in zip(minor_exponents, orders, strict=True))
-        for step, orders in zip(run, before, strict=False)
+        for step, orders in zip(run, orders_before, strict=False)
     ]
 
 
-NOTHING_TRACKED = Tracked()
+NOTHING_TRACKED = TrackedFunctions()
 
 
 @dataclass(frozen=True)
-class Range:
-    """The number of steps for which hypersurfaces are followed: `shown` along series, and `reach` in all.
+class StepLimits:
+    """The number of steps for which hypersurfaces are followed: `first_steps` along series, and `max_steps` in all.
 
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
     point of the image is followed, which is fast. If this point reaches the locus, slow series are computed, for at
@@ -188,8 +188,8 @@ class Range:
     limit is `repeating_steps`. The computation stops when the `budget` is spent.
     """
 
-    shown: int
-    reach: int
+    first_steps: int
+    max_steps: int
     series_steps: int
     budget: Budget
     repeating_steps: int
@@ -202,7 +202,7 @@ class TestCurve:
     equations: Sequence[Equation]
     point: Sequence[int]
     direction: Sequence[int]
-    limits: Range
+    limits: StepLimits
     tracked: AlongCurves = NOTHING_TRACKED
 
     @property
@@ -219,11 +219,11 @@ class TestCurve:
         """
         precision = 8
         functions = () if tangents else self.tracked.functions
-        start = self.equations, self.point, self.direction
+        arguments = self.equations, self.point, self.direction
         while True:
             run: list[JetStep] = []
             try:
-                for step in islice(images_of_curve(*start, precision, tangents, functions), count):
+                for step in islice(images_of_curve(*arguments, precision, tangents, functions), count):
                     run.append(step)
                     if self.limits.budget.is_spent:
                         return run, len(run) == count
@@ -240,25 +240,25 @@ class TestCurve:
             raise PrecisionTooLow
         return tuple(run)
 
-    def orbit_data_until_return(self, up: int) -> OrbitData:
-        """Return the orders along a curve whose image is a hypersurface again after the step `up`.
+    def orbit_data_until_return(self, return_step: int) -> OrbitData:
+        """Return the orders along a curve whose image is a hypersurface again after the step `return_step`.
 
         If the image is a critical hypersurface after some step, the pattern of the latter gives the later orders.
         """
-        steps = self.limits.shown
-        reach = min(self.limits.reach, steps + _FREE_STEPS)
+        step_count = self.limits.first_steps
+        max_steps = min(self.limits.max_steps, step_count + _FREE_STEPS)
         while True:
-            run = self.all_steps(steps)
+            run = self.all_steps(step_count)
             rows = self.tracked.rows(run)
             for t, (_, *nu) in enumerate(rows, 1):
-                if t >= up and any(nu) and self.tracked.functions:
+                if t >= return_step and any(nu) and self.tracked.functions:
                     if sorted(nu)[-2:] not in ([1], [0, 1]):
                         raise NotGeneric("a point on several critical hypersurfaces")
                     return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
-            event, reached = self._next_event(run[-1].limit, len(run), reach)
+            event, last_step = self._next_event(run[-1].limit, len(run), max_steps)
             if event is None or not self.tracked.functions:  # no orders are needed beyond the next indeterminacy point
-                return OrbitData(rows[:up], (), reached, True)
-            steps = event
+                return OrbitData(rows[:return_step], (), last_step, True)
+            step_count = event
 
     def orbit_data(self, first_steps: int) -> OrbitData:
         """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
@@ -266,58 +266,58 @@ class TestCurve:
         `first_steps` is the number of steps to begin with. The image may move on a critical hypersurface for many steps
         before it meets another one, so a recurrence is accepted only if it holds for as long as curves are followed.
         """
-        steps, limits, max_precision = first_steps, self.limits, _FIRST_PRECISION
+        step_count, limits, max_precision = first_steps, self.limits, _FIRST_PRECISION
         while True:
-            run, is_complete = self.steps(steps, max_precision=max_precision)
+            run, is_complete = self.steps(step_count, max_precision=max_precision)
             rows = self.tracked.rows(run)
-            last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
+            last_nonzero = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
             event = None
-            if is_complete and len(rows) - last >= _CONSTANT:
-                event, reached = self._next_event(run[-1].limit, len(run), limits.reach)
+            if is_complete and len(rows) - last_nonzero >= _CONSTANT:
+                event, last_step = self._next_event(run[-1].limit, len(run), limits.max_steps)
                 if event is None:
-                    return OrbitData(rows[:last], (), reached, True)
+                    return OrbitData(rows[:last_nonzero], (), last_step, True)
             recurrences = [find_recurrence(column) for column in zip(*rows, strict=True)]
-            repeats = all(
+            is_recurrent = all(
                 recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CONFIRMING_ORDERS)
                 for recurrence in recurrences
             )
             is_cut = not is_complete and not limits.budget.is_spent  # the largest precision did not suffice
-            is_far = len(run) >= min(limits.reach, limits.series_steps)
+            is_long = len(run) >= min(limits.max_steps, limits.series_steps)
             if (
                 rows
-                and repeats
-                and (is_far or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
+                and is_recurrent
+                and (is_long or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
             ):
                 polynomials = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
-                row_count = max(_CONSTANT, *(2 * int(law.degree()) for law in polynomials))
+                row_count = max(_CONSTANT, *(2 * int(polynomial.degree()) for polynomial in polynomials))
                 return OrbitData(rows[:row_count], polynomials, len(run), True)
             if is_cut and max_precision < _LONG_PRECISION:
                 max_precision *= 2
                 continue
-            longest = min(limits.reach, max(limits.series_steps, 2 * (event or 0)))
-            if rows and is_cut and (met_forever := self._met_for_ever(run[-1].limit)) is not None:
+            step_limit = min(limits.max_steps, max(limits.series_steps, 2 * (event or 0)))
+            if rows and is_cut and (hypersurfaces := self._find_incidences(run[-1].limit)) is not None:
                 other_steps = (
                     t
                     for t, (mu, *nu) in enumerate(rows, 1)
-                    if mu or any(order for k, order in enumerate(nu) if k not in met_forever)
+                    if mu or any(order for k, order in enumerate(nu) if k not in hypersurfaces)
                 )
-                return OrbitData(rows[: max(other_steps, default=1)], (), limits.reach, True, None, met_forever)
-            if not is_complete or steps >= longest:
+                return OrbitData(rows[: max(other_steps, default=1)], (), limits.max_steps, True, None, hypersurfaces)
+            if not is_complete or step_count >= step_limit:
                 return OrbitData(rows, (), len(rows), False)
-            steps = longest
+            step_count = step_limit
 
-    def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
+    def _find_incidences(self, point: Sequence[int]) -> tuple[int, ...] | None:
         """Return the critical hypersurfaces that the orbit of a point meets, or None if the orbit is not periodic.
 
         Also returns None if a point of the orbit is an indeterminacy point, where a power of t would be divided out.
         The map is evaluated along lines in the direction of the curve.
         """
         tracked, p = self.tracked, self.prime
-        if not isinstance(tracked, Tracked) or isinstance(self.equations, Letters):
+        if not isinstance(tracked, TrackedFunctions) or isinstance(self.equations, MapSequence):
             return None
-        point, visited, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
-        for _ in range(self.limits.reach):
-            visited.add(point)
+        point, visited_points, incident_hypersurfaces = _normalize_point(point, p), set[tuple[int, ...]](), set[int]()
+        for _ in range(self.limits.max_steps):
+            visited_points.add(point)
             line = [nmod_poly([x, v], p) for x, v in zip(point, self.direction, strict=True)]
             orders_here = [function(line, _MAX_PRECISION) for function in tracked.functions]
             run = replace(self, point=point).steps(1)[0]
@@ -326,19 +326,19 @@ class TestCurve:
             ((mu, *orders),) = replace(tracked, initial_orders=tuple(k or 0 for k in orders_here)).rows(run)
             if mu:
                 return None
-            point = _normal(run[0].limit, p)
-            met |= {k for k, order in enumerate(orders) if order}
-            if point in visited:
-                return tuple(sorted(met))
+            point = _normalize_point(run[0].limit, p)
+            incident_hypersurfaces |= {k for k, order in enumerate(orders) if order}
+            if point in visited_points:
+                return tuple(sorted(incident_hypersurfaces))
         return None
 
-    def _next_event(self, limit: Sequence[int], steps: int, reach: int) -> tuple[int | None, int]:
+    def _next_event(self, limit: Sequence[int], first_step: int, max_step: int) -> tuple[int | None, int]:
         """Follow a point to the next step at which the map is undefined or a tracked function is zero.
 
         Returns this step (None if there is no such step) and the step up to which the point was followed.
         """
         point: Sequence[int] = limit
-        for step in range(steps + 1, reach + 1):
+        for step in range(first_step + 1, max_step + 1):
             image = image_of(equations_of(self.equations, step), point)
             if image is None:
                 return step, step
@@ -348,10 +348,10 @@ class TestCurve:
                 return step, step
             if self.limits.budget.is_spent:
                 return None, step
-        return None, reach
+        return None, max_step
 
 
-def _normal(point: Sequence[int], p: int) -> tuple[int, ...]:
+def _normalize_point(point: Sequence[int], p: int) -> tuple[int, ...]:
     """Return the coordinates of a point, divided by the first nonzero coordinate."""
     inverse = pow(next(x for x in point if x), -1, p)
     return tuple(x * inverse % p for x in point)

@@ -37,28 +37,28 @@ class NotGeneric(ArithmeticError):
     """Raised if the point is in special position on its hypersurface; the caller takes another point."""
 
 
-class Letters(tuple[Equation, ...]):
+class MapSequence(tuple[Equation, ...]):
     """The maps of a composition: equations that are applied periodically, one in each step.
 
-    A function belongs to one of the maps. It is evaluated first after the number of steps given in `places`, and then
+    A function belongs to one of the maps. It is evaluated first after the number of steps given in `offsets`, and then
     after every period of the composition.
     """
 
-    places: tuple[int, ...] = ()
+    offsets: tuple[int, ...] = ()
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of a step, counted from 1: one equation for `Letters`, otherwise all equations."""
-    return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
+    """Return the equations of a step, counted from 1: one equation for `MapSequence`, otherwise all equations."""
+    return (equations[(step - 1) % len(equations)],) if isinstance(equations, MapSequence) else equations
 
 
 def orders_of(
     equations: Sequence[Equation], functions: Sequence[Function], step: int, X: Sequence[nmod_poly], precision: int
 ) -> list[int | None]:
     """Return the orders of functions along a curve after a step; 0 for a function that belongs to another map."""
-    if isinstance(equations, Letters):
-        is_due = [(step - place) % len(equations) == 0 for place in equations.places]
-        return [function(X, precision) if due else 0 for function, due in zip(functions, is_due, strict=True)]
+    if isinstance(equations, MapSequence):
+        are_due = [(step - offset) % len(equations) == 0 for offset in equations.offsets]
+        return [function(X, precision) if is_due else 0 for function, is_due in zip(functions, are_due, strict=True)]
     return [function(X, precision) for function in functions]
 
 
@@ -110,27 +110,27 @@ def images_of_curve(
     prime = equations[0].over.characteristic
     shift = precision if tangents else 0  # N: neighbours differ by multiples of t^N
     line = [nmod_poly([x, v], prime) for x, v in zip(point, direction, strict=True)]
-    power = nmod_poly([0] * shift + [1], prime)
-    curves = [line, *([x + power * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
+    shift_power = nmod_poly([0] * shift + [1], prime)
+    curves = [line, *([x + shift_power * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
     curves = [[entry.truncate(shift + precision) for entry in curve] for curve in curves]
-    for number in integers(1):
+    for step_number in integers(1):
         divided_power, denominators = 0, list[int | None]()
-        for equation in equations_of(equations, number):
+        for equation in equations_of(equations, step_number):
             pivots: list[Pivot] = []
-            images = [_image(equation, curve, precision, shift + precision, pivots) for curve in curves]
-            common = sum(exponent for exponent, *_ in pivots)
-            if common + 1 > precision - 1:
+            images = [_image_of_curve(equation, curve, precision, shift + precision, pivots) for curve in curves]
+            common_power = sum(exponent for exponent, *_ in pivots)
+            if common_power + 1 > precision - 1:
                 raise PrecisionTooLow
-            precision -= common
+            precision -= common_power
             curves = [[entry.truncate(shift + precision) for entry in curve] for curve in images]
             # The differences between the coordinates of the neighbours and of the curve.
             differences = [b - a for neighbour in curves[1:] for a, b in zip(curves[0], neighbour, strict=True)]
             if not all(difference.truncate(shift).is_zero() for difference in differences):
                 raise NotGeneric("the valuation differs at neighbouring points")
             order_of_Z = valuation(curves[0][-1], precision)
-            divided_power = divided_power * equation.image_degree + common
-            denominators.append(None if order_of_Z is None else order_of_Z + common)
-        orders = orders_of(equations, functions, number, curves[0], precision) if functions else []
+            divided_power = divided_power * equation.image_degree + common_power
+            denominators.append(None if order_of_Z is None else order_of_Z + common_power)
+        orders = orders_of(equations, functions, step_number, curves[0], precision) if functions else []
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
@@ -145,7 +145,7 @@ def images_of_curve(
         )
 
 
-def _image(
+def _image_of_curve(
     equation: Equation, X: Sequence[nmod_poly], precision: int, known_terms: int, pivots: list[Pivot]
 ) -> list[nmod_poly]:
     """Return the image of a curve known below t^known_terms, divided by a common power of t.
@@ -183,7 +183,7 @@ def kernel(
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
     units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
-    solved: list[tuple[int, dict[int, nmod_poly]]] = []
+    solved_rows: list[tuple[int, dict[int, nmod_poly]]] = []
     for k in range(len(rows)):
         if len(pivots) == k:
             pivots.append(_search_pivot(rows, free_rows, free_columns, precision))
@@ -203,9 +203,9 @@ def kernel(
                 for c in free_columns:
                     if not scaled_row[c].is_zero():
                         rows[r][c] = rows[r][c] - factor.mul_low(scaled_row[c], known_terms)
-        solved.append((j, scaled_row))
+        solved_rows.append((j, scaled_row))
     X = [rows[0][0] * 0 + 1] * (len(rows) + 1)
-    for j, scaled_row in reversed(solved):
+    for j, scaled_row in reversed(solved_rows):
         X[j] = -sum((entry.mul_low(X[c], known_terms) for c, entry in scaled_row.items()), 0 * X[j])
     return X
 
@@ -214,18 +214,18 @@ def _search_pivot(
     rows: Sequence[Sequence[nmod_poly]], free_rows: Sequence[int], free_columns: Sequence[int], precision: int
 ) -> Pivot:
     """Return the entry with the least exponent of t in these rows and columns. Raises PrecisionTooLow if all are 0."""
-    best: Pivot | None = None
+    pivot: Pivot | None = None
     # Rows with few nonzero entries come first, since they create the fewest new nonzero entries.
     for i in sorted(free_rows, key=lambda i: sum(not rows[i][j].is_zero() for j in free_columns)):
         for j in free_columns:
             power = valuation(rows[i][j], precision)
-            if power is not None and (best is None or power < best[0]):
-                best = power, i, j
+            if power is not None and (pivot is None or power < pivot[0]):
+                pivot = power, i, j
                 if power == 0:
-                    return best
-    if best is None:
+                    return pivot
+    if pivot is None:
         raise PrecisionTooLow
-    return best
+    return pivot
 
 
 def roots_modulo(polynomial: nmod_poly) -> list[int]:
@@ -255,30 +255,30 @@ def form_order(form: Any, field: PrimeField) -> Function:
 
     Raises BadPrime.
     """
-    p, reduced = field.prime, modulo(form, field)
-    terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in reduced.terms()]
-    products = sum(map(bool, chain.from_iterable(exponents for exponents, _ in terms)))
+    p, modular_form = field.prime, modulo(form, field)
+    terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in modular_form.terms()]
+    product_count = sum(map(bool, chain.from_iterable(exponents for exponents, _ in terms)))
     count_work(20 + 2 * len(terms))
 
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:
         count_work(2 + len(terms) / 5)
-        if int(reduced(*(int(entry[0]) for entry in X))):
+        if int(modular_form(*(int(entry[0]) for entry in X))):
             return 0
         if precision > _LOW_PRECISION:  # most orders are so small that few terms suffice
-            low = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
-            if low is not None:
-                return low
-        count_work(products * (0.3 + product_units(precision, precision)))
+            low_order = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
+            if low_order is not None:
+                return low_order
+        count_work(product_count * (0.3 + product_units(precision, precision)))
         powers = [[nmod_poly([1], p), entry] for entry in X]
-        total = nmod_poly([], p)
+        value = nmod_poly([], p)
         for exponents, term in terms:
-            for table, e in zip(powers, exponents, strict=True):
-                while len(table) <= e:
-                    table.append(table[-1].mul_low(table[1], precision))
+            for powers_of_coordinate, e in zip(powers, exponents, strict=True):
+                while len(powers_of_coordinate) <= e:
+                    powers_of_coordinate.append(powers_of_coordinate[-1].mul_low(powers_of_coordinate[1], precision))
                 if e:
-                    term = term.mul_low(table[e], precision)
-            total += term
-        return valuation(total, precision)
+                    term = term.mul_low(powers_of_coordinate[e], precision)
+            value += term
+        return valuation(value, precision)
 
     return order
 
@@ -300,8 +300,8 @@ def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] |
                 return None
             continue
         rows = equation.rows(equation.monomials(values), nmod(0, prime))
-        kernel, nullity = nmod_mat(rows, prime).nullspace()
+        null_vectors, nullity = nmod_mat(rows, prime).nullspace()
         if nullity != 1:
             return None
-        X = [int(kernel[k, 0]) for k in range(len(X))]
+        X = [int(null_vectors[k, 0]) for k in range(len(X))]
     return X

@@ -34,13 +34,13 @@ from kahanmaps.laboratory.singular.following import (
     NOTHING_TRACKED,
     AlongCurves,
     OrbitData,
-    Range,
+    StepLimits,
     TestCurve,
-    Tracked,
+    TrackedFunctions,
 )
 from kahanmaps.laboratory.singular.jets import (
     JetStep,
-    Letters,
+    MapSequence,
     NotGeneric,
     PrecisionTooLow,
     form_order,
@@ -84,52 +84,52 @@ def critical_points(
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
-    excluded = line[-1]
+    excluded_zeros = line[-1]
 
-    def function(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
+    def evaluate_E(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
         """Return E or det M at X; on the line common factors of images are divided out, whose zeros do not count."""
-        nonlocal excluded
-        total = X[0] * 0 + 1
+        nonlocal excluded_zeros
+        product = X[0] * 0 + 1
         for k, equation in enumerate(equations):
             if inverses is None:
-                total = times(total, _denominator(equation, X, times))
+                product = times(product, _denominator(equation, X, times))
                 if k + 1 == len(equations):
                     break
             image = equation.image(X, X[0] * 0, times)
-            if is_line and (common := reduce(nmod_poly.gcd, image)).degree() > 0:
-                image = [entry // common for entry in image]
-                excluded = excluded if inverses is None else excluded * common
+            if is_line and (common_factor := reduce(nmod_poly.gcd, image)).degree() > 0:
+                image = [entry // common_factor for entry in image]
+                excluded_zeros = excluded_zeros if inverses is None else excluded_zeros * common_factor
             X = image
             if inverses is not None:
-                total = times(total, _denominator(inverses[k], X, times))
-                excluded = excluded * X[-1] if is_line else excluded
-        return total
+                product = times(product, _denominator(inverses[k], X, times))
+                excluded_zeros = excluded_zeros * X[-1] if is_line else excluded_zeros
+        return product
 
-    E_on_line = function(line, counted_product, is_line=True)
-    while (common_zeros := E_on_line.gcd(excluded)).degree() > 0:
+    E_on_line = evaluate_E(line, counted_product, is_line=True)
+    while (common_zeros := E_on_line.gcd(excluded_zeros)).degree() > 0:
         E_on_line = E_on_line // common_zeros
     if E_on_line.degree() < 1:
         return [], {}
     points, degrees = [], dict[int, int]()
-    for part, exponent in E_on_line.factor_squarefree()[1]:
+    for squarefree_factor, exponent in E_on_line.factor_squarefree()[1]:
         power = int(exponent)
-        degrees[power] = degrees.get(power, 0) + int(part.degree())
-        for s in roots_modulo(part):
+        degrees[power] = degrees.get(power, 0) + int(squarefree_factor.degree())
+        for s in roots_modulo(squarefree_factor):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             # The gradient of F up to a factor, where E = F^power G: on x + t v + d w the form E is
             # (t F_v + d F_w)^power G + ... A power of t that is higher than all relevant ones replaces d.
-            gap = power + 1
+            gap_order = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
-            t_to_gap = nmod_poly([0] * gap + [1], p)
+            t_to_gap = nmod_poly([0] * gap_order + [1], p)
             curves = [curve, *([x + t_to_gap if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
-            terms = gap + power
+            term_count = gap_order + power
 
-            def times(left: nmod_poly, right: nmod_poly, terms: int = terms) -> nmod_poly:
-                count_work(product_units(terms, terms))
-                return left.mul_low(right, terms)
+            def times(left: nmod_poly, right: nmod_poly, term_count: int = term_count) -> nmod_poly:
+                count_work(product_units(term_count, term_count))
+                return left.mul_low(right, term_count)
 
-            at_point, *nearby = (int(function(X, times)[terms - 1]) for X in curves)
-            gradient = [(c - at_point) % p for c in nearby]
+            value, *nearby_values = (int(evaluate_E(X, times)[term_count - 1]) for X in curves)
+            gradient = [(c - value) % p for c in nearby_values]
             if any(gradient):
                 points.append(CriticalPoint(tuple(point), tuple(gradient), power))
     return points, degrees
@@ -202,8 +202,8 @@ class Hypersurface(ResultPart):
         `at` names the eps of the polynomial, for a polynomial that is not over Q[eps].
         """
         text, max_characters = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
-        cut = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
-        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
+        head = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
+        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{head} = 0{'' if self.generic else at}")
         if self.orbit_data.continues_as:
             steps, target = self.orbit_data.continues_as
             outcome = f"mapped onto C{target + 1} after {counted(steps, 'step')}"
@@ -213,10 +213,10 @@ class Hypersurface(ResultPart):
             outcome = f"its multiplicities satisfy a recurrence of order {self.orbit_data.settled_at}"
         else:
             outcome = f"not confined within {counted(self.followed, 'step')}"
-        by = "" if self.stage is None else f" by map {self.stage + 1}"
-        factor = ", a factor of the denominator" if self.divides_denominator else ""
-        phrases = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
-        return "; ".join(phrases)
+        map_text = "" if self.stage is None else f" by map {self.stage + 1}"
+        factor_text = ", a factor of the denominator" if self.divides_denominator else ""
+        summary = f"{name}, degree {self.degree}{factor_text}: contracted{map_text}, {outcome}"
+        return "; ".join([summary, *self.orbit_data.sentences])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, without the first steps."""
@@ -266,14 +266,14 @@ class Tracking:
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
-        letters = Letters([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.places = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
+        letters = MapSequence([*equations[self.stage : self.period], *equations[: self.stage]])
+        letters.offsets = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
         return letters
 
-    def along(self, form: Any, field: PrimeField) -> Tracked:
+    def along(self, form: Any, field: PrimeField) -> TrackedFunctions:
         """Return the functions whose orders are measured along curves through the hypersurface of `form`."""
         forms, stage = [*self.critical, *self.of_minors], self.stage or 0
-        return Tracked(
+        return TrackedFunctions(
             tuple(form_order(tracked.form, field) for tracked in forms),
             tuple(tracked.minor_exponent for tracked in forms),
             tuple(int(tracked.form == form and tracked.stage == stage) for tracked in forms),
@@ -290,7 +290,7 @@ def outcome_of(
     form: HypersurfaceForm,
     text: str,
     rng: random.Random,
-    limits: Range,
+    limits: StepLimits,
     tracking: Tracking = NONE_TRACKED,
 ) -> Hypersurface:
     """Return the hypersurface of a form over Q with its singularity pattern, at one exact eps (half the time step).
@@ -315,9 +315,9 @@ def outcome_of(
             if not roots or p in outcomes:
                 continue
             point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
-            at = [field.convert(x) for x in point]
-            normal = [int(evaluate(slope, field, at)) for slope in gradient(form.form)]
-            tangents = _tangents(point, normal, field) if any(normal) else None
+            field_point = [field.convert(x) for x in point]
+            normal_vector = [int(evaluate(slope, field, field_point)) for slope in gradient(form.form)]
+            tangents = _tangent_vectors(point, normal_vector, field) if any(normal_vector) else None
             if tangents is not None:
                 outcomes[p] = _outcome_at(equations, point, tangents, rng, limits, tracked=tracked)
         except (BadPrime, NotGeneric):
@@ -326,9 +326,11 @@ def outcome_of(
             note = BUDGET_SPENT if limits.budget.is_spent else "its series have too few terms"
             break
     if len(outcomes) == _POINTS:
-        first, second = ((h.status, h.contracted_at, h.confined_at, h.orbit_data.compared) for h in outcomes.values())
+        data, other_data = (
+            (h.status, h.contracted_at, h.confined_at, h.orbit_data.compared) for h in outcomes.values()
+        )
         outcome, note = next(iter(outcomes.values())), ""
-        if first != second:  # a reason may be that the budget was spent
+        if data != other_data:  # a reason may be that the budget was spent
             outcome, note = Hypersurface(steps=outcome.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
     hypersurface = replace(
         outcome,
@@ -340,15 +342,15 @@ def outcome_of(
     return replace(hypersurface, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
-def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `unwritten`."""
-    hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
+def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits) -> list[Hypersurface]:
+    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `outcomes_of_points`."""
+    hypersurfaces = outcomes_of_points(map_, eps, rng, limits, poles=True) + outcomes_of_points(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
         try:
             equations = map_.at(eps, field).equations
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
-            tangents = _tangents(point, [0] * map_.dim + [1], field)
+            tangents = _tangent_vectors(point, [0] * map_.dim + [1], field)
             outcome = _UNKNOWN if tangents is None else _outcome_at(equations, point, tangents, rng, limits)
         except (BadPrime, NotGeneric):
             continue
@@ -358,7 +360,9 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
     return hypersurfaces
 
 
-def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
+def outcomes_of_points(
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits, poles: bool = False
+) -> list[Hypersurface]:
     """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes. With `poles` the poles are returned, and
@@ -370,8 +374,8 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
         tuple[Any, ...], list[tuple[Any, ...]]
     ] = {}  # the keys in `hypersurfaces` of points with the same orders
     degrees: dict[int, int] = {}
-    for line in range(4 * _MIN_LINES):
-        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in hypersurfaces}):
+    for line_count in range(4 * _MIN_LINES):
+        if limits.budget.is_spent or (line_count >= _MIN_LINES and set(degrees) <= {key[0] for key in hypersurfaces}):
             break
         field = GF(random_prime(rng))
         try:
@@ -381,27 +385,27 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             continue
         points, zeros_by_multiplicity = critical_points(equations, None if poles else inverses, rng)
         degrees |= zeros_by_multiplicity
-        for critical in points:
-            tangents = _tangents(critical.point, critical.gradient, field)
+        for critical_point in points:
+            tangents = _tangent_vectors(critical_point.point, critical_point.gradient, field)
             if tangents is None or limits.budget.is_spent:
                 continue
-            direction = [rng.randrange(field.prime) for _ in critical.point]
-            run, _ = TestCurve(equations, critical.point, direction, limits).steps(
-                limits.shown, max_precision=_KEY_PRECISION
+            direction = [rng.randrange(field.prime) for _ in critical_point.point]
+            run, _ = TestCurve(equations, critical_point.point, direction, limits).steps(
+                limits.first_steps, max_precision=_KEY_PRECISION
             )
-            orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
+            orders = critical_point.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             keys = keys_by_orders.setdefault(orders, [])
             if len(keys) >= _POINTS and len(set(keys)) == 1:  # a third point would give no new information
                 primes = dict.fromkeys((*hypersurfaces[keys[0]].primes, field.prime))
                 hypersurfaces[keys[0]] = replace(hypersurfaces[keys[0]], primes=tuple(primes))
                 continue
             try:
-                outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
+                outcome = _outcome_at(equations, critical_point.point, tangents, rng, limits)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
                 outcome = _UNKNOWN
-            key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
+            key = (critical_point.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             keys.append(key)
             hypersurface = replace(
                 outcome,
@@ -411,13 +415,13 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
                 primes=(field.prime,),
             )
             if key in hypersurfaces:  # of two points with the same outcome, the smaller number of steps counts
-                earlier = hypersurfaces[key]
-                settled = [k for k in (earlier.settled_at, hypersurface.settled_at) if k is not None]
+                earlier_hypersurface = hypersurfaces[key]
+                settled_steps = [k for k in (earlier_hypersurface.settled_at, hypersurface.settled_at) if k is not None]
                 hypersurfaces[key] = replace(
-                    earlier,
-                    primes=tuple(dict.fromkeys((*earlier.primes, *hypersurface.primes))),
-                    followed=min(earlier.followed, hypersurface.followed),
-                    settled_at=max(settled) if len(settled) == 2 else None,
+                    earlier_hypersurface,
+                    primes=tuple(dict.fromkeys((*earlier_hypersurface.primes, *hypersurface.primes))),
+                    followed=min(earlier_hypersurface.followed, hypersurface.followed),
+                    settled_at=max(settled_steps) if len(settled_steps) == 2 else None,
                 )
             else:
                 hypersurfaces[key] = hypersurface
@@ -426,13 +430,13 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
     return sorted(hypersurfaces.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
-def _by_ranks(ranks: Sequence[int], full_rank: int) -> tuple[SingularityOutcome, int | None, int | None]:
+def _outcome_by_ranks(ranks: Sequence[int], full_rank: int) -> tuple[SingularityOutcome, int | None, int | None]:
     """Return the outcome, the step that contracts the hypersurface, and the step after which it is confined."""
-    down = next((k for k, rank in enumerate(ranks, 1) if rank < full_rank), None)
-    if down is None:
+    contracted_at = next((k for k, rank in enumerate(ranks, 1) if rank < full_rank), None)
+    if contracted_at is None:
         return NOT_CONTRACTED, None, None
-    up = next((k for k, rank in enumerate(ranks, 1) if k > down and rank == full_rank), None)
-    return (NOT_CONFINED, down, None) if up is None else (CONFINED, down, up)
+    confined_at = next((k for k, rank in enumerate(ranks, 1) if k > contracted_at and rank == full_rank), None)
+    return (NOT_CONFINED, contracted_at, None) if confined_at is None else (CONFINED, contracted_at, confined_at)
 
 
 def _outcome_at(
@@ -440,57 +444,57 @@ def _outcome_at(
     point: Sequence[int],
     tangents: list[list[int]],
     rng: random.Random,
-    limits: Range,
+    limits: StepLimits,
     tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
     """Return the outcome and the singularity pattern of the hypersurface with these tangent vectors at a point."""
     full_rank = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     curve = TestCurve(equations, point, direction, limits, tracked)
-    run, is_complete = curve.steps(limits.shown, tangents, _MAX_TANGENT_PRECISION)
-    status, down, up = _by_ranks([step.rank for step in run], full_rank)
+    run, is_complete = curve.steps(limits.first_steps, tangents, _MAX_TANGENT_PRECISION)
+    status, contracted_at, confined_at = _outcome_by_ranks([step.rank for step in run], full_rank)
     if not is_complete and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
     data = NO_ORBIT_DATA
-    if up is None:
-        data = curve.orbit_data(limits.shown)
+    if confined_at is None:
+        data = curve.orbit_data(limits.first_steps)
         # After the steps that are shown the image may be another hypersurface, whose pattern continues this pattern.
-        longest = min(limits.series_steps, limits.reach)
-        while up is None and is_complete and not data.is_settled and len(run) < longest:
-            run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
-            status, down, up = _by_ranks([step.rank for step in run], full_rank)
-    if up is None:
+        step_limit = min(limits.series_steps, limits.max_steps)
+        while confined_at is None and is_complete and not data.is_settled and len(run) < step_limit:
+            run, is_complete = curve.steps(min(2 * len(run), step_limit), tangents, _MAX_TANGENT_PRECISION)
+            status, contracted_at, confined_at = _outcome_by_ranks([step.rank for step in run], full_rank)
+    if confined_at is None:
         # At a superattracting point the multiplicities grow too fast for the precision, and yet satisfy a recurrence.
         if not is_complete and not data.is_settled:
             raise PrecisionTooLow
     else:
-        data = curve.orbit_data_until_return(up)
-    if is_complete and data.is_settled and not data.continues_as and len(run) < data.settled_at + 2 <= limits.reach:
+        data = curve.orbit_data_until_return(confined_at)
+    if is_complete and data.is_settled and not data.continues_as and len(run) < data.settled_at + 2 <= limits.max_steps:
         run = list(curve.all_steps(data.settled_at + 2, tangents))
-        status, down, up = _by_ranks([step.rank for step in run], full_rank)
-    settled = max(up or 0, data.settled_at) if data.is_settled else None
+        status, contracted_at, confined_at = _outcome_by_ranks([step.rank for step in run], full_rank)
+    settled_at = max(confined_at or 0, data.settled_at) if data.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         data = replace(NO_ORBIT_DATA, followed=data.followed)
     return Hypersurface(
         status=status,
-        contracted_at=down,
-        confined_at=up,
+        contracted_at=contracted_at,
+        confined_at=confined_at,
         steps=tuple(run),
         followed=data.followed,
-        settled_at=settled,
+        settled_at=settled_at,
         orbit_data=data,
     )
 
 
-def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) -> list[list[int]] | None:
+def _tangent_vectors(point: Sequence[int], gradient: Sequence[int], field: PrimeField) -> list[list[int]] | None:
     """Return a basis of the tangent space of a hypersurface at a point, modulo the point; None in special position."""
-    p, places = field.prime, range(len(point))
-    pivot = next(k for k in places if gradient[k])
+    p, indices = field.prime, range(len(point))
+    pivot = next(k for k in indices if gradient[k])
     inverse = pow(gradient[pivot], -1, p)
     # The point is itself a tangent vector of the cone, so a basis vector that occurs in it is left out.
-    occurs = next((k for k in places if k != pivot and point[k]), None)
-    free = [k for k in places if k not in (pivot, occurs)]
-    basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in places] for k in free]
-    return None if occurs is None else [[entry % p for entry in vector] for vector in basis]
+    second_pivot = next((k for k in indices if k != pivot and point[k]), None)
+    free_indices = [k for k in indices if k not in (pivot, second_pivot)]
+    basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in indices] for k in free_indices]
+    return None if second_pivot is None else [[entry % p for entry in vector] for vector in basis]

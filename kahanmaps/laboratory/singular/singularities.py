@@ -29,10 +29,10 @@ from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
-from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduce_map
+from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed_hypersurfaces
 from kahanmaps.laboratory.singular.exceptional import OrbitDataUnknown, exceptional_hypersurfaces
-from kahanmaps.laboratory.singular.following import Fraction, Range
+from kahanmaps.laboratory.singular.following import Fraction, StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     FIRST_STEPS,
@@ -44,7 +44,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     Tracking,
     outcome_of,
     outcomes_at_random,
-    unwritten,
+    outcomes_of_points,
 )
 from kahanmaps.laboratory.singular.written import (
     Word,
@@ -149,8 +149,8 @@ class SingularityRun(PrintableResult):
         """The verdict, with the number of steps searched for confinement."""
         if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
             return self.verdict
-        others = ", others not" if self.verdict == "some confined" else ""
-        return f"{self.verdict}{others} within {counted(self.followed, self.unit)}"
+        others_text = ", others not" if self.verdict == "some confined" else ""
+        return f"{self.verdict}{others_text} within {counted(self.followed, self.unit)}"
 
     @property
     def unit(self) -> str:
@@ -218,15 +218,15 @@ def singularities(
     if map_.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
     budget = budget_for("singularities", effort)
-    max_digits = _most_digits(map_.dim, budget)
-    if (digits := _digits(map_, exact_eps)) > max_digits:
+    max_digits = _max_digits(map_.dim, budget)
+    if (digits := _count_digits(map_, exact_eps)) > max_digits:
         raise InputError(
             f"found numbers of about {digits} digits in eps and the system, expected at most {max_digits}: "
             f"in dimension {map_.dim} formulas with longer numbers exceed the work limit; raise --effort"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-    limits = _range(map_.dim, steps, budget)
+    limits = _step_limits(map_.dim, steps, budget)
     map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
     try:
         if is_long(map_at_eps):
@@ -235,22 +235,22 @@ def singularities(
         count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
-            line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
+            line = Line(reduce_map(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
         except Stopped as error:
             raise InputError(f"found a composition whose singularities cannot be followed: {error.message}") from error
         run = SingularityRun(exact_eps, "?", line.degree)
         if not _is_dominant(map_, exact_eps):
             return replace(run, is_dominant=False)
-        if (followed_run := _map_by_map(map_, run, seed, limits, progress)) is not None:
+        if (followed_run := _follow_map_by_map(map_, run, seed, limits, progress)) is not None:
             return followed_run
         if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
                 "maps whose equations are linear in both points, which are treated at random points"
             ) from None
-        at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
-        return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
+        random_hypersurfaces = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
+        return replace(run, hypersurfaces=random_hypersurfaces, stopped=limits.budget.is_spent)
     denominator = map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
     run = SingularityRun(
@@ -263,14 +263,14 @@ def singularities(
         progress("the Jacobian determinant of the homogeneous map")
     forms, critical_degree = poles_and_critical_factors(map_form)
     if critical_degree is None and len(map_at_eps.factors) > 1:
-        followed_run = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
+        followed_run = _follow_map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
         if followed_run is not None:
             return followed_run
     tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
     hypersurfaces: list[Hypersurface] = []
-    stopped = False
+    is_stopped = False
     for form in forms:
-        if stopped := limits.budget.is_spent:
+        if is_stopped := limits.budget.is_spent:
             break
         try:
             text = name_of(form.form, map_)
@@ -279,26 +279,28 @@ def singularities(
         except TimeLimit:
             if isinstance(effort, Budget):  # a stage of a larger computation, which must end as well
                 raise
-            stopped = True
+            is_stopped = True
             break
-    if critical_degree is None and not stopped:
+    if critical_degree is None and not is_stopped:
         progress("following critical points")
-        too_large = "the polynomials of the exceptional hypersurfaces are too large"
+        note = "the polynomials of the exceptional hypersurfaces are too large"
         without_polynomials = (
-            unwritten(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=too_large)]
+            outcomes_of_points(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=note)]
         )
         hypersurfaces += without_polynomials
-    stopped |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=stopped)
+    is_stopped |= limits.budget.is_spent and (
+        critical_degree is None or any(h.settled_at is None for h in hypersurfaces)
+    )
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_stopped)
 
 
-def _map_by_map(
-    map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
+def _follow_map_by_map(
+    map_: MapFamily, run: SingularityRun, seed: int, limits: StepLimits, progress: Callable[[str], None]
 ) -> SingularityRun | None:
     """Return the run for a composition whose maps are followed one by one; None if one of the maps is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
-    followed = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return followed and replace(run, word=followed[0], hypersurfaces=tuple(followed[1]), stopped=limits.budget.is_spent)
+    result = followed_map_by_map(map_, run.eps, rng, limits, progress)
+    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -342,12 +344,12 @@ class Patterns:
     def series_text(self) -> str:
         """The generating function of the degrees as a formula in z; empty if it is not known."""
         texts = []
-        for part in self.series:
+        for coefficients in self.series:
             text = ""
-            for power, c in enumerate(part):
+            for power, c in enumerate(coefficients):
                 if c:
-                    letter = "" if power == 0 else "z" if power == 1 else f"z^{power}"
-                    term = "*".join(([] if abs(c) == 1 and letter else [str(abs(c))]) + ([letter] if letter else []))
+                    z_text = "" if power == 0 else "z" if power == 1 else f"z^{power}"
+                    term = "*".join(([] if abs(c) == 1 and z_text else [str(abs(c))]) + ([z_text] if z_text else []))
                     text += f" {'-' if c < 0 else '+'} {term}" if text else f"{'-' if c < 0 else ''}{term}"
             texts.append(f"({text or '0'})")
         return " / ".join(texts)
@@ -355,8 +357,8 @@ class Patterns:
     @property
     def sentences(self) -> list[str]:
         """A sentence on the singularity pattern of each exceptional hypersurface, if the degrees are derived."""
-        at = f" at eps = {self.at}" if self.at else ""
-        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.exceptional, 1) if self.series]
+        eps_text = f" at eps = {self.at}" if self.at else ""
+        return [f"C{k}: {h.sentence(eps_text)}" for k, h in enumerate(self.exceptional, 1) if self.series]
 
     @property
     def word_text(self) -> str:
@@ -376,22 +378,22 @@ class Patterns:
         if self.running:
             return self.running
         longest = max(self.lengths, default=0)
-        ends = f"all singularity patterns have settled by step {longest}" if longest else "none lowers the degree"
-        return f"{ends}; {self.limit}" if self.limit else ends
+        sentence = f"all singularity patterns have settled by step {longest}" if longest else "none lowers the degree"
+        return f"{sentence}; {self.limit}" if self.limit else sentence
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         data = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
-        series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
+        series = {name: [str(c) for c in coefficients] for name, coefficients in zip(names, self.series, strict=False)}
         exceptional = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.exceptional, strict=False)]
-        maps = self.word.length if self.word_text and self.word else None
+        maps_per_step = self.word.length if self.word_text and self.word else None
         fields = {
             "generating_function": series or None,
             "exceptional_hypersurfaces": exceptional,
             "eps": self.at or None,
         }
-        return {**data, **fields, "maps_a_step": maps}
+        return {**data, **fields, "maps_a_step": maps_per_step}
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
@@ -399,13 +401,13 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     results = set()
     for run in runs:
         if not run.is_dominant:
-            result = _not_dominant(run.eps)
+            result = _patterns_if_not_dominant(run.eps)
         elif run.stopped:
-            result = _unknown(_STOPPED)
+            result = _no_patterns(_STOPPED)
         else:
-            result = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
+            result = _merge_patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
         results.add(result)
-    return results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
+    return results.pop() if len(results) == 1 else _no_patterns(_DIFFERENT)
 
 
 def patterns(
@@ -423,47 +425,47 @@ def patterns(
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
-    result = _unknown("")
+    result = _no_patterns("")
     for attempt in range(_DRAWS if eps is None else 1):
         if attempt and (not result.running or budget.is_spent):
             break
         values = default_eps(map_, seed + attempt) if eps is None else (eps,)
-        stages = budget.share([1] * len(values))
+        budgets = budget.share([1] * len(values))
         # Random points can be attributed to hypersurfaces only if the equations are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
         if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
-                pairs = zip(values, stages, strict=True)
-                runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in pairs]
+                pairs = zip(values, budgets, strict=True)
+                runs = [singularities(map_, value, steps=steps, seed=seed, effort=share) for value, share in pairs]
             except TooLongFormula:
-                return _unknown("the composition is too long for its singularities to be followed")
+                return _no_patterns("the composition is too long for its singularities to be followed")
             result = patterns_of(runs, map_.has_eps)
         else:
             results = set()
-            for value, stage in zip(values, stages, strict=True):
-                limits, equations = _range(map_.dim, steps, stage), map_.at(value).equations
+            for value, share in zip(values, budgets, strict=True):
+                limits, equations = _step_limits(map_.dim, steps, share), map_.at(value).equations
                 rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
                 if not _is_dominant(map_, value):
-                    result_at_eps = _not_dominant(value)
+                    result_at_eps = _patterns_if_not_dominant(value)
                 elif period_of(equations) > 1:
                     outcomes = outcomes_at_random(map_, value, rng, limits)
-                    result_at_eps = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
+                    result_at_eps = _no_patterns(_STOPPED) if limits.budget.is_spent else _merge_patterns(0, outcomes)
                 else:
                     try:
                         degree, hypersurfaces = exceptional_hypersurfaces(map_, value, rng, limits)
-                        result_at_eps = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
+                        result_at_eps = _merge_patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrbitDataUnknown as error:
-                        result_at_eps = _unknown(_STOPPED if limits.budget.is_spent else str(error))
+                        result_at_eps = _no_patterns(_STOPPED if limits.budget.is_spent else str(error))
                 results.add(result_at_eps)
-            result = results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
+            result = results.pop() if len(results) == 1 else _no_patterns(_DIFFERENT)
     return result
 
 
-def _digits(map_: MapFamily, eps: fmpq) -> int:
+def _count_digits(map_: MapFamily, eps: fmpq) -> int:
     return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + map_.digits
 
 
-def _most_digits(dim: int, budget: Budget) -> int:
+def _max_digits(dim: int, budget: Budget) -> int:
     """Return the largest number of digits for which the budget allows formulas, at least 50."""
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
@@ -471,55 +473,55 @@ def _most_digits(dim: int, budget: Budget) -> int:
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
     """Return whether the dimension and the number of digits of map and eps are small enough for `singularities`."""
     map_ = as_map(system)
-    return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, budget)
+    return map_.dim <= MAX_DIMENSION and _count_digits(map_, eps) <= _max_digits(map_.dim, budget)
 
 
-def _not_dominant(eps: fmpq) -> Patterns:
-    return _unknown(f"the map is not dominant at eps = {format_number(eps)}, so that no singularity is followed")
+def _patterns_if_not_dominant(eps: fmpq) -> Patterns:
+    return _no_patterns(f"the map is not dominant at eps = {format_number(eps)}, so that no singularity is followed")
 
 
-def _unknown(reason: str) -> Patterns:
+def _no_patterns(reason: str) -> Patterns:
     return Patterns((), None, None, reason)
 
 
-def _patterns(
-    map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "", word: Word | None = None
+def _merge_patterns(
+    map_degree: int, hypersurfaces: Sequence[Hypersurface], eps_text: str = "", word: Word | None = None
 ) -> Patterns:
     maps_per_step = 1 if word is None else word.length
     # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
-    critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
-    for h in critical:
+    exceptional = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
+    for h in exceptional:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
         if h.status == UNDECIDED:
-            return _unknown(f"the pattern of {name} is undecided: {h.note or 'its series ended'}")
+            return _no_patterns(f"the pattern of {name} is undecided: {h.note or 'its series ended'}")
         if h.settled_at is None:
-            return _unknown(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
-    lengths = {h.settled_at for h in critical if h.settled_at}
-    unconfined_steps = [h.followed for h in critical if h.status != CONFINED]
+            return _no_patterns(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
+    lengths = {h.settled_at for h in exceptional if h.settled_at}
+    unconfined_steps = [h.followed for h in exceptional if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
-    if all(h.orbit_data.is_settled and h.degree for h in critical) and map_degree > 0:
-        if needed([h.orbit_data for h in critical]) is None:
-            return _unknown(
+    if all(h.orbit_data.is_settled and h.degree for h in exceptional) and map_degree > 0:
+        if needed_hypersurfaces([h.orbit_data for h in exceptional]) is None:
+            return _no_patterns(
                 "some images lie in a hypersurface that lowers the degree at all steps, with unknown multiplicities"
             )
         degrees = (map_degree,) if word is None else word.degrees
         fraction = degree_series(
-            degrees, [(h.degree, h.orbit_data) for h in critical], [h.stage or 0 for h in critical]
+            degrees, [(h.degree, h.orbit_data) for h in exceptional], [h.stage or 0 for h in exceptional]
         )
         if maps_per_step > 1:
             try:
                 fraction = every_nth(fraction, maps_per_step)
             except ArithmeticError as error:
-                return _unknown(f"{error}: those of the degrees of a composition")
+                return _no_patterns(f"{error}: those of the degrees of a composition")
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
         tuple(sorted({-(-length // maps_per_step) for length in lengths})),
         min((steps // maps_per_step for steps in unconfined_steps), default=None),
-        any(h.status == CONFINED for h in critical),
+        any(h.status == CONFINED for h in exceptional),
         "",
         series,
-        tuple(critical),
-        at,
+        tuple(exceptional),
+        eps_text,
         word,
     )
 
@@ -529,10 +531,10 @@ def steps_by_default(dim: int) -> int:
     return _DEFAULT_STEPS.get(dim, _LEAST_STEPS)
 
 
-def _range(dim: int, steps: int | None, budget: Budget) -> Range:
-    reach, series_steps = steps or steps_by_default(dim), steps or _SERIES_STEPS.get(dim, _LEAST_SERIES_STEPS)
+def _step_limits(dim: int, steps: int | None, budget: Budget) -> StepLimits:
+    total, series_steps = steps or steps_by_default(dim), steps or _SERIES_STEPS.get(dim, _LEAST_SERIES_STEPS)
     repeating_steps = steps or min(series_steps, _REPEATING_STEPS.get(dim, series_steps))
-    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, series_steps, budget, repeating_steps)
+    return StepLimits(min(total, steps or FIRST_STEPS, _MOST_SHOWN), total, series_steps, budget, repeating_steps)
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
@@ -560,8 +562,8 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
     if not as_map(system).has_eps:
         return (fmpq(1),)
     rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).subject)}")
-    first = fmpq(rng.randint(2, 9), 11)
-    return first, fmpq(rng.randint(2, 11), 13)
+    first_eps = fmpq(rng.randint(2, 9), 11)
+    return first_eps, fmpq(rng.randint(2, 11), 13)
 
 
 def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:

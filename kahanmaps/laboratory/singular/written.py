@@ -25,7 +25,7 @@ from kahanmaps.algebra.polynomials import degree_in, ring
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import InputError, counted
-from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.following import StepLimits
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, HypersurfaceForm, Tracking, outcome_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.equation import Equation
@@ -63,34 +63,34 @@ def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceF
     If the determinant is too large, the degree is None, and the list has only the poles and infinity.
     """
     forms, _, denominator = map_
-    by_text: dict[str, HypersurfaceForm] = {}
+    forms_by_text: dict[str, HypersurfaceForm] = {}
     for factor, _ in factored(denominator):
         if not is_infinity(factor):
-            by_text[str(factor)] = HypersurfaceForm(factor, True, 0)
+            forms_by_text[str(factor)] = HypersurfaceForm(factor, True, 0)
     if map_.degree <= 1:
-        return list(by_text.values()), 0
+        return list(forms_by_text.values()), 0
     critical_degree = len(forms) * (map_.degree - 1)
-    critical = _critical_factors(forms, critical_degree)
-    if critical is None:
+    critical_factors = _critical_factors(forms, critical_degree)
+    if critical_factors is None:
         infinity = forms[0].context().gens()[-1]
-        poles = [HypersurfaceForm(form.form, form.divides_denominator, None) for form in by_text.values()]
+        poles = [HypersurfaceForm(form.form, form.divides_denominator, None) for form in forms_by_text.values()]
         return [*poles, HypersurfaceForm(infinity, False, None)], None
-    for factor, multiplicity in critical:
-        by_text[str(factor)] = HypersurfaceForm(factor, str(factor) in by_text, multiplicity)
-    return list(by_text.values()), critical_degree
+    for factor, multiplicity in critical_factors:
+        forms_by_text[str(factor)] = HypersurfaceForm(factor, str(factor) in forms_by_text, multiplicity)
+    return list(forms_by_text.values()), critical_degree
 
 
 def followed_forms(
     map_: HomogeneousMap, forms: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
     """Return the forms whose zeros a map contracts, and the forms in the common factor of the minors."""
-    contracted = [replace(form, stage=stage) for form in forms if form.multiplicity]
-    common = [] if map_.factor.is_constant() else factored(map_.factor)
-    return contracted, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in common]
+    contracted_forms = [replace(form, stage=stage) for form in forms if form.multiplicity]
+    minor_factors = [] if map_.factor.is_constant() else factored(map_.factor)
+    return contracted_forms, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in minor_factors]
 
 
 def followed_map_by_map(
-    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits, progress: Callable[[str], None]
 ) -> tuple[Word, list[Hypersurface]] | None:
     """Return the hypersurfaces that the maps of a composition contract at one exact eps, and the `Word` of these maps.
 
@@ -99,28 +99,28 @@ def followed_map_by_map(
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
-    letters = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
-    by_letter = [poles_and_critical_factors(letter) for letter in letters]
-    if any(degree is None for _, degree in by_letter):
+    maps = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
+    forms_by_map = [poles_and_critical_factors(h) for h in maps]
+    if any(degree is None for _, degree in forms_by_map):
         return None
-    followed = [
-        followed_forms(letter, hypersurfaces, k)
-        for k, (letter, (hypersurfaces, _)) in enumerate(zip(letters, by_letter, strict=True))
+    followed_by_map = [
+        followed_forms(h, hypersurfaces, k)
+        for k, (h, (hypersurfaces, _)) in enumerate(zip(maps, forms_by_map, strict=True))
     ]
-    critical = [form for part, _ in followed for form in part]
-    of_minors = [form for _, part in followed for form in part]
-    limits = replace(limits, shown=min(limits.shown * period, limits.reach))
+    critical_forms = [form for forms, _ in followed_by_map for form in forms]
+    of_minors = [form for _, forms in followed_by_map for form in forms]
+    limits = replace(limits, first_steps=min(limits.first_steps * period, limits.max_steps))
     hypersurfaces = []
-    for stage, (forms, _) in enumerate(by_letter):
+    for stage, (forms, _) in enumerate(forms_by_map):
         for factor in forms:
             if not factor.multiplicity or limits.budget.is_spent:
                 continue
             text = name_of(factor.form, map_)
             progress(f"following {text[:40]}")
             hypersurfaces.append(
-                outcome_of(map_, eps, factor, text, rng, limits, Tracking(critical, of_minors, stage, period))
+                outcome_of(map_, eps, factor, text, rng, limits, Tracking(critical_forms, of_minors, stage, period))
             )
-    return Word(tuple(letter.degree for letter in letters), len(equations) // period), hypersurfaces
+    return Word(tuple(h.degree for h in maps), len(equations) // period), hypersurfaces
 
 
 def is_long(map_: Map) -> bool:
@@ -152,11 +152,11 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
     if _is_short(size, degree):
         rows = [[*(form.derivative(j) for j in range(size)), zero] for form in forms]
         return factored(kernel_minors(rows, counted_product)[-1])
-    finite = factors_at_finite_points(forms)
-    if finite is None:
+    finite_factors = factors_at_finite_points(forms)
+    if finite_factors is None:
         return None
     factors = []
-    for factor, k in finite:
+    for factor, k in finite_factors:
         total = degree_in(factor, size)
         terms = {(*m[: size - 1], total - sum(m[:size]), *m[size:]): c for m, c in factor.terms()}
         factors.append((context.from_dict(terms), k))
@@ -178,27 +178,27 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
 
     def multiply(polynomial: Any, power: int) -> None:
         for factor, k in factored(polynomial):
-            _, before = multiplicities.get(str(factor), (factor, 0))
-            multiplicities[str(factor)] = factor, before + power * k
+            _, earlier_power = multiplicities.get(str(factor), (factor, 0))
+            multiplicities[str(factor)] = factor, earlier_power + power * k
 
     multiply(denominator, n + 1)
     rows = []
     for numerator in numerators:
         count_work(10 * (len(numerator) + len(denominator)))
-        common = numerator.gcd(denominator)
-        P, Q = numerator / common, denominator / common
+        common_factor = numerator.gcd(denominator)
+        P, Q = numerator / common_factor, denominator / common_factor
         row = [counted_product(Q, P.derivative(j)) - counted_product(P, Q.derivative(j)) for j in range(n)]
         count_work(sum(map(len, row)))
         content = reduce(lambda left, right: left.gcd(right), row)
         multiply(Q, -2)
         multiply(content, 1)
         rows.append([*(None if entry.is_zero() else entry / content for entry in row), None])
-    products = 0
+    product_count = 0
 
     def require_few(pairs: list[tuple[Any, Any]]) -> None:
-        nonlocal products
-        products += sum(len(entry) * len(minor) for entry, minor in pairs)
-        if products > _MAX_PRODUCTS:
+        nonlocal product_count
+        product_count += sum(len(entry) * len(minor) for entry, minor in pairs)
+        if product_count > _MAX_PRODUCTS:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
@@ -241,8 +241,8 @@ def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) 
     for hypersurface in hypersurfaces:
         if hypersurface.stage not in polynomials:
             polynomials[hypersurface.stage] = _generic_polynomials(map_, eps, hypersurface.stage)
-        generic = polynomials[hypersurface.stage].get(hypersurface.polynomial, "")
-        result.append(replace(hypersurface, generic=generic))
+        generic_text = polynomials[hypersurface.stage].get(hypersurface.polynomial, "")
+        result.append(replace(hypersurface, generic=generic_text))
     return tuple(result)
 
 
@@ -260,19 +260,19 @@ def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[
             rows = map_.parts[stage].map.inverse_rows if map_.parts[stage].is_inverse else map_.parts[stage].map.rows
         except InputError:
             return {}
-    n, at_eps, forms = len(variables), ring((*variables, "Z")), forms_over_eps(rows)
-    size = max(degree_in(form, n + 1) for form in forms) - 1
-    factors = (_critical_factors(forms, (n + 1) * size) or []) if size > 0 else []
-    affine_ring, named = ring((*variables, "eps")), {}
+    n, ring_at_eps, forms = len(variables), ring((*variables, "Z")), forms_over_eps(rows)
+    reduced_degree = max(degree_in(form, n + 1) for form in forms) - 1
+    factors = (_critical_factors(forms, (n + 1) * reduced_degree) or []) if reduced_degree > 0 else []
+    affine_ring, polynomials_by_name = ring((*variables, "eps")), {}
     for factor, _ in factors:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
             continue
-        value = factor.compose(*at_eps.gens(), at_eps.constant(eps), ctx=at_eps)
+        value = factor.compose(*ring_at_eps.gens(), ring_at_eps.constant(eps), ctx=ring_at_eps)
         factors_at_eps = factored(value)
         if len(factors_at_eps) == 1 and factors_at_eps[0][1] == 1:
             text = format_polynomial(affine_ring.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
-            named[name_of(factors_at_eps[0][0], map_)] = text
-    return named
+            polynomials_by_name[name_of(factors_at_eps[0][0], map_)] = text
+    return polynomials_by_name
 
 
 def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None) -> list[fmpq_mpoly]:
@@ -283,14 +283,14 @@ def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None
     n = len(rows)
     context = ring((*(f"x{k + 1}" for k in range(n)), "Z", "eps"))
     degree = max(degree_in(entry, n) for row in rows for entry in row)
-    *X, symbol = context.gens()
-    value = symbol if eps is None else context.constant(eps)
+    *X, eps_variable = context.gens()
+    value = eps_variable if eps is None else context.constant(eps)
 
-    def form(entry: fmpq_mpoly) -> fmpq_mpoly:
+    def homogenize(entry: fmpq_mpoly) -> fmpq_mpoly:
         terms = {(*m[:n], degree - sum(m[:n]), m[-1]): c for m, c in entry.terms()}
         return context.from_dict(terms).compose(*X, value, ctx=context)
 
-    minors = kernel_minors([[form(entry) for entry in row] for row in rows], counted_product)
+    minors = kernel_minors([[homogenize(entry) for entry in row] for row in rows], counted_product)
     count_work(5 * sum(map(len, minors)))
-    common = reduce(fmpq_mpoly.gcd, minors)
-    return [minor / common for minor in minors]
+    common_factor = reduce(fmpq_mpoly.gcd, minors)
+    return [minor / common_factor for minor in minors]

@@ -27,9 +27,9 @@ from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import (
     SolutionComponent,
     decoupling,
+    maximal_components,
     normal_form,
     solve_system,
-    without_contained,
 )
 from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty, Finding, combined
@@ -145,10 +145,10 @@ class CommutingSystems(PrintableResult):
     @property
     def kind_text(self) -> str:
         """A phrase for the fields g among which the search ran."""
-        over = f" over the number field of a {self.root}" if self.root else ""
+        field_text = f" over the number field of a {self.root}" if self.root else ""
         if self.shape == "linear":
-            return f"fields g = B f (B a constant {'matrix' if over else 'rational matrix'}{over})"
-        return f"fields g of degree at most 2{over or ' with rational coefficients'}"
+            return f"fields g = B f (B a constant {'matrix' if field_text else 'rational matrix'}{field_text})"
+        return f"fields g of degree at most 2{field_text or ' with rational coefficients'}"
 
     @property
     def nontrivial(self) -> list[CommutingField]:
@@ -268,71 +268,71 @@ class _Search:
             result.basis = list(self.space.fields)
             result.dimension = len(result.basis) if len(result.basis) == self.space.dimension else None
             dimension = self.space.dimension
-            everything = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
+            all_fields = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
             # If f is affine, the space may be large, and often all its g commute: this is proved without equations.
             if (
                 result.dimension is not None
                 and f.degree <= 1
                 and proof_by_affine_lemma(f, self.space.fields) is not None
             ):
-                self._add_family(everything, certify_family(f, self.space, everything, self.settings))
+                self._add_family(all_fields, certify_family(f, self.space, all_fields, self.settings))
             elif dimension > MAX_SPACE:
                 result.undecided.append(
                     f"the fields g with [f, g] = 0 have dimension {'up to ' * (result.dimension is None)}{dimension}, "
                     f"and equations are solved up to {MAX_SPACE}"
                 )
             else:
-                self._solve(everything, 0)
+                self._solve(all_fields, 0)
         zeros = [fmpq(0)] * (len(self.space.fields) - 1)
-        trivial = [(fmpq(first), *zeros) for first in (0, 1, -1)]
-        isolated = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
+        trivial_points = [(fmpq(f_weight), *zeros) for f_weight in (0, 1, -1)]
+        isolated_points = [c.point for c in maximal_components([*self.families, *self.points]) if not c.free]
         # Each -g directly follows g in the list.
-        signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in isolated if p not in trivial}
-        others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
-        for k, weights in enumerate([*trivial, *others]):
-            if self.budget.is_spent and weights not in trivial:
-                result.undecided.append(f"{counted(len(others) + 3 - k, 'solution')} not certified: {SPENT}")
+        signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in isolated_points if p not in trivial_points}
+        sorted_points = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
+        for k, weights in enumerate([*trivial_points, *sorted_points]):
+            if self.budget.is_spent and weights not in trivial_points:
+                result.undecided.append(f"{counted(len(sorted_points) + 3 - k, 'solution')} not certified: {SPENT}")
                 return
-            self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
+            self.settings.progress(f"solution {k + 1} of {len(sorted_points) + 3}")
             finding = certify_field(f, field_at(self.space, weights), self.settings)
             if finding.verdict is Certainty.REFUTED:
                 result.discarded += 1
             elif finding.verdict is Certainty.UNDECIDED:
                 result.undecided.append(f"one solution: {finding.evidence.summary}")
             else:
-                result.solutions.append(self._field(weights, finding))
+                result.solutions.append(self._build_field(weights, finding))
                 self._report()
 
     def _report(self) -> None:
         """Call `on_result` with a copy of the solutions so far."""
         result = self.result
-        lists: dict[str, Any] = {"solutions": [*result.solutions], "families": [*result.families]}
-        self.on_result(replace(result, **lists, undecided=[*result.undecided, UNFINISHED]))
+        copied_lists: dict[str, Any] = {"solutions": [*result.solutions], "families": [*result.families]}
+        self.on_result(replace(result, **copied_lists, undecided=[*result.undecided, UNFINISHED]))
 
-    def _solve(self, part: SolutionComponent, level: int) -> None:
-        """Solve the equations of order `ORDERS[level]` on a part of the space."""
-        order, result = ORDERS[level], self.result
-        self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
+    def _solve(self, region: SolutionComponent, order_index: int) -> None:
+        """Solve the equations of order `ORDERS[order_index]` on a region of the space."""
+        order, result = ORDERS[order_index], self.result
+        self.settings.progress(f"equations at eps^{order}, {len(region.free)} unknowns")
         result.order = max(result.order, order)
         rng = random.Random(f"commuting {self.settings.seed} {order}")
-        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self.budget)
-        equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
-        gens = part.values[0].context().gens()
+        equations = commutator_equations(self.f, self.space.fields, region.values, order, rng, self.budget)
+        equations = [*region.equations, *(normal_form(p, region.equations) for p in equations)]
+        gens = region.values[0].context().gens()
         # New coordinates in which each equation has few unknowns. They are used at the first level only: later parts
         # have further equations, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
-        if T is not None and level == 0:
+        if T is not None and order_index == 0:
             zero = gens[0].context().constant(0)
             old_coordinates = [
                 sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))
             ]
             equations = [p.compose(*old_coordinates, ctx=zero.context()) for p in equations]
-            part = SolutionComponent(tuple(v.compose(*old_coordinates, ctx=zero.context()) for v in part.values))
-        solutions = solve_system(equations, part.values, self.budget)
+            region = SolutionComponent(tuple(v.compose(*old_coordinates, ctx=zero.context()) for v in region.values))
+        solutions = solve_system(equations, region.values, self.budget)
         result.irrational += [text for text in solutions.irrational if text not in result.irrational]
         self.points += [component for component in solutions.components if not component.free]
         for family in [component for component in solutions.components if component.free]:
-            if any(known.contains(family) for known in self.families):
+            if any(known_family.contains(family) for known_family in self.families):
                 continue
             if self.budget.is_spent:
                 self._report_unsolved(family, SPENT)
@@ -341,24 +341,24 @@ class _Search:
             finding = certify_family(self.f, self.space, family, self.settings)
             if finding.verdict is not Certainty.REFUTED:
                 self._add_family(family, finding)
-            elif level + 1 < len(ORDERS) and not self.budget.is_spent:
-                self._solve(family, level + 1)
+            elif order_index + 1 < len(ORDERS) and not self.budget.is_spent:
+                self._solve(family, order_index + 1)
             else:
                 result.undecided.append(
                     f"a family with {len(family.free)} parameters solves the equations up to eps^{order}, "
                     "and not all of it commutes"
                 )
         for component in solutions.unsolved:
-            if level + 1 < len(ORDERS) and not self.budget.is_spent:
-                self._solve(component, level + 1)
+            if order_index + 1 < len(ORDERS) and not self.budget.is_spent:
+                self._solve(component, order_index + 1)
             else:
                 self._report_unsolved(component, solutions.reason)
 
-    def _report_unsolved(self, part: SolutionComponent, reason: str) -> None:
+    def _report_unsolved(self, region: SolutionComponent, reason: str) -> None:
         """Report equations that were not solved: a message for each of the first few, then one for all others."""
-        texts = [format_polynomial(p) for p in part.equations]
-        shown = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
-        message = f"equations for b1, ..., b{len(part.values)} were not solved over Q ({reason}): {shown}"
+        texts = [format_polynomial(p) for p in region.equations]
+        equations_text = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
+        message = f"equations for b1, ..., b{len(region.values)} were not solved over Q ({reason}): {equations_text}"
         if message in self.result.undecided:
             return
         if len(self.result.undecided) < MAX_MESSAGES:
@@ -371,25 +371,24 @@ class _Search:
             self.result.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
             return
         # A family of a higher order, which is found later, may contain earlier families.
-        kept = [k for k, known in enumerate(self.families) if not family.contains(known)]
-        self.families = [*(self.families[k] for k in kept), family]
-        self.result.families = [self.result.families[k] for k in kept]
+        kept_indices = [k for k, known_family in enumerate(self.families) if not family.contains(known_family)]
+        self.families = [*(self.families[k] for k in kept_indices), family]
+        self.result.families = [self.result.families[k] for k in kept_indices]
         # Reduce the directions, and take as the base the member that is zero at their pivots.
         direction_matrix, _ = fmpq_mat([family.direction(i) for i in family.free]).rref()
         base = list(family.point)
         for row in direction_matrix.tolist():
-            lead = next(k for k, entry in enumerate(row) if entry != 0)
-            base = [b - base[lead] * entry for b, entry in zip(base, row, strict=True)]
+            pivot = next(k for k, entry in enumerate(row) if entry != 0)
+            base = [b - base[pivot] * entry for b, entry in zip(base, row, strict=True)]
         directions = [tuple(fmpq(e) for e in primitive_integers(tuple(row))) for row in direction_matrix.tolist()]
-        self.result.families.append(
-            CommutingFamily(self._field(base, finding), tuple(self._field(d, finding) for d in directions), finding)
-        )
+        base_field, *fields = (self._build_field(weights, finding) for weights in (base, *directions))
+        self.result.families.append(CommutingFamily(base_field, tuple(fields), finding))
         self._report()
 
-    def _field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
+    def _build_field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
         matrix = combination_of(weights, self.space.matrices) if self.space.matrices else None
         g = field_at(self.space, weights)
-        names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
+        names = [name for name, multiple in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(multiple)]
         return CommutingField(g, matrix, names[0] if names else "", finding)
 
 
@@ -442,23 +441,25 @@ def find_commuting(
         rhs = (sum((coordinates[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
         return QuadraticSystem(tuple(rhs), f.symbols)
 
-    def over_field(g: CommutingField) -> CommutingField:
+    def descend_field(g: CommutingField) -> CommutingField:
         return replace(g, system=descend(g.system), B=None)
 
-    def descended(result: CommutingSystems) -> CommutingSystems:
+    def descend_all(result: CommutingSystems) -> CommutingSystems:
         return replace(
             result,
             system=f,
             basis=[descend(G) for G in result.basis],
             dimension=None if result.dimension is None else result.dimension // m,
-            solutions=[over_field(g) for g in result.solutions],
+            solutions=[descend_field(g) for g in result.solutions],
             families=[
-                replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
+                replace(
+                    family, base=descend_field(family.base), directions=tuple(map(descend_field, family.directions))
+                )
                 for family in result.families
             ],
             irrational=[],  # irrational solutions are defined over extensions of the field only
             root=str(map_.root),
         )
 
-    options["on_result"] = lambda result: on_result(descended(result))
-    return descended(commuting_systems(over_algebra(over_t, minimal_polynomial), shape or "linear", **options, C=C))
+    options["on_result"] = lambda result: on_result(descend_all(result))
+    return descend_all(commuting_systems(over_algebra(over_t, minimal_polynomial), shape or "linear", **options, C=C))

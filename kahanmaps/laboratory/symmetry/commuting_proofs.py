@@ -44,22 +44,22 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
     >>> str(certify_field(f, f.scaled(-1), Settings()).verdict), str(certify_field(f, f.scaled(2), Settings()).verdict)
     ('proved', 'refuted')
     """
-    claim, certified = "the Kahan maps of f and g commute", {"system": f, "commute": g}
-    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
+    claim, certified_objects = "the Kahan maps of f and g commute", {"system": f, "commute": g}
+    for factor, text in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
         if g == f.scaled(factor):
-            evidence = Evidence(theorems.METHOD, why)
-            return Finding(claim, theorems.PROVED, evidence, formula=_FORMULA, certified=certified)
+            evidence = Evidence(theorems.METHOD, text)
+            return Finding(claim, theorems.PROVED, evidence, formula=_FORMULA, certified=certified_objects)
     count_work(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
-    proof = theorems.commuting_by_splitting(f, g) or proof_by_affine_lemma(f, [g]) or _in_dimension_one(f, g)
-    return certify(claim, identity, settings, proof, formula=_FORMULA, certified=certified)
+    proof = theorems.commuting_by_splitting(f, g) or proof_by_affine_lemma(f, [g]) or _proof_in_dimension_one(f, g)
+    return certify(claim, identity, settings, proof, formula=_FORMULA, certified=certified_objects)
 
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """Certify that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     count_work(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.direction(i)) for i in family.free)]
-    proof = proof_by_affine_lemma(f, members) or _in_dimension_one(f, f)
+    proof = proof_by_affine_lemma(f, members) or _proof_in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"
     return certify(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
 
@@ -72,49 +72,51 @@ def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem])
         name, pairs = "g", [(fields[0], f)]
     else:
         return None
-    n, count = f.dim, 2 * f.dim + 1
-    identity, holds = QQ.identity(n), True
+    n, eps_count = f.dim, 2 * f.dim + 1
+    identity, is_symmetric = QQ.identity(n), True
     for a, h in pairs:  # test at enough values of eps whether the affine Kahan map of a is a symmetry of h
-        checked, k = 0, 0
-        while holds and checked < count:
+        checked_count, k = 0, 0
+        while is_symmetric and checked_count < eps_count:
             k += 1
             matrix = identity - a.B * fmpq(1, k)
             if matrix.det() != 0:
                 P = matrix.solve(identity + a.B * fmpq(1, k))
                 q = matrix.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
-                holds = h.composed(P, q.entries()) == h.transformed(P)
-                checked += 1
-    equation = f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps"
-    return theorems.evidence("the lemma of affine maps", [(f"{name} is affine", True), (equation, holds)])
+                is_symmetric = h.composed(P, q.entries()) == h.transformed(P)
+                checked_count += 1
+    equation = f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {eps_count} values of eps"
+    return theorems.evidence("the lemma of affine maps", [(f"{name} is affine", True), (equation, is_symmetric)])
 
 
-def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+def _proof_in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     if f.dim > 1:
         return None
-    proportional = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
-    return theorems.evidence("the lemma of Moebius maps", [("f and g are proportional, in dimension 1", proportional)])
+    are_proportional = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
+    return theorems.evidence(
+        "the lemma of Moebius maps", [("f and g are proportional, in dimension 1", are_proportional)]
+    )
 
 
 def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent) -> Identity:
     """State commutativity as an identity in x, the free parameters and eps."""
-    n, free = f.dim, family.free
+    n, free_indices = f.dim, family.free
     zero = family.values[0].context().constant(0)
-    table = combination(space.fields, family.values, zero)
+    coefficients = combination(space.fields, family.values, zero)
     # The free parameters are the symbols of g.
-    symbols = [f"{''.join(f.variables)}{k}" for k in range(len(free))]
+    symbols = [f"{''.join(f.variables)}{k}" for k in range(len(free_indices))]
     joint = ring((*f.variables, *symbols))
-    parameters = dict(zip(free, joint.gens()[n:], strict=True))
+    parameters = dict(zip(free_indices, joint.gens()[n:], strict=True))
     arguments = [parameters.get(k, joint.constant(0)) for k in range(len(family.values))]
     weights = [value.compose(*arguments, ctx=joint) for value in family.values]
     rhs = [0 * joint.gen(0)] * n
     for weight, g in zip(weights, space.fields, strict=True):
-        rhs = [total + weight * p.compose(*joint.gens()[:n], ctx=joint) for total, p in zip(rhs, g.rhs, strict=True)]
-    first, second = KahanFamily(f), KahanFamily(QuadraticSystem(tuple(rhs), tuple(symbols)))
+        rhs = [entry + weight * p.compose(*joint.gens()[:n], ctx=joint) for entry, p in zip(rhs, g.rhs, strict=True)]
+    family_f, family_g = KahanFamily(f), KahanFamily(QuadraticSystem(tuple(rhs), tuple(symbols)))
 
     def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
-        phi_f, phi_g, x = first.at(eps, field), second.at(eps, field, point[n:]), point[:n]
+        phi_f, phi_g, x = family_f.at(eps, field), family_g.at(eps, field, point[n:]), point[:n]
         return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
 
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
-    subject = (f.rhs, table, free)
-    return Identity(n + len(free), sides, None, *labels, subject=subject)
+    identity_key = (f.rhs, coefficients, free_indices)
+    return Identity(n + len(free_indices), sides, None, *labels, subject=identity_key)

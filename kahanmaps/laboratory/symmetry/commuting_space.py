@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.small_systems import independent
+from kahanmaps.algebra.small_systems import echelon_basis
 from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -62,13 +62,13 @@ def combination(systems: Sequence[QuadraticSystem], weights: Sequence[Any], zero
     >>> combination([f, f], [fmpq(2), fmpq(1)], fmpq(0))
     [[3, 0, -3]]
     """
-    tables = [coefficients_of(system) for system in systems]
-    total = [[zero for _ in row] for row in tables[0]]
-    for weight, table in zip(weights, tables, strict=True):
+    coefficient_tables = [coefficients_of(system) for system in systems]
+    sums = [[zero for _ in row] for row in coefficient_tables[0]]
+    for weight, coefficients in zip(weights, coefficient_tables, strict=True):
         if weight != 0:
-            for i, row in enumerate(table):
-                total[i] = [a + weight * c if c != 0 else a for a, c in zip(total[i], row, strict=True)]
-    return total
+            for i, row in enumerate(coefficients):
+                sums[i] = [a + weight * c if c != 0 else a for a, c in zip(sums[i], row, strict=True)]
+    return sums
 
 
 def commutator_equations(
@@ -91,18 +91,18 @@ def commutator_equations(
     [b^3 - b]
     """
     n = f.dim
-    of_f = _SeriesMap(coefficients_of(f), n)
-    of_g = _SeriesMap(combination(basis, weights, weights[0].context().constant(0)), n)
+    map_of_f = _SeriesMap(coefficients_of(f), n)
+    map_of_g = _SeriesMap(combination(basis, weights, weights[0].context().constant(0)), n)
     equations: list[fmpq_mpoly] = []
-    idle = 0
-    while idle < 2 and not budget.is_spent:
+    idle_count = 0
+    while idle_count < 2 and not budget.is_spent:
         point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
-        left, right = of_f.step(of_g.step(x)), of_g.step(of_f.step(x))
-        new = [a - b for u, v in zip(left, right, strict=True) for a, b in zip(u, v, strict=True)]
-        spanned = independent([*equations, *(p for p in new if isinstance(p, fmpq_mpoly))])
-        idle = idle + 1 if len(spanned) == len(equations) else 0
-        equations = spanned
+        f_after_g, g_after_f = map_of_f.step(map_of_g.step(x)), map_of_g.step(map_of_f.step(x))
+        commutator = [a - b for u, v in zip(f_after_g, g_after_f, strict=True) for a, b in zip(u, v, strict=True)]
+        spanning_equations = echelon_basis([*equations, *(p for p in commutator if isinstance(p, fmpq_mpoly))])
+        idle_count = idle_count + 1 if len(spanning_equations) == len(equations) else 0
+        equations = spanning_equations
     return equations
 
 
@@ -120,18 +120,18 @@ class _SeriesMap:
         # that no linear system has to be solved.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
-        terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
+        term_counts = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
         for order in range(len(y)):
             lengths = [len(e) if isinstance(e, fmpq_mpoly) else 1 for row in (*y[: order + 1], *v) for e in row]
-            count_work((order + 1) * (2 * len(terms_of) + sum(terms_of) * sum(lengths) / len(lengths) / 2))
+            count_work((order + 1) * (2 * len(term_counts) + sum(term_counts) * sum(lengths) / len(lengths) / 2))
             value = [fmpq(0)] * len(y[0])
             for i, terms in enumerate(self._terms):
                 for c, j, k in terms:
                     for a in range(order + 1):
                         product = y[a][j] * y[order - a][k]
                         if a < order:
-                            w = v[order - 1 - a]
-                            product = product + y[a][j] * w[k] + y[a][k] * w[j]
+                            earlier_v = v[order - 1 - a]
+                            product = product + y[a][j] * earlier_v[k] + y[a][k] * earlier_v[j]
                         if product != 0:
                             value[i] = value[i] + c * product
             v.append(value)
@@ -220,17 +220,17 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                     zero, defect = 0 * g.rhs[0], list[fmpq]()
                     for i, j in itertools.product(range(n), repeat=2):
                         terms = (C[i, k] * g.rhs[k].derivative(j) - C[k, j] * g.rhs[i].derivative(k) for k in range(n))
-                        total = sum(terms, zero)
-                        defect += [fmpq(total[tuple(int(l == k) for l in range(n))]) for k in range(n + 1)]
+                        polynomial = sum(terms, zero)
+                        defect += [fmpq(polynomial[tuple(int(l == k) for l in range(n))]) for k in range(n + 1)]
                     defects.append(defect)
                 combinations = nullspace(QQ, fmpq_mat(defects).transpose())
                 fields = [system_of(f.variables, combination(fields, w, fmpq(0))) for w in combinations]
                 matrices = [combination_of(w, matrices) for w in combinations] if matrices else []
             # Replace one member of the basis by f, and move f to the front.
-            flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
-            (relation,) = nullspace(QQ, flat)
-            replaced = max(k for k in range(len(fields)) if relation[k] != 0)
-            other_indices = [k for k in range(len(fields)) if k != replaced]
+            flat_matrix = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
+            (relation,) = nullspace(QQ, flat_matrix)
+            replaced_index = max(k for k in range(len(fields)) if relation[k] != 0)
+            other_indices = [k for k in range(len(fields)) if k != replaced_index]
             identity = [QQ.identity(n)] if matrices else []
             basis = (f, *(fields[k] for k in other_indices))
             return CommutingSpace(basis, (*identity, *(matrices[k] for k in other_indices if matrices)), len(basis))
@@ -252,8 +252,8 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
 
 def _independent_components(f: QuadraticSystem) -> list[int]:
     """Return the indices of the first components of f that span all components."""
-    reduced, count = fmpq_mat(coefficients_of(f)).transpose().rref()
-    return [next(j for j in range(f.dim) if reduced[i, j] != 0) for i in range(count)]
+    reduced_matrix, rank = fmpq_mat(coefficients_of(f)).transpose().rref()
+    return [next(j for j in range(f.dim) if reduced_matrix[i, j] != 0) for i in range(rank)]
 
 
 def field_at(space: CommutingSpace, weights: Sequence[fmpq]) -> QuadraticSystem:

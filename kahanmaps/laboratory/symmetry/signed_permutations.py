@@ -26,9 +26,6 @@ MAX_DIMENSION = 12
 MAX_FOUND = 1_000  # in dimension 6 there are 720 permutations
 
 
-Table = dict[tuple[int, ...], fmpq]  # keys: the component of f, then the variables of the monomial
-
-
 def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[list[fmpq_mat], bool]:
     """Search for S with f_2(S x) = sign S f_2(x), where f_2 are the quadratic terms, or for affine f the linear terms.
 
@@ -40,14 +37,36 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     >>> [S.tolist() for S in signed_permutations(f, 1, Budget())[0]]
     [[[1, 0], [0, 1]], [[0, 4], [1/4, 0]]]
     """
-    matrices: list[fmpq_mat] = []
     # A translation never changes the terms of highest degree, but it changes the linear terms of a quadratic f.
     n, size = f.dim, 2 if f.degree <= 1 else 3
     forms = [f.B] if size == 2 else f.Q
     entries = (((i, j, k)[-size:], form[j, k]) for i, form in enumerate(forms) for j in range(n) for k in range(n))
-    table: Table = {index: value for index, value in entries if value != 0}
-    base, scales, numbers = _balance(table, n)
-    for permutation in _signed_permutations_of(numbers, n, sign, budget):
+    # The keys are the component of f, then the variables of the monomial.
+    coefficients = {index: value for index, value in entries if value != 0}
+    # The scales e_i are products of powers of coprime integers b, with the exponents `scales`. In y_i = e_i x_i the
+    # coefficient has the logarithm log |c| + row . log e, with e the shortest least-squares solution.
+    base = _coprime_base(integer for c in coefficients.values() for integer in (abs(c.p), c.q))
+    logarithms = [[fmpq(_exponent(c.p, b) - _exponent(c.q, b)) for b in base] for c in coefficients.values()]
+    scales = [[fmpq(0)] * len(base) for _ in range(n)]
+    if base:
+        M = fmpq_mat([[fmpq((index[0] == k) - index[1:].count(k)) for k in range(n)] for index in coefficients])
+        L, G = fmpq_mat(logarithms), M.transpose() * M
+        right_side = M.transpose() * L
+        for j in range(len(base)):
+            equations = fmpq_mat([[*(G * G).tolist()[i], right_side[i, j]] for i in range(n)])
+            special_solution = next(v for v in reversed(nullspace(QQ, equations)) if v[-1] != 0)
+            shortest_solution = G * fmpq_mat(n, 1, [w / special_solution[-1] for w in special_solution[:-1]])
+            for i in range(n):
+                scales[i][j] = shortest_solution[i, 0]
+        logarithms = (L + M * fmpq_mat(scales)).tolist()
+    # A coefficient in y, irrational in general, is represented by its sign times an index of its absolute value.
+    indices: dict[tuple[fmpq, ...], int] = {}
+    numbers = {
+        key: indices.setdefault(tuple(row), len(indices) + 1) * (1 if c > 0 else -1)
+        for (key, c), row in zip(coefficients.items(), logarithms, strict=True)
+    }
+    matrices: list[fmpq_mat] = []
+    for permutation in _search_signed_permutations(numbers, n, sign, budget):
         if permutation is None or len(matrices) >= MAX_FOUND:
             return matrices, False
         S = fmpq_mat(n, n)
@@ -60,49 +79,21 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     return matrices, True
 
 
-def _balance(table: Table, n: int) -> tuple[list[fmpz], list[list[fmpq]], dict[tuple[int, ...], int]]:
-    """Return coprime integers b, the exponents of each b in the scales e_i, and the coefficients in y_i = e_i x_i.
-
-    A coefficient in y is represented by its sign times an index of its absolute value, which is irrational in general.
-    """
-    base = _coprime_base(part for c in table.values() for part in (abs(c.p), c.q))
-    # In y the coefficient has the logarithm log |c| + row . log e, with e the shortest least-squares solution.
-    logarithms = [[fmpq(_exponent(c.p, b) - _exponent(c.q, b)) for b in base] for c in table.values()]
-    rows = [[fmpq((index[0] == k) - index[1:].count(k)) for k in range(n)] for index in table]
-    scales = [[fmpq(0)] * len(base) for _ in range(n)]
-    if base:
-        M, L = fmpq_mat(rows), fmpq_mat(logarithms)
-        G = M.transpose() * M
-        right = M.transpose() * L
-        for j in range(len(base)):
-            system = fmpq_mat([[*(G * G).tolist()[i], right[i, j]] for i in range(n)])
-            special = next(v for v in reversed(nullspace(QQ, system)) if v[-1] != 0)
-            shortest = G * fmpq_mat(n, 1, [w / special[-1] for w in special[:-1]])
-            for i in range(n):
-                scales[i][j] = shortest[i, 0]
-        logarithms = (L + M * fmpq_mat(scales)).tolist()
-    sizes: dict[tuple[fmpq, ...], int] = {}
-    numbers = {}
-    for (index, c), row in zip(table.items(), logarithms, strict=True):
-        numbers[index] = sizes.setdefault(tuple(row), len(sizes) + 1) * (1 if c > 0 else -1)
-    return base, scales, numbers
-
-
 def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
     """Return pairwise coprime integers > 1, no perfect powers, such that all given ones are products of powers."""
-    waiting, base = list(integers), list[fmpz]()
-    while waiting:
-        number = waiting.pop()
+    remaining_integers, base = list(integers), list[fmpz]()
+    while remaining_integers:
+        number = remaining_integers.pop()
         if number == 1:
             continue
-        other = next((b for b in base if b.gcd(number) > 1), None)
-        if other is not None:
-            common = other.gcd(number)
-            base.remove(other)
-            waiting += [number // common, common, other // common]
+        base_element = next((b for b in base if b.gcd(number) > 1), None)
+        if base_element is not None:
+            divisor = base_element.gcd(number)
+            base.remove(base_element)
+            remaining_integers += [number // divisor, divisor, base_element // divisor]
         elif number.is_perfect_power():
             k = next(k for k in range(2, number.bit_length() + 1) if number.root(k) ** k == number)
-            waiting.append(number.root(k))
+            remaining_integers.append(number.root(k))
         else:
             base.append(number)
     return sorted(base)
@@ -116,7 +107,7 @@ def _exponent(number: fmpz, b: fmpz) -> int:
     return count
 
 
-def _signed_permutations_of(
+def _search_signed_permutations(
     numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
     """Yield the signed permutations that preserve a table of numbers, as images and signs; None at the work limit."""
@@ -130,11 +121,11 @@ def _signed_permutations_of(
         for last in range(n)
     ]
 
-    def fits(p: list[int], s: list[int]) -> bool:
-        for checked, index in enumerate(equations[len(p) - 1], 1):
+    def is_consistent(p: list[int], s: list[int]) -> bool:
+        for checked_count, index in enumerate(equations[len(p) - 1], 1):
             image = numbers.get(tuple(p[k] for k in index), 0) * math.prod(s[k] for k in index)
             if image != numbers.get(index, 0) * sign:
-                count_work(2 + 1.5 * checked)
+                count_work(2 + 1.5 * checked_count)
                 return False
         count_work(2 + 1.5 * len(equations[len(p) - 1]))
         return True
@@ -145,9 +136,9 @@ def _signed_permutations_of(
         elif len(p) == n:
             yield list(zip(p, s, strict=True))
         else:
-            choices = (([*p, image], [*s, t]) for image in range(n) if image not in p for t in (1, -1))
-            for images, signs in choices:
-                if fits(images, signs):
+            extensions = (([*p, image], [*s, t]) for image in range(n) if image not in p for t in (1, -1))
+            for images, signs in extensions:
+                if is_consistent(images, signs):
                     yield from extend(images, signs)
 
     return extend([], [])

@@ -153,22 +153,22 @@ class Symmetries(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        signed = self.group_of != MATRICES
-        forward = sum(not t.reversing for t in self.signed) if signed else (self.order or 0) - self.reversing_order
+        is_signed = self.group_of != MATRICES
+        count = sum(not t.reversing for t in self.signed) if is_signed else (self.order or 0) - self.reversing_order
         group = {
             "of": self.group_of,
             "order": self.order,
-            "symmetries": forward,
+            "symmetries": count,
             "reversing_symmetries": self.reversing_order,
             **attributes(self, "generators"),
         }
-        listed = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
+        lists = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
         return {
             "status": "complete" if self.complete else "undecided",
             **attributes(self, "infinitesimal", "scaling"),
             "group": group,
-            "listed": sum(map(len, listed.values())),
-            **plain(listed),
+            "listed": sum(map(len, lists.values())),
+            **plain(lists),
             **attributes(self, "searched", "undecided"),
         }
 
@@ -204,16 +204,16 @@ def linear_symmetries(
     symmetries = Symmetries(system)
     on_result(symmetries)
     progress("infinitesimal symmetries")
-    _add_infinitesimal(symmetries)
+    _add_lie_algebra(symmetries)
     progress("signed permutations")
-    _add_signed(symmetries, budget)
+    _add_signed_permutations(symmetries, budget)
     if system.dim <= MAX_GENERAL:
         progress("all matrices")
-        _add_general(symmetries, budget)
+        _add_matrices(symmetries, budget)
     return symmetries
 
 
-def _add_infinitesimal(symmetries: Symmetries) -> None:
+def _add_lie_algebra(symmetries: Symmetries) -> None:
     f = symmetries.system
     n = f.dim
     if n > MAX_LINEAR:
@@ -229,60 +229,60 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
     columns.append([-p for p in f.rhs])
     # One row for each component and each monomial.
     rows: dict[tuple[int, tuple[int, ...]], list[fmpq]] = {}
-    for place, column in enumerate(columns):
+    for column_index, column in enumerate(columns):
         for k, p in enumerate(column):
             for monomial, value in p.terms():
-                rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[place] = value
-    table = list(rows.values()) or [[fmpq(0)] * len(columns)]
-    count_work(200 + len(table) * len(columns) * (3 + len(columns) / 50))
+                rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[column_index] = value
+    equations = list(rows.values()) or [[fmpq(0)] * len(columns)]
+    count_work(200 + len(equations) * len(columns) * (3 + len(columns) / 50))
     # In echelon form from the right, with s last, the linear fields come first and span all linear fields.
-    basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
+    basis = nullspace(QQ, fmpq_mat([row[:-1] for row in equations]))
 
-    def infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
+    def build_infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
         return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
 
-    symmetries.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
-    scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
+    symmetries.infinitesimal = [build_infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
+    scalings = [v for v in nullspace(QQ, fmpq_mat(equations)) if v[-1] != 0]
     if f.is_homogeneous:  # S = I is a scaling, preferred to all others
         symmetries.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
-        symmetries.scaling = infinitesimal([e / vector[-1] for e in vector[:-1]], 1)
+        symmetries.scaling = build_infinitesimal([e / vector[-1] for e in vector[:-1]], 1)
     symmetries.searched.append("affine infinitesimal symmetries and scalings: all")
 
 
-def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
+def _add_signed_permutations(symmetries: Symmetries, budget: Budget) -> None:
     f = symmetries.system
     if f.dim > MAX_SIGNED:
         symmetries.undecided.append(
             f"signed permutations are tried up to dimension {MAX_SIGNED}, not in dimension {f.dim}"
         )
         return
-    done = True
+    is_complete = True
     for sign in (1, -1):
-        matrices, finished = signed_permutations(f, sign, budget)
-        done = done and finished
+        matrices, is_finished = signed_permutations(f, sign, budget)
+        is_complete = is_complete and is_finished
         for S in matrices:
             if budget.is_spent:
-                done = False
+                is_complete = False
                 break
             r = translation(f, S, sign, budget)
             if r is not None:
                 symmetries.signed.append(Symmetry(f.variables, S, r, sign < 0))
     symmetries.signed.sort(key=lambda t: (t.reversing, not t.is_trivial, any(e != 0 for e in t.r)))
-    if not done:
+    if not is_complete:
         symmetries.undecided.append(
             "not all signed permutations were tried: they are too many, or the work limit was reached; raise --effort"
         )
         return
     symmetries.searched.append("signed permutations, with a translation: all")
-    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 all are symmetry and reversing
+    symmetries.order = len({_matrix_key(t.S) for t in symmetries.signed})  # for f = 0 all are symmetry and reversing
     if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
         symmetries.group_of = SCALED
-    symmetries.generators = _generators(symmetries.signed)
+    symmetries.generators = _find_generators(symmetries.signed)
 
 
-def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
+def _find_generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
     """Return a minimal set of elements whose linear parts generate all linear parts, high orders first."""
 
     def order(matrix: fmpq_mat) -> int:
@@ -292,34 +292,34 @@ def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
         return count
 
     generators: list[Symmetry] = []
-    group = _generated([], len(elements[0].r))
+    group = _generate_group([], len(elements[0].r))
     for element in sorted(elements, key=lambda t: -order(t.S)):
-        if _key(element.S) not in group:
+        if _matrix_key(element.S) not in group:
             generators.append(element)
-            group = _generated([t.S for t in generators], len(element.r))
+            group = _generate_group([t.S for t in generators], len(element.r))
     for element in list(generators):
-        others = [t for t in generators if t is not element]
-        if len(_generated([t.S for t in others], len(element.r))) == len(group):
-            generators = others
+        other_generators = [t for t in generators if t is not element]
+        if len(_generate_group([t.S for t in other_generators], len(element.r))) == len(group):
+            generators = other_generators
     return generators
 
 
-def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
+def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
     """Return the finite group that the matrices generate."""
-    waiting = [QQ.identity(n)]
-    group = {_key(waiting[0])}
-    while waiting:
-        element = waiting.pop()
+    new_elements = [QQ.identity(n)]
+    group = {_matrix_key(new_elements[0])}
+    while new_elements:
+        element = new_elements.pop()
         for matrix in matrices:
             count_work(5 + n**2)
             product = element * matrix
-            if _key(product) not in group:
-                group.add(_key(product))
-                waiting.append(product)
+            if _matrix_key(product) not in group:
+                group.add(_matrix_key(product))
+                new_elements.append(product)
     return group
 
 
-def _add_general(symmetries: Symmetries, budget: Budget) -> None:
+def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
     """Add all rational S with f(S x) = sign S f(x), from the polynomial equations of S."""
     f = symmetries.system
     n = f.dim
@@ -334,31 +334,31 @@ def _add_general(symmetries: Symmetries, budget: Budget) -> None:
     context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
     gens = context.gens()
     matrix = [list(gens[i * n : (i + 1) * n]) for i in range(n)]
-    known_matrices = {_key(t.S) for t in symmetries.signed if not any(e != 0 for e in t.r)}
-    complete = True
+    known_matrices = {_matrix_key(t.S) for t in symmetries.signed if not any(e != 0 for e in t.r)}
+    is_complete = True
     for sign in (1, -1):
         equations = matrix_equations(f, matrix, sign)
-        solved = solve_system(equations, gens, budget)
-        for component in solved.components:
+        solutions = solve_system(equations, gens, budget)
+        for component in solutions.components:
             # All S of a family are singular, since a family of invertible S would give infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
-            if not component.free and S.det() != 0 and _key(S) not in known_matrices:
+            if not component.free and S.det() != 0 and _matrix_key(S) not in known_matrices:
                 symmetries.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
-        unsolved = [part for part in solved.unsolved if not is_singular(part, n)]
+        unsolved = [c for c in solutions.unsolved if not is_singular(c, n)]
         if unsolved:
-            complete = False
+            is_complete = False
             symmetries.undecided.append(
-                f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}"
+                f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solutions.reason}"
             )
-    if complete:
+    if is_complete:
         symmetries.searched.append("rational matrices S, without a translation: all")
     # Without infinitesimal symmetries the affine group is finite, and so are the groups that its elements generate.
-    if complete and symmetries.others and symmetries.order is not None and not symmetries.infinitesimal:
-        symmetries.generators = _generators([*symmetries.signed, *symmetries.others])
-        symmetries.order, symmetries.group_of = len(_generated([t.S for t in symmetries.generators], n)), MATRICES
+    if is_complete and symmetries.others and symmetries.order is not None and not symmetries.infinitesimal:
+        symmetries.generators = _find_generators([*symmetries.signed, *symmetries.others])
+        symmetries.order, symmetries.group_of = len(_generate_group([t.S for t in symmetries.generators], n)), MATRICES
 
 
-def _key(matrix: fmpq_mat) -> tuple[str, ...]:
+def _matrix_key(matrix: fmpq_mat) -> tuple[str, ...]:
     return tuple(str(e) for e in matrix.entries())
 
 
@@ -392,26 +392,26 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     if is_symmetry(f, S, zero, sign):
         return zero
     # f''(S x, r) + B S x = sign S B x is linear in r, with one equation for each entry of a matrix.
-    missing = (S * f.B * fmpq(sign) - f.B * S).entries()
+    defects = (S * f.B * fmpq(sign) - f.B * S).entries()
     derivatives = [(form * S * fmpq(2)).transpose() for form in f.Q]
-    rows = [[*(derivatives[i][j, k] for k in range(n)), -missing[i * n + j]] for i in range(n) for j in range(n)]
+    rows = [[*(derivatives[i][j, k] for k in range(n)), -defects[i * n + j]] for i in range(n) for j in range(n)]
     solutions = nullspace(QQ, fmpq_mat(rows))
     if not any(v[-1] != 0 for v in solutions):
         return None
-    (special,) = [v for v in solutions if v[-1] != 0]
+    (special_solution,) = [v for v in solutions if v[-1] != 0]
     directions = [v for v in solutions if v[-1] == 0]
     # Among the solutions r the condition f(r) = sign S c decides.
     parameters = ring([f"t{k + 1}" for k in range(len(directions) + 1)])
     gens = parameters.gens()
-    r = [parameters.constant(special[k] / special[-1]) for k in range(n)]
+    r = [parameters.constant(special_solution[k] / special_solution[-1]) for k in range(n)]
     for t, v in zip(gens, directions, strict=False):
         r = [a + t * v[k] for k, a in enumerate(r)]
     constants = (S * fmpq_mat(n, 1, list(f.c)) * fmpq(sign)).entries()
     equations = [p.compose(*r, ctx=parameters) - value for p, value in zip(f.rhs, constants, strict=True)]
-    solved = solve_system([*equations, gens[-1]], r, budget)
-    if not solved.components:
+    solution_set = solve_system([*equations, gens[-1]], r, budget)
+    if not solution_set.components:
         return None
-    point = solved.components[0].point
+    point = solution_set.components[0].point
     return point if is_symmetry(f, S, point, sign) else None
 
 
@@ -427,14 +427,14 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
     """
     n, entries = f.dim, [entry for row in S for entry in row]
     count_work(100 + 10 * n**4)
-    joint = ring([f"x{j}" for j in range(n)] + [f"s{k}" for k in range(n * n)])
-    x, s = joint.gens()[:n], joint.gens()[n:]
-    images = [sum((s[i * n + j] * x[j] for j in range(n)), joint.constant(0)) for i in range(n)]
-    *at_x, divergence = (p.compose(*x, ctx=joint) * fmpq(sign) for p in (*f.rhs, f.divergence))
-    sides = [sum((s[i * n + a] * at_x[a] for a in range(n)), joint.constant(0)) for i in range(n)]
+    joint_ring = ring([f"x{j}" for j in range(n)] + [f"s{k}" for k in range(n * n)])
+    x, s = joint_ring.gens()[:n], joint_ring.gens()[n:]
+    images = [sum((s[i * n + j] * x[j] for j in range(n)), joint_ring.constant(0)) for i in range(n)]
+    *f_at_x, divergence = (p.compose(*x, ctx=joint_ring) * fmpq(sign) for p in (*f.rhs, f.divergence))
+    right_sides = [sum((s[i * n + a] * f_at_x[a] for a in range(n)), joint_ring.constant(0)) for i in range(n)]
     differences = [
-        p.compose(*images, ctx=joint) - side
-        for p, side in zip((*f.rhs, f.divergence), (*sides, divergence), strict=True)
+        p.compose(*images, ctx=joint_ring) - side
+        for p, side in zip((*f.rhs, f.divergence), (*right_sides, divergence), strict=True)
     ]
     context = entries[0].context()
     values = [context.constant(0)] * n + entries

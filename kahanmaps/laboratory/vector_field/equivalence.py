@@ -65,12 +65,12 @@ class Equivalence(ResultPart):
         values = ", ".join(f"{name} = {format_number(value)}" for name, value in self.parameters.items())
         images = linear_combinations(self.P, ring(self.variables).gens())
         point = ", ".join(format_polynomial(image + q) for image, q in zip(images, self.q, strict=True))
-        change = f"after ({', '.join(self.variables)}) -> ({point})"
+        change_text = f"after ({', '.join(self.variables)}) -> ({point})"
         if self.P == QQ.identity(len(self.q)) and not any(e != 0 for e in self.q):
-            change = "with its variables called " + ", ".join(self.variables)
-        factor = "-" if self.c == -1 else f"{format_number(1 / self.c)}*"
-        eps_text = "" if self.c == 1 else f", with {factor}eps in place of eps"
-        return f"equivalent to {self.name}{f' at {values}' if values else ''} {change}{eps_text}"
+            change_text = "with its variables called " + ", ".join(self.variables)
+        factor_text = "-" if self.c == -1 else f"{format_number(1 / self.c)}*"
+        eps_text = "" if self.c == 1 else f", with {factor_text}eps in place of eps"
+        return f"equivalent to {self.name}{f' at {values}' if values else ''} {change_text}{eps_text}"
 
     def __str__(self) -> str:
         return self.text
@@ -108,7 +108,7 @@ def equivalent_system(
     # The candidates: systems of the catalogue, frames, and permutations of the variables, None if P is any matrix.
     catalogue, candidates = _load_catalogue(f.dim), list[tuple[_CatalogueSystem, fmpq_mat, tuple[int, ...] | None]]()
     budget = budget_for("equivalent systems", effort)
-    for frame in _frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
+    for frame in _candidate_frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
         monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
         for g in catalogue:
             if sorted(map(len, monomials)) != sorted(map(len, g.monomials)):
@@ -150,16 +150,16 @@ def _load_catalogue(dim: int) -> tuple[_CatalogueSystem, ...]:
 
     Systems with more than dim + 2 parameters are left out: nearly every system is equivalent to a member of these.
     """
-    systems, dimensions = [], titles()
+    systems, titles_by_name = [], titles()
     for name in names():
-        if dimensions[name][0] != dim:
+        if titles_by_name[name][0] != dim:
             continue
         file = load(name)
         if len(file.parameters) <= dim + 2:
             system = with_symbols(file, tuple(file.parameters))
             if system.degree >= 2:
                 systems.append(_CatalogueSystem(name, system, dict(file.parameters), _quadratic_monomials(system)))
-    return tuple(sorted(systems, key=lambda entry: len(entry.defaults)))
+    return tuple(sorted(systems, key=lambda catalogue_system: len(catalogue_system.defaults)))
 
 
 def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
@@ -167,7 +167,7 @@ def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
     return tuple(frozenset(tuple(m[:n]) for m in p.monoms() if sum(m[:n]) == 2) for p in f.rhs)
 
 
-def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
+def _candidate_frames(f: QuadraticSystem, search: FixedPointSearch) -> Iterator[fmpq_mat]:
     """Yield matrices F such that f in the coordinates F x may look like a system of the catalogue; the first is I."""
     n = f.dim
 
@@ -177,13 +177,13 @@ def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
 
     yield QQ.identity(n)
     normals = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
-    yield from itertools.islice(_invertible(normals, n), MAX_FRAMES)
-    lines = [component for component in fixed.found if component.dimension == 1 and not component.equations]
+    yield from itertools.islice(_bases_among(normals, n), MAX_FRAMES)
+    lines = [component for component in search.found if component.dimension == 1 and not component.equations]
     directions = [[sum(linear_coefficients(value), fmpq(0)) for value in line.coordinates] for line in lines]
-    yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
+    yield from (columns.transpose().inv() for columns in itertools.islice(_bases_among(directions, n), MAX_FRAMES))
 
 
-def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
+def _bases_among(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
     """Yield the invertible matrices whose rows are n of the vectors."""
     matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
     return (matrix for matrix in matrices if matrix.det() != 0)
@@ -206,20 +206,20 @@ def _solve_for_equivalence(
     count_work(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
     # If there are infinitely many solutions, unknowns are set to their defaults in this order.
-    scales = [f"t{i}{j}" for i, j in entries]
-    unknowns = ring(["c", *(f"q{i}" for i in range(n)), *scales, *(f"a{k}" for k in g.defaults)])
+    entry_names = [f"t{i}{j}" for i, j in entries]
+    unknowns = ring(["c", *(f"q{i}" for i in range(n)), *entry_names, *(f"a{k}" for k in g.defaults)])
     defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
     defaults += g.defaults.values()
-    highest, lower = _equivalence_equations(f, g, frame, entries, unknowns)
+    highest_equations, lower_equations = _equivalence_equations(f, g, frame, entries, unknowns)
     # First without scaling and translation: the equations for the parameters are then usually linear.
     default_equations = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     fixed_shift, fixed_scale = default_equations[: n + 1], default_equations[n + 1 :][: len(entries)]
-    untranslated = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
-    for fixed in (untranslated,) if is_scaled else ([*fixed_shift, *fixed_scale], [*untranslated, *fixed_scale]):
-        solved = solve_system([*highest, *fixed], unknowns.gens(), budget)
-        for component in (*solved.components, *solved.unsolved):
-            equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
-            for point in _points([*equations, *component.equations], component.values, defaults, budget):
+    shift = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
+    for conditions in (shift,) if is_scaled else ([*fixed_shift, *fixed_scale], [*shift, *fixed_scale]):
+        solutions = solve_system([*highest_equations, *conditions], unknowns.gens(), budget)
+        for component in (*solutions.components, *solutions.unsolved):
+            equations = [p.compose(*component.values, ctx=unknowns) for p in lower_equations]
+            for point in _rational_solutions([*equations, *component.equations], component.values, defaults, budget):
                 c, q, values = point[0], point[1 : n + 1], point[n + 1 + len(entries) :]
                 T = fmpq_mat(n, n)
                 for (i, j), t in zip(entries, point[n + 1 :], strict=False):
@@ -253,25 +253,25 @@ def _equivalence_equations(
     P0 = [[sum((T[i][k] * frame[k, j] for k in range(n)), zero) for j in range(n)] for i in range(n)]
     images = [sum((P0[i][j] * c * x[j] for j in range(n)), q[i]) for i in range(n)]
     images += joint.gens()[2 * n + 1 + len(entries) :]  # the parameters
-    at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
-    sides = [sum((P0[i][j] * at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
+    f_at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
+    sides = [sum((P0[i][j] * f_at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
     differences = [p.compose(*images, ctx=joint) - side for p, side in zip(g.system.rhs, sides, strict=True)]
     differences.append(g.system.divergence.compose(*images, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
-    highest: list[fmpq_mpoly] = []
-    lower: list[fmpq_mpoly] = []
+    highest_equations: list[fmpq_mpoly] = []
+    lower_equations: list[fmpq_mpoly] = []
     for k, difference in enumerate(differences):
-        by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # in x
+        terms_by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # in x
         for monomial, value in difference.terms():
             exponents = tuple(int(e) for e in monomial)
-            by_monomial.setdefault(exponents[:n], {})[exponents[n:]] = value
-        for in_x, terms in by_monomial.items():  # c^degree divides the coefficient
-            degree = sum(in_x)
+            terms_by_monomial.setdefault(exponents[:n], {})[exponents[n:]] = value
+        for x_exponents, terms in terms_by_monomial.items():  # c^degree divides the coefficient
+            degree = sum(x_exponents)
             equation = unknowns.from_dict(terms) / unknowns.gen(0) ** degree
-            (highest if degree == (2 if k < n else 1) else lower).append(equation)
-    return highest, lower
+            (highest_equations if degree == (2 if k < n else 1) else lower_equations).append(equation)
+    return highest_equations, lower_equations
 
 
-def _points(
+def _rational_solutions(
     equations: Sequence[fmpq_mpoly],
     values: Sequence[fmpq_mpoly],
     defaults: Sequence[fmpq],
@@ -280,11 +280,11 @@ def _points(
 ) -> Iterator[list[fmpq]]:
     """Yield rational solutions, one from each family; a solution is the `values` at a zero of the equations."""
     context = values[0].context()
-    solved = solve_system([p for p in equations if not p.is_zero()], values, budget)
-    for component in solved.components:
+    solutions = solve_system([p for p in equations if not p.is_zero()], values, budget)
+    for component in solutions.components:
         yield [evaluate(value, QQ, defaults) for value in component.values]
-    for part in solved.unsolved if depth < _MAX_DEPTH and not budget.is_spent else ():
-        i = part.free[0]
+    for unsolved in solutions.unsolved if depth < _MAX_DEPTH and not budget.is_spent else ():
+        i = unsolved.free[0]
         for value in (defaults[i], defaults[i] + 1):
-            fixed = [*part.equations, context.gen(i) - value]
-            yield from _points(fixed, part.values, defaults, budget, depth + 1)
+            fixed_equations = [*unsolved.equations, context.gen(i) - value]
+            yield from _rational_solutions(fixed_equations, unsolved.values, defaults, budget, depth + 1)

@@ -54,15 +54,15 @@ class FixedPoints(ResultPart):
     @property
     def where(self) -> str:
         """A phrase: "fixed point (1, 0)", "line of fixed points (x, 0)", "2 fixed points (x, 1) with x^2 - 2 = 0"."""
-        point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
-        kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
+        point_text = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
+        kind_text = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:
-            return f"{kind} of fixed points {point}" if self.dimension else f"fixed point {point}"
-        size = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
-        size = size or counted(self.count or 0, "fixed point")
+            return f"{kind_text} of fixed points {point_text}" if self.dimension else f"fixed point {point_text}"
+        count_text = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
+        count_text = count_text or counted(self.count or 0, "fixed point")
         if len(self.equations) > len(self.coordinates):  # the basis is not shorter than the equations f = 0
-            return f"{size} {point} with f = 0{'' if self.count is None else ', not rational'}"
-        return f"{size} {point} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
+            return f"{count_text} {point_text} with f = 0{'' if self.count is None else ', not rational'}"
+        return f"{count_text} {point_text} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
 
     @property
     def eigenvalues_text(self) -> str:
@@ -92,8 +92,8 @@ class FixedPoints(ResultPart):
             have_same_eigenvalues = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
             return True if have_same_eigenvalues else None
         context = self.coordinates[0].context()
-        at_eps = self.eigenvalues.compose(context.constant(1 / eps), *context.gens(), ctx=context)
-        value = normal_form(at_eps, self.equations)
+        determinant_at_eps = self.eigenvalues.compose(context.constant(1 / eps), *context.gens(), ctx=context)
+        value = normal_form(determinant_at_eps, self.equations)
         if value.is_constant():
             return not value.is_zero()
         basis = groebner([*self.equations, value], Budget(_UNITS)) if self.equations else None
@@ -154,38 +154,38 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
         return FixedPointSearch((), f"they are computed up to dimension {MAX_DIMENSION}")
     context = ring(system.variables)
     budget = budget_for("fixed points", effort)
-    solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
-    components, undecided = [_points_of(system, part, []) for part in solved.components], ""
-    for part in (*solved.conjugate, *solved.unsolved):
-        basis = None if part in solved.without_basis else groebner(part.equations, budget)
+    solutions = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
+    components, undecided = [_points_of(system, component, []) for component in solutions.components], ""
+    for component in (*solutions.conjugate, *solutions.unsolved):
+        basis = None if component in solutions.without_basis else groebner(component.equations, budget)
         if basis is None:
-            undecided = solved.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
+            undecided = solutions.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
         elif not any(p.is_constant() for p in basis):
-            components.append(_points_of(system, part, basis))
+            components.append(_points_of(system, component, basis))
     return FixedPointSearch(tuple(components), undecided)
 
 
 def _points_of(system: QuadraticSystem, component: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
     """Return the fixed points on one component, whose equations have this Groebner basis."""
-    leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
-    free = sorted({*component.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
+    leading_monomials = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
+    free_variables = sorted({*component.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
     # The dimension is the largest number of variables such that no leading monomial contains only these.
-    sizes = [
+    dimensions = [
         len(subset)
-        for size in range(len(free) + 1)
-        for subset in itertools.combinations(free, size)
-        if not any(all(e == 0 for i, e in enumerate(m) if i not in subset) for m in leading)
+        for size in range(len(free_variables) + 1)
+        for subset in itertools.combinations(free_variables, size)
+        if not any(all(e == 0 for i, e in enumerate(m) if i not in subset) for m in leading_monomials)
     ]
-    dimension = max(sizes)
-    count = len(quotient_monomials(basis, free) or ()) if basis else 1
+    dimension = max(dimensions)
+    count = len(quotient_monomials(basis, free_variables) or ()) if basis else 1
     # det(lambda I - f'), reduced modulo the equations of the points
     n = system.dim
-    letter = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
-    joint = ring([letter, *names_of(component.values[0])])
+    symbol = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
+    joint = ring([symbol, *names_of(component.values[0])])
     eigenvalue, *x = joint.gens()
-    at_point = [p.compose(*x, ctx=joint) for p in component.values]
+    coordinates = [p.compose(*x, ctx=joint) for p in component.values]
     rows = [
-        [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*at_point, ctx=joint) for j in range(n)), None]
+        [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*coordinates, ctx=joint) for j in range(n)), None]
         for i, p in enumerate(system.rhs)
     ]
     eigenvalues = normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])

@@ -63,10 +63,10 @@ class SurvivingIntegral:
         """The result as a sentence."""
         if self.verdict == "survives":
             return f"survives to eps^{self.order}"
-        after = f"survives to eps^{self.order}, " if self.order else ""
+        survival_text = f"survives to eps^{self.order}, " if self.order else ""
         if self.verdict == "lost":
-            return f"{after}lost at eps^{self.order + 2}: no polynomial correction of degree <= {self.degree}"
-        return f"{after}not examined at eps^{self.order + 2}: more than {_MAX_UNKNOWNS} unknown coefficients"
+            return f"{survival_text}lost at eps^{self.order + 2}: no polynomial correction of degree <= {self.degree}"
+        return f"{survival_text}not examined at eps^{self.order + 2}: more than {_MAX_UNKNOWNS} unknown coefficients"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +86,12 @@ class ModifiedField(ResultPart):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        even, names = range(0, self.order + 1, 2), ("integral", "verdict", "order", "degree", "corrections")
+        even_orders, names = range(0, self.order + 1, 2), ("integral", "verdict", "order", "degree", "corrections")
         return {
             "order": self.order,
             "variables": list(self.file.variables),
-            "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even],
-            "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even if self.hamiltonian],
+            "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even_orders],
+            "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even_orders if self.hamiltonian],
             "flow_integrals": [attributes(integral, *names) for integral in self.integrals],
         }
 
@@ -100,12 +100,12 @@ class ModifiedField(ResultPart):
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):
-                lines.append(f"eps^{k}\t{name}'\t{_short(component)}")
+                lines.append(f"eps^{k}\t{name}'\t{_short_text(component)}")
         for k in range(0, self.order + 1 if self.hamiltonian else 0, 2):
-            lines.append(f"eps^{k}\tmodified H\t{_short(self.hamiltonian[k])}")
-        lines += [f"proved\t{_short(integral.integral)}\t{integral.sentence}" for integral in self.integrals]
-        nothing = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
-        return lines + nothing
+            lines.append(f"eps^{k}\tmodified H\t{_short_text(self.hamiltonian[k])}")
+        lines += [f"proved\t{_short_text(integral.integral)}\t{integral.sentence}" for integral in self.integrals]
+        remarks = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
+        return lines + remarks
 
     @property
     def text(self) -> str:
@@ -117,7 +117,7 @@ class ModifiedField(ResultPart):
         return self.text
 
 
-def _short(polynomial: fmpq_mpoly) -> str:
+def _short_text(polynomial: fmpq_mpoly) -> str:
     count = len(polynomial)
     return format_polynomial(polynomial) if count <= _SHOWN_TERMS else f"a polynomial of {count} terms (--json has it)"
 
@@ -149,8 +149,26 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         raise InputError(f"found the algebraic number {file.map.root}, expected a system over the rational numbers")
     fields = modified_fields(file.system, order, progress)
     series = () if file.hamiltonian is None else modified_hamiltonian(file.hamiltonian, order)
-    integrals = tuple(_continued(integral, fields, order) for integral in _integrals_of_flow(file, progress))
-    return ModifiedField(file, order, fields, series, integrals)
+    # Independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search.
+    context, candidates = ring(file.variables), []
+    if file.hamiltonian is not None:
+        candidates.append(file.hamiltonian.H)
+    functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
+    progress("searching for integrals of the flow")
+    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
+    for function in functions:
+        if function is not None and function.denominator.is_constant():
+            candidates.append(function.numerator.project_to_context(context))
+    integrals, gradients = list[fmpq_mpoly](), list[list[fmpq]]()
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
+    for candidate in candidates:
+        integral = primitive_part(candidate - candidate[(0,) * file.dim])[1]
+        gradient_at_point = [evaluate(p, QQ, point) for p in gradient(integral)]
+        is_new = rank(QQ, fmpq_mat([*gradients, gradient_at_point])) > len(gradients)
+        if is_new and _derivative(file.system.rhs, [integral])[0].is_zero():
+            integrals.append(integral)
+            gradients.append(gradient_at_point)
+    return ModifiedField(file, order, fields, series, tuple(_continue(I, fields, order) for I in integrals))
 
 
 def modified_fields(
@@ -169,15 +187,15 @@ def modified_fields(
     for n in range(2, order + 2):
         power = _derivative(power, f)  # f'^{n-1} f
         progress(f"the modified field at eps^{n - 1}")
-        rest = [2 * p for p in power]
+        remainder = [2 * p for p in power]
         powers.append([])
         for j in range(2, n + 1):
-            at = n - j  # sum over k of F_k . grad [eps^{n-j-k}] D^{j-1} x
-            terms = [_derivative(fields[k], powers[j - 1][at - k]) for k in range(at + 1)]
-            total = tuple(sum(parts, context.constant(0)) for parts in zip(*terms, strict=True))
-            powers[j].append(total)
-            rest = [r - fmpq(2**j, factorial(j)) * t for r, t in zip(rest, total, strict=True)]
-        fields.append(tuple(r / 2 for r in rest))
+            order_left = n - j  # sum over k of F_k . grad [eps^{n-j-k}] D^{j-1} x
+            terms = [_derivative(fields[k], powers[j - 1][order_left - k]) for k in range(order_left + 1)]
+            coefficient = tuple(sum(summands, context.constant(0)) for summands in zip(*terms, strict=True))
+            powers[j].append(coefficient)
+            remainder = [r - fmpq(2**j, factorial(j)) * t for r, t in zip(remainder, coefficient, strict=True)]
+        fields.append(tuple(r / 2 for r in remainder))
         powers[1].append(fields[-1])
     return tuple(fields)
 
@@ -203,65 +221,42 @@ def _derivative(vector: Field, functions: Sequence[fmpq_mpoly]) -> Field:
     )
 
 
-def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> list[fmpq_mpoly]:
-    """Return independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search."""
-    context, candidates = ring(file.variables), []
-    if file.hamiltonian is not None:
-        candidates.append(file.hamiltonian.H)
-    functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
-    progress("searching for integrals of the flow")
-    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
-    for function in functions:
-        if function is not None and function.denominator.is_constant():
-            candidates.append(function.numerator.project_to_context(context))
-    f, integrals, gradients = file.system.rhs, list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
-    for candidate in candidates:
-        primitive = primitive_part(candidate - candidate[(0,) * file.dim])[1]
-        slope = [evaluate(p, QQ, point) for p in gradient(primitive)]
-        is_new = rank(QQ, fmpq_mat([*gradients, slope])) > len(gradients)
-        if is_new and _derivative(f, [primitive])[0].is_zero():
-            integrals.append(primitive)
-            gradients.append(slope)
-    return integrals
-
-
-def _continued(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
+def _continue(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
     """Return how far an integral of the flow can be continued by polynomials.
 
     All corrections up to an order are unknowns of one linear system: corrections are determined only up to integrals of
     the flow, and the next correction may exist for some choices only.
     """
     names = fields[0][0].context().names()
-    context, top = ring(names), degree(integral)
-    even = [tuple(p.project_to_context(context) for p in one) for one in fields[::2]]
+    context, integral_degree = ring(names), degree(integral)
+    even_fields = [tuple(p.project_to_context(context) for p in components) for components in fields[::2]]
     integral = integral.project_to_context(context)
     # For homogeneous f and I each correction is homogeneous, since eps x is the only quantity of degree 0.
-    is_graded = all(is_homogeneous(p, 2) for p in even[0]) and is_homogeneous(integral, top)
+    is_graded = all(is_homogeneous(p, 2) for p in even_fields[0]) and is_homogeneous(integral, integral_degree)
     columns: list[tuple[int, fmpq_mpoly]] = []
     corrections: tuple[fmpq_mpoly, ...] = ()
     for m in range(1, order // 2 + 1):
-        largest = top + 2 * m
-        for d in range(largest if is_graded else 1, largest + 1):
+        max_degree = integral_degree + 2 * m
+        for d in range(max_degree if is_graded else 1, max_degree + 1):
             columns += [(m, context.from_dict({e: fmpq(1)})) for e in monomials(len(names), d)]
         if len(columns) > _MAX_UNKNOWNS:
-            return SurvivingIntegral(integral, corrections, 2 * m - 2, "not examined", largest)
+            return SurvivingIntegral(integral, corrections, 2 * m - 2, "not examined", max_degree)
         equations: dict[tuple[int, Any], dict[int, fmpq]] = {}
-        for c, (level, monomial) in enumerate([*columns, (0, integral)]):
-            for j in range(max(level, 1), m + 1):
-                for exponent, value in _derivative(even[j - level], [monomial])[0].terms():
+        for c, (order_index, monomial) in enumerate([*columns, (0, integral)]):
+            for j in range(max(order_index, 1), m + 1):
+                for exponent, value in _derivative(even_fields[j - order_index], [monomial])[0].terms():
                     equations.setdefault((j, exponent), {})[c] = value
         matrix = fmpq_mat(max(1, len(equations)), len(columns) + 1)
         for r, row in enumerate(equations.values()):
             for c, value in row.items():
                 matrix[r, c] = value
-        reduced, pivots = matrix.rref()
-        solved = [context.constant(0)] * m
+        reduced_matrix, pivots = matrix.rref()
+        solution = [context.constant(0)] * m
         for r in range(pivots):
-            pivot = next(c for c in range(len(columns) + 1) if reduced[r, c] != 0)
+            pivot = next(c for c in range(len(columns) + 1) if reduced_matrix[r, c] != 0)
             if pivot == len(columns):  # 0 = 1
-                return SurvivingIntegral(integral, corrections, 2 * m - 2, "lost", largest)
-            level, monomial = columns[pivot]
-            solved[level - 1] -= reduced[r, len(columns)] * monomial
-        corrections = tuple(solved)
-    return SurvivingIntegral(integral, corrections, order, "survives", top + order)
+                return SurvivingIntegral(integral, corrections, 2 * m - 2, "lost", max_degree)
+            order_index, monomial = columns[pivot]
+            solution[order_index - 1] -= reduced_matrix[r, len(columns)] * monomial
+        corrections = tuple(solution)
+    return SurvivingIntegral(integral, corrections, order, "survives", integral_degree + order)

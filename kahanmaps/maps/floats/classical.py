@@ -10,7 +10,7 @@ Source: hairer-lubich-wanner-2006 for the methods, their orders and the coeffici
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import reduce
 from math import sqrt
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
-from kahanmaps.maps.floats.steps import SINGULAR, FloatStep, map_step
+from kahanmaps.maps.floats.steps import SINGULAR, FloatStep, Write, map_step
 from kahanmaps.maps.floats.straight_line_program import StepChecks, extreme, is_zero, solve
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import OrbitEnd
@@ -87,11 +87,11 @@ def composition(method: str) -> list[fmpq]:
     """
 
     if method == "yoshida6":
-        side = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
+        weights = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
     else:  # k steps of 1/(k - k^(1/3)), one step back, and k steps again; with k halved on each side
         k = 4 if method == "suzuki4" else 2
-        side = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
-    return [*side, 1 - 2 * sum(side, fmpq(0)), *reversed(side)]
+        weights = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
+    return [*weights, 1 - 2 * sum(weights, fmpq(0)), *reversed(weights)]
 
 
 def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
@@ -100,9 +100,9 @@ def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
     >>> work("midpoint", 100), work("midpoint", 100, 1)
     ((300, 300), (309, 309))
     """
-    what, stages = METHODS[method], len(_IMPLICIT[method][1]) if repeated else 0
-    evaluations = what.evaluations * steps + repeated * (1 + stages * _CAREFUL_ITERATIONS)
-    return evaluations, what.systems * steps + repeated * (1 + _CAREFUL_ITERATIONS)
+    properties, stage_count = METHODS[method], len(_IMPLICIT[method][1]) if repeated else 0
+    evaluations = properties.evaluations * steps + repeated * (1 + stage_count * _CAREFUL_ITERATIONS)
+    return evaluations, properties.systems * steps + repeated * (1 + _CAREFUL_ITERATIONS)
 
 
 class MethodEnsemble(FloatEnsemble):
@@ -131,16 +131,16 @@ class MethodEnsemble(FloatEnsemble):
     ) -> None:
         if method not in METHODS or method == "normal-form" or (method in SEPARABLE and halves is None):
             raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
-        self._made_of = system, rational(eps), method, halves
+        self._step_arguments = system, rational(eps), method, halves
         super().__init__(system, eps, starts, **options)
 
     def _build_step(self) -> None:
-        self._step = method_step(*self._made_of)
+        self._step = method_step(*self._step_arguments)
         self._machine_code: Any = None
 
     def end(self, orbit: int) -> OrbitEnd:
         """Return how one orbit has ended."""
-        end, method = super().end(orbit), self._made_of[2]
+        end, method = super().end(orbit), self._step_arguments[2]
         if self._batch.status[orbit] == SINGULAR and method in IMPLICIT:
             sentence = f"step {end.steps + 1}: Newton's method finds no solution of the equations of {method}"
             return OrbitEnd("singular", end.steps, sentence)
@@ -152,16 +152,41 @@ def method_step(
 ) -> FloatStep:
     """Return the step of a method; see `MethodEnsemble` for the arguments."""
     if method not in _TABLEAUS and method not in IMPLICIT and method not in SEPARABLE:
-        shares = [fmpq(1)] if method == "kahan" else composition(method)
+        parts = [fmpq(1)] if method == "kahan" else composition(method)
         family = KahanFamily(system)
-        return map_step([factor for share in shares for factor in family.at(eps * share).factors])
+        return map_step([factor for part in parts for factor in family.at(eps * part).factors])
     field, h = FieldProgram(system), to_float(2 * eps)
+    if method in _IMPLICIT:
+        return FloatStep(system.dim, _implicit_writer(field, h, *_IMPLICIT[method]))
     if method in SEPARABLE and halves is not None:
-        write = _separable(field, h, halves, method)
-    elif method in _TABLEAUS:
-        write = _explicit(field, h, *_TABLEAUS[method])
+        # Change positions and momenta in turn: positions by h first, or momenta by h/2 before and after them.
+        positions, momenta = halves
+        substeps = [(positions, h), (momenta, h)]
+        if method == "stormer-verlet":
+            substeps = [(momenta, h / 2), (positions, h), (momenta, h / 2)]
+
+        def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+            state = list(x)
+            for group, duration in substeps:
+                slopes = field(state)
+                state = [y + duration * slopes[i] if i in group else y for i, y in enumerate(state)]
+            return state
+
     else:
-        write = _implicit(field, h, *_IMPLICIT[method])
+        rows, weights = _TABLEAUS[method]
+
+        def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+            slopes: list[list[Any]] = []
+
+            def stage_point(factors: Sequence[float]) -> list[Any]:
+                return [
+                    y + _sum(h * a * k[i] for a, k in zip(factors, slopes, strict=True) if a) for i, y in enumerate(x)
+                ]
+
+            for row in rows:
+                slopes.append(field(stage_point(row)))
+            return stage_point(weights)
+
     return FloatStep(system.dim, write)
 
 
@@ -181,8 +206,8 @@ class FieldProgram:
 
     def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> Any:
         """Return f(x), or the sum of its terms of the given degrees."""
-        kept = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
-        return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in kept]
+        selected_terms = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
+        return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in selected_terms]
 
     def jacobian(self, x: Sequence[Any]) -> Any:
         """Return the rows of f'(x)."""
@@ -200,93 +225,50 @@ def _sum(values: Any) -> Any:
     return reduce(lambda a, b: a + b, values, 0.0)
 
 
-Write = Callable[[Sequence[Any], StepChecks], list[Any]]
-
-
-def _explicit(field: FieldProgram, h: float, rows: list[list[float]], weights: list[float]) -> Write:
-    def combined(x: Sequence[Any], factors: Sequence[float], slopes: Sequence[Sequence[Any]]) -> list[Any]:
-        return [x[i] + _sum(h * a * k[i] for a, k in zip(factors, slopes, strict=True) if a) for i in range(len(x))]
-
-    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        slopes: list[list[Any]] = []
-        for row in rows:
-            slopes.append(field(combined(x, row, slopes)))
-        return combined(x, weights, slopes)
-
-    return write
-
-
-def _separable(field: FieldProgram, h: float, halves: tuple[frozenset[int], frozenset[int]], method: str) -> Write:
-    """Change positions and momenta in turn: positions by h first, or momenta by h/2 before and after them."""
-    positions, momenta = halves
-    moves = [(positions, h), (momenta, h)]
-    if method == "stormer-verlet":
-        moves = [(momenta, h / 2), (positions, h), (momenta, h / 2)]
-
-    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        state = list(x)
-        for group, duration in moves:
-            slopes = field(state)
-            state = [y + duration * slopes[i] if i in group else y for i, y in enumerate(state)]
-        return state
-
-    return write
-
-
-def _implicit(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
+def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
     """z_i = h sum_j a_ij f(x + z_j), x~ = x + sum_i w_i z_i; the first z_i is on a parabola through a Kahan step."""
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
         n, stages = len(x), range(len(A))
         nodes = [sum(row) for row in A]
 
-        def matrix(shares: list[list[float]], slopes: Sequence[Any]) -> list[list[Any]]:
-            at = [(r, i) for r in range(len(shares)) for i in range(n)]
-            return [[float((r, i) == (s, j)) - h * shares[r][s] * slopes[s][i][j] for s, j in at] for r, i in at]
+        def matrix(factors: list[list[float]], jacobians: Sequence[Any]) -> list[list[Any]]:
+            """Return the matrix with the blocks delta_rs I - h factors_rs jacobian_s."""
+            pairs = [(r, i) for r in range(len(factors)) for i in range(n)]
+            return [
+                [float((r, i) == (s, j)) - h * factors[r][s] * jacobians[s][i][j] for s, j in pairs] for r, i in pairs
+            ]
 
-        def equations(y: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], list[Any]]:
-            values, rows = [field(part) for part in y], matrix(A, [field.jacobian(part) for part in y])
-            sums = [_sum(h * A[r][s] * values[s][i] for s in stages) for r in stages for i in range(n)]
-            return rows, [a - b for a, b in zip(sums, z, strict=True)]
+        def stage_sums(values: Sequence[Any]) -> list[Any]:
+            return [_sum(h * A[r][s] * values[s][i] for s in stages) for r in stages for i in range(n)]
 
-        def left(d: Sequence[Any]) -> list[Any]:
-            second = [field(d[s * n : s * n + n], (2,)) for s in stages]
-            return [_sum(h * A[r][s] * second[s][i] for s in stages) for r in stages for i in range(n)]
-
-        slopes = [h * entry for entry in field(x)]
-        rows = [[*row, b] for row, b in zip(matrix([[0.5]], [field.jacobian(x)]), slopes, strict=True)]
-        step = solve(rows, lambda: 1.0, StepChecks(False))
-        z = [c * a + c * c * (b - a) for c in nodes for a, b in zip(slopes, step, strict=True)]
-        _newton(x, z, equations, left, checks)
+        euler_step = [h * entry for entry in field(x)]
+        rows = [[*row, b] for row, b in zip(matrix([[0.5]], [field.jacobian(x)]), euler_step, strict=True)]
+        kahan_step = solve(rows, lambda: 1.0, StepChecks(False))
+        z = [c * a + c * c * (b - a) for c in nodes for a, b in zip(euler_step, kahan_step, strict=True)]
+        # Newton's method. Its pivots need no check of their own: an inaccurate elimination only makes it slower.
+        for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
+            points = [[a + w for a, w in zip(x, z[k : k + n], strict=True)] for k in range(0, len(z), n)]
+            values, rows = [field(point) for point in points], matrix(A, [field.jacobian(point) for point in points])
+            residuals = [a - b for a, b in zip(stage_sums(values), z, strict=True)]
+            newton_checks = StepChecks(False)
+            correction = solve([[*row, r] for row, r in zip(rows, residuals, strict=True)], lambda: 1.0, newton_checks)
+            z = [a + b for a, b in zip(z, correction, strict=True)]
+        size = reduce(lambda a, b: extreme("max", a, abs(b)), [*x, *z], 0.0)
+        if checks.careful:
+            for d in correction:
+                if not is_zero(d):
+                    checks.zero = checks.zero | (abs(d) > _STALLED * size)
+            checks.near = True
+        else:
+            checks.good = checks.good & newton_checks.good
+            # The residuals after the last correction d: h a_ij Q(d, d).
+            for residual in stage_sums([field(correction[s * n : s * n + n], (2,)) for s in stages]):
+                if not is_zero(residual):
+                    checks.good = checks.good & (abs(residual) <= _ROUNDING * size)
         return [a + _sum(w * z[s * n + i] for s, w in enumerate(weights)) for i, a in enumerate(x)]
 
     return write
-
-
-def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, checks: StepChecks) -> None:
-    """Improve the increments z of the stages x + z in place, and check that they have converged.
-
-    `equations` returns the rows of the matrix and the residuals at the stages, `left` the residual after a correction.
-    Pivots need no check of their own: an inaccurate elimination only makes Newton's method slower.
-    """
-    n = len(x)
-    for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
-        stages = [[a + w for a, w in zip(x, z[k : k + n], strict=True)] for k in range(0, len(z), n)]
-        rows, residuals = equations(stages)
-        inner = StepChecks(False)
-        change = solve([[*row, r] for row, r in zip(rows, residuals, strict=True)], lambda: 1.0, inner)
-        z[:] = [a + b for a, b in zip(z, change, strict=True)]
-    size = reduce(lambda a, b: extreme("max", a, abs(b)), [*x, *z], 0.0)
-    if checks.careful:
-        for d in change:
-            if not is_zero(d):
-                checks.zero = checks.zero | (abs(d) > _STALLED * size)
-        checks.near = True
-    else:
-        checks.good = checks.good & inner.good
-        for rest in left(change):
-            if not is_zero(rest):
-                checks.good = checks.good & (abs(rest) <= _ROUNDING * size)
 
 
 def separated(
@@ -312,16 +294,16 @@ def separated(
                 neighbours[i].add(j)
                 neighbours[j].add(i)
     color: dict[int, int] = {}
-    for first in range(n):
-        waiting = [(first, 0)] if first not in color else []
-        while waiting:
-            i, side = waiting.pop()
+    for start in range(n):
+        stack = [(start, 0)] if start not in color else []
+        while stack:
+            i, expected_color = stack.pop()
             if i in color:
-                if color[i] != side:
+                if color[i] != expected_color:
                     return f"H is not of the form T(p) + V(q): {names[i]} would be a position and a momentum"
                 continue
-            color[i] = side
-            waiting += [(j, 1 - side) for j in sorted(neighbours[i])]
+            color[i] = expected_color
+            stack += [(j, 1 - expected_color) for j in sorted(neighbours[i])]
     return frozenset(i for i in color if color[i] == 0), frozenset(i for i in color if color[i] == 1)
 
 

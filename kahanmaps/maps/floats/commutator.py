@@ -39,15 +39,17 @@ class Commutator:
 
     def lines(self) -> list[str]:
         """Return the result as sentences, which say that the numbers are measured."""
-        sizes = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
+        sizes_text = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
         if not self.by_step:
             return [f"measured\t{self.message}"]
-        lines = [f"measured\t|Phi_g Phi_f^n x - Phi_f^n Phi_g x|: {sizes}; largest {self.largest:.2g}"]
+        lines = [f"measured\t|Phi_g Phi_f^n x - Phi_f^n Phi_g x|: {sizes_text}; largest {self.largest:.2g}"]
         if self.by_eps and self.slope is None:
             lines.append("measured\tat n = 1 it is rounding for all eps")
         elif self.slope is not None:
-            first, last = self.by_eps[0], self.by_eps[-1]
-            text = f"{first[1]:.2g} at eps = {format_number(first[0])} to {last[1]:.2g} at {format_number(last[0])}"
+            (first_eps, first_size), (last_eps, last_size) = self.by_eps[0], self.by_eps[-1]
+            text = (
+                f"{first_size:.2g} at eps = {format_number(first_eps)} to {last_size:.2g} at {format_number(last_eps)}"
+            )
             lines.append(f"measured\tat n = 1 it is of order eps^{self.slope:.2f}: {text}")
         return lines + [f"measured\t{self.message}"] * bool(self.message)
 
@@ -82,28 +84,30 @@ def commutator(f: MapFamily, g: MapFamily, eps: Any, start: Sequence[Any], steps
         raise InputError(f"found {steps} steps, expected at least 1")
     if len(start) != f.dim:
         raise InputError(f"found an initial point with {counted(len(start), 'coordinate')}, expected {f.dim}")
-    value, x = rational(eps), to_floats(start)
+    exact_eps, x = rational(eps), to_floats(start)
 
-    def sizes(at: fmpq, count: int) -> tuple[list[float], str]:
-        other = g.at(at * rational(ratio))
-        image = images_of(other, x)
+    def measure_sizes(f_eps: fmpq, count: int) -> tuple[list[float], str]:
+        g_at_eps = g.at(f_eps * rational(ratio))
+        image = images_of(g_at_eps, x)
         if not np.isfinite(image).all():
             return [], "the map of g is not defined at the initial point"
-        ensemble, found = FloatEnsemble(f, at, np.array([x, image]), threads=1), list[float]()
+        ensemble, sizes = FloatEnsemble(f, f_eps, np.array([x, image]), threads=1), list[float]()
         for k, points in enumerate(ensemble.records(count, 1)):
             if k:
-                both = images_of(other, points[:, 0]), points[:, 1]
+                endpoints = images_of(g_at_eps, points[:, 0]), points[:, 1]
                 size = np.maximum(1.0, np.abs(points).max(axis=(1, 2)))
-                found += (np.abs(both[0] - both[1]).max(axis=1) / size).tolist()
-        ended = [ensemble.end(k).message for k in range(2) if ensemble.failed_at[k] >= 0]
-        return [size for size in found if np.isfinite(size)], ended[0] if ended else ""
+                sizes += (np.abs(endpoints[0] - endpoints[1]).max(axis=1) / size).tolist()
+        messages = [ensemble.end(k).message for k in range(2) if ensemble.failed_at[k] >= 0]
+        return [size for size in sizes if np.isfinite(size)], messages[0] if messages else ""
 
-    along, message = sizes(value, steps)
-    chosen = sorted({1 << k for k in range(len(along).bit_length())} | {len(along)}) if along else []
+    step_sizes, message = measure_sizes(exact_eps, steps)
+    printed_steps = (
+        sorted({1 << k for k in range(len(step_sizes).bit_length())} | {len(step_sizes)}) if step_sizes else []
+    )
     by_eps: list[tuple[fmpq, float]] = []
     for k in range(_HALVINGS if f.has_eps and g.has_eps else 0):
-        by_eps += [(value / (1 << k), size) for size in sizes(value / (1 << k), 1)[0]]
-    kept = [size for _, size in by_eps if size > _ROUNDING]
-    slope = log2(kept[-2] / kept[-1]) if len(kept) > 1 else None
-    largest = max(along, default=float("nan"))
-    return Commutator(tuple((n, along[n - 1]) for n in chosen if n), largest, tuple(by_eps), slope, message)
+        by_eps += [(exact_eps / (1 << k), size) for size in measure_sizes(exact_eps / (1 << k), 1)[0]]
+    significant_sizes = [size for _, size in by_eps if size > _ROUNDING]
+    slope = log2(significant_sizes[-2] / significant_sizes[-1]) if len(significant_sizes) > 1 else None
+    largest = max(step_sizes, default=float("nan"))
+    return Commutator(tuple((n, step_sizes[n - 1]) for n in printed_steps if n), largest, tuple(by_eps), slope, message)

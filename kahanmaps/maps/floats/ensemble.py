@@ -83,8 +83,10 @@ def distribution(values: NDArray[Any]) -> dict[str, float]:
     quantiles = np.quantile(values, _QUANTILES, method="inverted_cdf").tolist()
     with np.errstate(over="ignore"):
         mean = float(values.mean())
-    middle = {f"{100 * share:g}%": float(value) for share, value in zip(_QUANTILES, quantiles, strict=True)}
-    return {"min": float(values.min()), **middle, "max": float(values.max()), "mean": mean}
+    quantiles_by_name = {
+        f"{100 * probability:g}%": float(value) for probability, value in zip(_QUANTILES, quantiles, strict=True)
+    }
+    return {"min": float(values.min()), **quantiles_by_name, "max": float(values.max()), "mean": mean}
 
 
 class FloatEnsemble(AttributeHints):
@@ -145,7 +147,7 @@ class FloatEnsemble(AttributeHints):
             raise InputError("found an initial point with a coordinate that is not finite")
         if to_float(epsilon) == 0.0:
             raise InputError("eps rounds to 0 as a floating-point number: choose a larger eps")
-        compiled = choose_kernel(kernel, is_long=True) == "numba" and has_llvm()
+        is_compiled = choose_kernel(kernel, is_long=True) == "numba" and has_llvm()
         if radius is not None and not radius > 0:
             raise InputError(f"found the radius {radius:g}, expected a number above 0")
         if threads is not None and threads < 1:
@@ -158,32 +160,32 @@ class FloatEnsemble(AttributeHints):
         if form is not None:
             require_same_system(form, map_)
             self._blocks = planar_blocks(form, -epsilon if backward else epsilon)
-            state = _product(self._blocks.x_to_state, state)
-            self._base = self._blocks.integrals(state)
-            self._largest = np.zeros(self._base.shape)
+            state = _multiply(self._blocks.x_to_state, state)
+            self._initial_values = self._blocks.integrals(state)
+            self._largest_drift = np.zeros(self._initial_values.shape)
         self._factors = (map_over.inverse if backward else map_over).factors
         self._build_step()
         self._batch = BatchState.of(state)
-        compiled = compiled and self._step.careful_code is not None
-        self._threads = (threads or processors()) if compiled else 1
+        is_compiled = is_compiled and self._step.careful_code is not None
+        self._threads = (threads or processors()) if is_compiled else 1
         method = "generic" if form is None else "normal form"
         #: The kernel, the method and the number of threads, for example "numba normal form, 2 threads".
-        self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if compiled else f"numpy {method}"
-        self._compiled = compiled
-        self._watched = []
-        for name, given in (integrals or {}).items():
-            function: Function = given
-            if isinstance(given, RationalFunction):
-                function = _of_point(given, to_float(epsilon))
-            self._watched.append(WatchedFunction(name, function, self._starts))
-        self._sampled = sampled
+        self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if is_compiled else f"numpy {method}"
+        self._is_compiled = is_compiled
+        self._watched_functions = []
+        for name, integral in (integrals or {}).items():
+            function: Function = integral
+            if isinstance(integral, RationalFunction):
+                function = _float_integral(integral, to_float(epsilon))
+            self._watched_functions.append(WatchedFunction(name, function, self._starts))
+        self._sample_interval = sampled
         self._interrupted = False
         self._radius = radius
         self._escaped_at = np.full(self.n, -1)
         self._escaped_to = np.full(shape, np.nan)
         self.backward = backward
         self.step = 0
-        self._note_escapes(0, self._starts[None])
+        self._record_escapes(0, self._starts[None])
 
     def _build_step(self) -> None:
         self._step = map_step(self._factors) if self._blocks is None else planar_step(self._blocks)
@@ -198,8 +200,8 @@ class FloatEnsemble(AttributeHints):
         self._build_step()
 
     def __repr__(self) -> str:
-        alive = int((self._batch.status == RUNNING).sum())
-        return f"<FloatEnsemble: {self.n} orbits after {counted(self.step, 'step')}, {alive} completed>"
+        running_count = int((self._batch.status == RUNNING).sum())
+        return f"<FloatEnsemble: {self.n} orbits after {counted(self.step, 'step')}, {running_count} completed>"
 
     @property
     def n(self) -> int:
@@ -252,8 +254,8 @@ class FloatEnsemble(AttributeHints):
         The drift is over the orbits that completed their steps, by the name of the integral. If a radius is given,
         "escape step" is the distribution of `escaped_at` over the orbits that escaped. See `distribution`.
         """
-        completed = self._batch.status == RUNNING
-        results = {drift.name: distribution(drift.largest[completed]) for drift in self.drift}
+        is_complete = self._batch.status == RUNNING
+        results = {drift.name: distribution(drift.largest[is_complete]) for drift in self.drift}
         if self._radius is not None:
             results["escape step"] = distribution(self._escaped_at[self._escaped_at >= 0])
         return results
@@ -263,13 +265,15 @@ class FloatEnsemble(AttributeHints):
         """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
-            current = self._blocks.distances(self._batch.z, self._base)
-            current[:, self._batch.status != RUNNING] = np.nan
-            largest = np.fmax(self._largest, current)
+            current_drift = self._blocks.distances(self._batch.z, self._initial_values)
+            current_drift[:, self._batch.status != RUNNING] = np.nan
+            largest = np.fmax(self._largest_drift, current_drift)
             for r, label in enumerate(self._blocks.labels):
-                initial: NDArray[Any] = self._base[r].copy() if r >= self._blocks.reals else self._base[r].real.copy()
-                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current[r]))
-        return (*drifts, *(watched.drift for watched in self._watched))
+                initial: NDArray[Any] = (
+                    self._initial_values[r].copy() if r >= self._blocks.reals else self._initial_values[r].real.copy()
+                )
+                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current_drift[r]))
+        return (*drifts, *(function.drift for function in self._watched_functions))
 
     def end(self, orbit: int) -> OrbitEnd:
         """Return how one orbit has ended."""
@@ -287,13 +291,13 @@ class FloatEnsemble(AttributeHints):
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
         """Take `steps` steps; `progress` is called with the current step about ten times a second."""
         require_steps(steps)
-        if self._watched or self._radius is not None:
-            for _ in self.records(steps, self._sampled, progress=progress):
+        if self._watched_functions or self._radius is not None:
+            for _ in self.records(steps, self._sample_interval, progress=progress):
                 pass
-            for watched in self._watched:
+            for watched in self._watched_functions:
                 watched.observe(self.x[None])
             return
-        for _ in self._recorded(steps, 0, progress):
+        for _ in self._record_steps(steps, 0, progress):
             pass
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
@@ -304,81 +308,86 @@ class FloatEnsemble(AttributeHints):
         require_steps(steps)
         require_every(every)
         if self.step == 0:
-            for watched in self._watched:
-                watched.observe(self._starts[None])
+            for function in self._watched_functions:
+                function.observe(self._starts[None])
             yield self._starts[None].copy()
         else:
             yield np.empty((0, self.n, self.system.dim))
-        for record in self._recorded(steps, every if self._radius is None else 1, progress):
+        for record in self._record_steps(steps, every if self._radius is None else 1, progress):
             if len(record):
                 x = self._points_of(record)
                 if self._radius is not None:
-                    first = self.step - len(x) + 1
-                    self._note_escapes(first, x)
-                    x = x[-first % every :: every]
-                for watched in self._watched:
-                    watched.observe(x)
+                    first_step = self.step - len(x) + 1
+                    self._record_escapes(first_step, x)
+                    x = x[-first_step % every :: every]
+                for function in self._watched_functions:
+                    function.observe(x)
                 if len(x):
                     yield x
 
-    def _note_escapes(self, first: int, x: FloatArray) -> None:
-        """Store for each orbit the first point outside the radius among the steps first, first + 1, ..."""
+    def _record_escapes(self, first_step: int, x: FloatArray) -> None:
+        """Store for each orbit the first point outside the radius among the steps first_step, first_step + 1, ..."""
         if self._radius is None:
             return
-        inside = np.flatnonzero(self._escaped_at < 0)
+        inside_orbits = np.flatnonzero(self._escaped_at < 0)
         with np.errstate(invalid="ignore"):
-            is_outside = np.abs(x[:, inside]).max(axis=2) > self._radius
-        left = np.flatnonzero(is_outside.any(axis=0))
-        at = is_outside[:, left].argmax(axis=0)
-        self._escaped_at[inside[left]], self._escaped_to[inside[left]] = first + at, x[at, inside[left]]
+            is_outside = np.abs(x[:, inside_orbits]).max(axis=2) > self._radius
+        escaping_indices = np.flatnonzero(is_outside.any(axis=0))
+        indices = is_outside[:, escaping_indices].argmax(axis=0)
+        orbits = inside_orbits[escaping_indices]
+        self._escaped_at[orbits], self._escaped_to[orbits] = first_step + indices, x[indices, orbits]
 
-    def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
+    def _record_steps(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
         """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: no states)."""
-        batch, stop, rows = self._batch, self.step + steps, self._step.rows
+        batch, last_step, rows = self._batch, self.step + steps, self._step.rows
         # Rough estimates of the time per step; for arrays only a part of the time grows with the number of orbits.
-        if self._compiled:
+        if self._is_compiled:
             speed = 8e9 if self.n > _MAX_SCALAR_ORBITS else 1.5e9
             seconds = self.n * self._step.operations / speed / self._threads
         else:
             seconds = self._step.operations * (1e-6 + self.n * 1e-9)
-        portion = max(1, int(0.1 / seconds))
-        intervals = [every, 0 if self._blocks is None else self._sampled]
+        portion_steps = max(1, int(0.1 / seconds))
+        intervals = [every, 0 if self._blocks is None else self._sample_interval]
         for interval in filter(None, intervals):
-            portion = min(portion, interval * max(1, _RECORDED_NUMBERS // (self.n * rows)))
-        if self._compiled and self._machine_code is None and self.step < stop:
+            portion_steps = min(portion_steps, interval * max(1, _RECORDED_NUMBERS // (self.n * rows)))
+        if self._is_compiled and self._machine_code is None and self.step < last_step:
             from kahanmaps.maps.floats.machine_code import MachineCode
 
             width = 1 if self.n <= _MAX_SCALAR_ORBITS else 32 if rows <= 2 else 16 if rows <= 8 else 8
             self._machine_code = MachineCode(self._step, width)
-        chunk = self.n if self._threads == 1 else -(-self.n // (self._threads * _CHUNKS_PER_THREAD * 64)) * 64
-        chunk_starts = range(0, self.n, chunk)
-        while self.step < stop:
-            first, count = self.step, min(portion, stop - self.step)
+        chunk_size = self.n if self._threads == 1 else -(-self.n // (self._threads * _CHUNKS_PER_THREAD * 64)) * 64
+        chunk_starts = range(0, self.n, chunk_size)
+        while self.step < last_step:
+            first_step, count = self.step, min(portion_steps, last_step - self.step)
             tables = []
             for interval in intervals:
-                length = (first + count) // interval - first // interval if interval else 0
-                tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
-            nonempty = [table for table in tables if len(table.states)]
-            if self._compiled:
+                record_count = (first_step + count) // interval - first_step // interval if interval else 0
+                tables.append(RecordTable(interval, np.empty((record_count, rows, self.n))))
+            nonempty_tables = [table for table in tables if len(table.states)]
+            if self._is_compiled:
 
-                def advance(start: int, first: int = first, count: int = count, nonempty: Any = nonempty) -> None:
-                    self._machine_code.advance(batch, start, min(self.n, start + chunk), first, count, nonempty)
+                def advance(
+                    start: int, first_step: int = first_step, count: int = count, nonempty_tables: Any = nonempty_tables
+                ) -> None:
+                    self._machine_code.advance(
+                        batch, start, min(self.n, start + chunk_size), first_step, count, nonempty_tables
+                    )
 
                 with ThreadPoolExecutor(self._threads) if len(chunk_starts) > 1 else nullcontext() as pool:
                     list(map(advance, chunk_starts) if pool is None else pool.map(advance, chunk_starts))
             else:
-                advance_by_numpy(self._step, batch, first, count, nonempty)
-            self.step = first + count
+                advance_by_numpy(self._step, batch, first_step, count, nonempty_tables)
+            self.step = first_step + count
             for interval, states in tables:  # states after the end of an orbit become NaN
                 if len(states) and (batch.status != RUNNING).any():
-                    recorded_steps = (first // interval + 1 + np.arange(len(states))) * interval
+                    recorded_steps = (first_step // interval + 1 + np.arange(len(states))) * interval
                     after_end = (batch.failed_at >= 0) & (recorded_steps[:, None] >= batch.failed_at)
                     states.transpose(0, 2, 1)[after_end] = np.nan
             if self._blocks is not None and len(tables[1].states):
                 states = tables[1].states.transpose(1, 0, 2)
-                distances = self._blocks.distances(states, self._base[:, None])
+                distances = self._blocks.distances(states, self._initial_values[:, None])
                 distances[:, np.isnan(states).any(axis=0)] = 0.0
-                np.maximum(self._largest, distances.max(axis=1), out=self._largest)
+                np.maximum(self._largest_drift, distances.max(axis=1), out=self._largest_drift)
             yield tables[0].states
             if progress is not None:
                 progress(self.step)
@@ -393,7 +402,7 @@ class FloatEnsemble(AttributeHints):
             return np.ascontiguousarray(record.transpose(0, 2, 1))
         if n == 1:  # a product of contiguous arrays is fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
-        x = _product(self._blocks.state_to_x, record)
+        x = _multiply(self._blocks.state_to_x, record)
         return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(records, n, self.system.dim)
 
 
@@ -429,7 +438,7 @@ class WatchedFunction:
         return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def _of_point(function: RationalFunction, eps: float) -> Function:
+def _float_integral(function: RationalFunction, eps: float) -> Function:
     in_floats, has_eps = float_function(function), function.names[-1:] == ("eps",)
     return lambda x: in_floats([*x, eps] if has_eps else x)
 
@@ -492,7 +501,7 @@ def require_every(every: int) -> None:
         raise InputError(f"found a record every {every} steps, expected at least 1")
 
 
-def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
+def _multiply(matrix: FloatArray, columns: FloatArray) -> FloatArray:
     """Return matrix @ columns, for columns of shape (..., rows, n), with sums taken from left to right.
 
     BLAS is not used, since its order of summation depends on the shapes of the arrays.

@@ -21,13 +21,13 @@ FloatArray = NDArray[np.float64]
 def to_float(value: fmpq) -> float:
     """Return the double nearest to a rational number. Raises InputError if the number is too large for a double."""
     try:
-        nearest = int(value.p) / int(value.q)
+        nearest_double = int(value.p) / int(value.q)
     except OverflowError as error:
         raise InputError(
             "found a number beyond the range of floating-point numbers, expected one below 1.8e308 (exact orbits have "
             "no such limit)"
         ) from error
-    return nearest
+    return nearest_double
 
 
 def double(value: Any) -> float:

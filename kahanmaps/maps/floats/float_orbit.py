@@ -93,7 +93,7 @@ class FloatOrbit:
         self.every = every
         self.dim = system.dim
         self.end: OrbitEnd | None = None
-        self._fresh = partial(
+        self._new_ensemble = partial(
             FloatEnsemble,
             system,
             eps,
@@ -105,7 +105,7 @@ class FloatOrbit:
             integrals=integrals,
             sampled=sampled,
         )
-        self._ensemble = self._fresh()
+        self._ensemble = self._new_ensemble()
         self._interrupted = False
 
     @property
@@ -147,7 +147,7 @@ class FloatOrbit:
         if (
             self.end is not None or self._ensemble.step
         ):  # create a new ensemble: the old one would continue the previous iteration
-            self._ensemble = self._fresh()
+            self._ensemble = self._new_ensemble()
         ensemble = self._ensemble
         for x in ensemble.records(_NO_LIMIT if self.steps is None else self.steps, self.every):
             points = x[:, 0]

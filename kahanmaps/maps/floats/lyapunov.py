@@ -34,7 +34,7 @@ from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.values import start_rows
 
 MAX_NUMBERS = 20_000_000  # entries of the frames of all orbits together
-_PORTION = 200_000  # entries of the tangent maps in a portion
+_PORTION_ENTRIES = 200_000  # entries of the tangent maps in a portion
 _MAX_PORTION_STEPS = 512
 _MAX_CONDITION = 16.0  # logarithm of the condition number of a product; larger products would lose digits
 _MAX_NORM = 300.0  # logarithm of the norm of a tangent map, whose square must not overflow
@@ -80,13 +80,13 @@ class Lyapunov(ResultPart):
         return self.text
 
     def __repr__(self) -> str:
-        exponents = ", ".join(f"{x:.6g}" for x in self.mean)
-        return f"<Lyapunov: {exponents} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
+        exponents_text = ", ".join(f"{x:.6g}" for x in self.mean)
+        return f"<Lyapunov: {exponents_text} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
 
     @property
     def mean(self) -> FloatArray:
         """The mean of each exponent over the orbits, per unit of time; NaN if no orbit was completed."""
-        return _over_orbits(np.mean, self.exponents)
+        return _statistic_over_orbits(np.mean, self.exponents)
 
     @property
     def per_step(self) -> FloatArray:
@@ -96,12 +96,12 @@ class Lyapunov(ResultPart):
     @property
     def spread(self) -> FloatArray:
         """The standard deviation of each exponent over the orbits, per unit of time."""
-        return _over_orbits(np.std, self.exponents)
+        return _statistic_over_orbits(np.std, self.exponents)
 
     @property
     def change(self) -> FloatArray:
         """The distances of the mean exponents over the first half of the steps from those over all steps."""
-        return np.abs(_over_orbits(np.mean, self.half) - self.mean)
+        return np.abs(_statistic_over_orbits(np.mean, self.half) - self.mean)
 
     @property
     def residual(self) -> float:
@@ -111,7 +111,7 @@ class Lyapunov(ResultPart):
         )
 
 
-def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
+def _statistic_over_orbits(function: Any, values: FloatArray) -> FloatArray:
     statistics: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
     return statistics
 
@@ -177,82 +177,86 @@ def lyapunov_exponents(
     orbits = FloatEnsemble(map_, eps, x, kernel="numpy" if len(x) * steps < _MIN_COMPILED_WORK else None, threads=1)
     equations = map_.at(rational(eps)).equations
     frames = np.broadcast_to(np.eye(n), (len(x), n, n))
-    sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
-    marks = [transient, transient + steps // 2, transient + steps]
-    checkpoint = 0, sums, half, volumes, alive  # the state after the last complete portion
+    log_sums, half_sums = np.zeros((len(x), n)), np.zeros((len(x), n))
+    log_volumes, is_running = np.zeros(len(x)), np.ones(len(x), bool)
+    phase_ends = [transient, transient + steps // 2, transient + steps]
+    checkpoint = 0, log_sums, half_sums, log_volumes, is_running  # the state after the last complete portion
     with suppress(TimeLimit):
-        while orbits.step < marks[-1] and alive.any():
-            progress(f"step {orbits.step} of {marks[-1]}")
-            mark = next(mark for mark in marks if mark > orbits.step)
-            count = min(mark - orbits.step, _MAX_PORTION_STEPS, max(1, _PORTION // (len(x) * n * n)))
-            previous = orbits.x[None]
-            after = np.concatenate(list(orbits.records(count, 1)))[-count:]
-            alive &= ~np.isnan(after).any(axis=(0, 2))
-            points = np.concatenate([previous, after])[:, alive]
+        while orbits.step < phase_ends[-1] and is_running.any():
+            progress(f"step {orbits.step} of {phase_ends[-1]}")
+            phase_end = next(phase_end for phase_end in phase_ends if phase_end > orbits.step)
+            count = min(phase_end - orbits.step, _MAX_PORTION_STEPS, max(1, _PORTION_ENTRIES // (len(x) * n * n)))
+            previous_points = orbits.x[None]
+            new_points = np.concatenate(list(orbits.records(count, 1)))[-count:]
+            is_running &= ~np.isnan(new_points).any(axis=(0, 2))
+            points = np.concatenate([previous_points, new_points])[:, is_running]
             with np.errstate(all="ignore"):
                 maps, log_dets = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
                 maps, log_dets = maps.reshape(count, -1, n, n), log_dets.reshape(count, -1)
                 norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
-            sound = np.isfinite(log_dets).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
-            alive[alive] = sound
-            maps, log_dets, norms, Q = maps[:, sound], log_dets[:, sound], norms[:, sound], frames[alive]
-            volumes[alive] += log_dets.sum(axis=0)
+            is_valid = np.isfinite(log_dets).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
+            is_running[is_running] = is_valid
+            maps, log_dets, norms, Q = maps[:, is_valid], log_dets[:, is_valid], norms[:, is_valid], frames[is_running]
+            log_volumes[is_running] += log_dets.sum(axis=0)
             # Logarithms of bounds: the condition number of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, and the
             # condition number of a product is at most the product of the condition numbers.
             log_conditions = np.maximum(
                 np.log(2.0) + n * (norms - np.log(n) / 2) - log_dets, norms * _MAX_CONDITION / _MAX_NORM
             )
-            first, total = 0, 0.0
+            first_factor, log_condition_sum = 0, 0.0
             for k, log_condition in enumerate([*log_conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
-                if k and total + log_condition > _MAX_CONDITION:
-                    Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
-                    sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
-                    first, total = k, 0.0
-                total += log_condition
+                if k and log_condition_sum + log_condition > _MAX_CONDITION:
+                    Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first_factor:k], Q))
+                    log_sums[is_running] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
+                    first_factor, log_condition_sum = k, 0.0
+                log_condition_sum += log_condition
             frames = np.zeros((len(x), n, n))
-            frames[alive] = Q
+            frames[is_running] = Q
             if orbits.step == transient:
-                sums[:], volumes[:] = 0.0, 0.0
-            elif orbits.step == marks[1]:
-                half = sums.copy()
-            checkpoint = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
-    done, sums, half, volumes, alive = checkpoint
-    counted = max(0, done - transient)
-    ended = len(x) - int(alive.sum())
-    alive &= counted > 0
+                log_sums[:], log_volumes[:] = 0.0, 0.0
+            elif orbits.step == phase_ends[1]:
+                half_sums = log_sums.copy()
+            checkpoint = orbits.step, log_sums.copy(), half_sums, log_volumes.copy(), is_running.copy()
+    completed_steps, log_sums, half_sums, log_volumes, is_running = checkpoint
+    counted_steps = max(0, completed_steps - transient)
+    ended_count = len(x) - int(is_running.sum())
+    is_running &= counted_steps > 0
     unit = convention.time_step(float_eps, map_) or 1.0
-    order = np.argsort(-sums[alive] / unit, axis=1)  # for negative eps the unit is negative
-    first_half = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
+    permutation = np.argsort(-log_sums[is_running] / unit, axis=1)  # for negative eps the unit is negative
+    first_half = half_sums[is_running] / (unit * (steps // 2) if counted_steps >= steps // 2 else np.nan)
     return Lyapunov(
         unit,
-        counted,
-        min(done, transient),
+        counted_steps,
+        min(completed_steps, transient),
         len(x),
-        ended,
-        np.take_along_axis(sums[alive], order, axis=1) / (unit * max(1, counted)),
-        np.take_along_axis(first_half, order, axis=1),
-        volumes[alive] / (unit * max(1, counted)),
-        ended < len(x) and counted < steps,
+        ended_count,
+        np.take_along_axis(log_sums[is_running], permutation, axis=1) / (unit * max(1, counted_steps)),
+        np.take_along_axis(first_half, permutation, axis=1),
+        log_volumes[is_running] / (unit * max(1, counted_steps)),
+        ended_count < len(x) and counted_steps < steps,
     )
 
 
-def _tangent_maps(equations: Sequence[Equation], x: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return dPhi and log |det dPhi| at points x (count, n), whose images are `last`.
+def _tangent_maps(equations: Sequence[Equation], x: FloatArray, images: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return dPhi and log |det dPhi| at points x (count, n) with these images.
 
     dPhi is the product over the factors of M(x)^{-1} N(x, x~), where N = -(d/dx)(M x~ - r) at fixed x~.
     """
-    x, image, total = x.T, last.T, None
-    volume = np.zeros(len(last))
+    x, image, tangent_map = x.T, images.T, None
+    log_volume = np.zeros(len(images))
     for equation in equations:
         n, exponents = equation.dim, [[int(e) for e in exponent] for exponent in equation.exponents]
-        L, N = np.zeros((n, n + 1, len(last))), np.zeros((n, n, len(last)))  # (M | -r)
+        L, N = np.zeros((n, n + 1, len(images))), np.zeros((n, n, len(images)))  # (M | -r)
 
-        def product(exponent: Sequence[int], x: FloatArray = x) -> Any:
+        def monomial_value(exponent: Sequence[int], x: FloatArray = x) -> Any:
             return reduce(mul, (x[i] ** e if e > 1 else x[i] for i, e in enumerate(exponent) if e), 1.0)
 
-        values = [product(exponent[:n]) for exponent in exponents]
+        values = [monomial_value(exponent[:n]) for exponent in exponents]
         terms = [
-            (i, j, k, to_float(c)) for i, row in enumerate(equation.terms) for j, e in enumerate(row) for k, c in e
+            (i, j, k, to_float(c))
+            for i, row in enumerate(equation.terms)
+            for j, entry in enumerate(row)
+            for k, c in entry
         ]
         for i, j, k, c in terms:
             L[i, j] += c * values[k]
@@ -263,11 +267,11 @@ def _tangent_maps(equations: Sequence[Equation], x: FloatArray, last: FloatArray
         for i, j, k, c in terms:
             for l, e in enumerate(exponents[k][:n]):
                 if e:
-                    less = [d - (l == q) for q, d in enumerate(exponents[k][:n])]
-                    N[i, l] -= c * e * product(less) * (image[j] if j < n else 1.0)
+                    lowered_exponent = [d - (l == q) for q, d in enumerate(exponents[k][:n])]
+                    N[i, l] -= c * e * monomial_value(lowered_exponent) * (image[j] if j < n else 1.0)
         M = np.concatenate([L[:, :n], N], axis=1)
-        volume = volume + np.log(eliminate(N, n, 0)).sum(axis=0) - np.log(eliminate(M, n, n)).sum(axis=0)
-        slope = np.moveaxis(M[:, n:], 2, 0)
-        total = slope if total is None else slope @ total
+        log_volume = log_volume + np.log(eliminate(N, n, 0)).sum(axis=0) - np.log(eliminate(M, n, n)).sum(axis=0)
+        factor_map = np.moveaxis(M[:, n:], 2, 0)
+        tangent_map = factor_map if tangent_map is None else factor_map @ tangent_map
         x = image
-    return np.ascontiguousarray(total), volume
+    return np.ascontiguousarray(tangent_map), log_volume

@@ -149,17 +149,17 @@ class MachineCode:
         def splat(kind: str, value: Any) -> str:
             return "<" + ", ".join([f"{kind} {value}"] * width) + ">"
 
-        def number(x: Any) -> str:
+        def constant(x: Any) -> str:
             if isinstance(x, bool):
                 return splat("i1", int(x))
             return splat("double", f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}")
 
-        def body(code: StraightLineProgram, prefix: str) -> tuple[str, list[str]]:
+        def translate(code: StraightLineProgram, prefix: str) -> tuple[str, list[str]]:
             """Return the instructions of a program, and the names of its outputs."""
 
             def name(x: Any) -> str:
                 if not isinstance(x, Value):
-                    return number(x)
+                    return constant(x)
                 return f"%x{x.number}" if x.number < code.inputs else f"%{prefix}{x.number}"
 
             lines = []
@@ -171,49 +171,51 @@ class MachineCode:
                 lines.append(f"%{prefix}{k} = {_INSTRUCTIONS[operation].format(*x)}")
             return "\n".join(lines), [name(x) for x in code.outputs]
 
-        def of_rows(*lines: str) -> str:
-            """Repeat lines for each row, with its number and the names of its images in the fast and careful step."""
-            return "\n".join(line.format(i=i, fast=image[i], careful=recomputed[i]) for i in rows for line in lines)
+        def repeat_for_rows(*lines: str) -> str:
+            """Repeat lines for each row, with its index and the names of its images in the fast and careful step."""
+            return "\n".join(
+                line.format(i=i, fast=fast_image[i], careful=careful_image[i]) for i in rows for line in lines
+            )
 
-        def stored(name: str, table: str, index: str, value: str) -> str:
-            return of_rows(
+        def store_rows(name: str, table: str, index: str, value: str) -> str:
+            return repeat_for_rows(
                 f"%{name}{{i}}.r = mul i64 %n, {{i}}",
                 f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {index}",
                 f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
                 f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
             )
 
-        fast, (*image, good) = body(step.fast_code, "f")
-        careful, (*recomputed, near, singular, overflow) = body(step.careful_code, "c")
-        parts = {
+        fast_code, (*fast_image, good) = translate(step.fast_code, "f")
+        careful_code, (*careful_image, near, singular, overflow) = translate(step.careful_code, "c")
+        sections = {
             "load": f"%record = mul i64 %n, {step.rows}\n"
-            + of_rows(
+            + repeat_for_rows(
                 "%z{i}.r = mul i64 %n, {i}",
                 "%z{i}.o = add i64 %z{i}.r, %at",
                 "%z{i}.p = getelementptr double, ptr %z, i64 %z{i}.o",
                 "%z{i} = call $v @llvm.masked.load.$s.p0(ptr %z{i}.p, i32 8, $m %there, $v zeroinitializer)",
             ),
-            "states": of_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
-            "fast": fast,
-            "careful": careful,
-            "choose": of_rows(
+            "states": repeat_for_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
+            "fast": fast_code,
+            "careful": careful_code,
+            "choose": repeat_for_rows(
                 "%k{i} = select $m %fine, $v {fast}, $v {careful}",
                 "%e{i} = select $m %ended, $v zeroinitializer, $v %k{i}",
             ),
-            "images": of_rows("%y{i} = phi $v [{fast}, %loop], [%e{i}, %careful]"),
-            "keep0": stored("s", "%table0", "%place0", "%y{i}"),
-            "keep1": stored("t", "%table1", "%place1", "%y{i}"),
-            "store": of_rows("%r{i} = select $m %dead.after, $v zeroinitializer, $v %y{i}")
+            "images": repeat_for_rows("%y{i} = phi $v [{fast}, %loop], [%e{i}, %careful]"),
+            "keep0": store_rows("s", "%table0", "%place0", "%y{i}"),
+            "keep1": store_rows("t", "%table1", "%place1", "%y{i}"),
+            "store": repeat_for_rows("%r{i} = select $m %dead.after, $v zeroinitializer, $v %y{i}")
             + "\n"
-            + stored("u", "%z", "%at", "%r{i}"),
+            + store_rows("u", "%z", "%at", "%r{i}"),
         }
         llvm_types = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
         llvm_types |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
         llvm_types |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
         llvm_types |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
         llvm_types |= {"singular": singular, "overflow": overflow}
-        text = Template(_LOOPS.safe_substitute(parts)).substitute(llvm_types)
-        self._engine, self._call = _compiled(text)
+        text = Template(_LOOPS.safe_substitute(sections)).substitute(llvm_types)
+        self._engine, self._advance_function = _compile(text)
 
     def advance(
         self, batch: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
@@ -224,20 +226,20 @@ class MachineCode:
             records += [states.ctypes.data, interval, interval - first % interval]
         records += [None, _NEVER, _NEVER] * (2 - len(tables))
         arrays = (array.ctypes.data for array in batch)
-        self._call(*arrays, batch.z.shape[1], low, high, first, steps, *records)
+        self._advance_function(*arrays, batch.z.shape[1], low, high, first, steps, *records)
 
 
 @lru_cache(maxsize=32)
-def _compiled(text: str) -> tuple[Any, Any]:
+def _compile(text: str) -> tuple[Any, Any]:
     """Compile a module; return the engine that owns the machine code, and the function `advance`."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
-    machine = llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
+    target_machine = llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
     module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.triple, module.data_layout = target_machine.triple, str(target_machine.target_data)
     module.verify()
-    engine = llvm.create_mcjit_compiler(module, machine)  # the engine takes ownership of the target machine
+    engine = llvm.create_mcjit_compiler(module, target_machine)  # the engine takes ownership of the target machine
     engine.finalize_object()
-    kinds = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
-    return engine, ctypes.CFUNCTYPE(None, *kinds)(engine.get_function_address("advance"))
+    types = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
+    return engine, ctypes.CFUNCTYPE(None, *types)(engine.get_function_address("advance"))

@@ -18,7 +18,7 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kahanmaps.atomic_files import named, sync
+from kahanmaps.atomic_files import sync, with_file_name
 from kahanmaps.errors import InputError
 
 
@@ -42,7 +42,7 @@ class NpyFile:
         self._header_size = len(self._header(0))
         self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
         try:
-            with named(path):
+            with with_file_name(path):
                 self._stream.write(self._header(0))
         except BaseException:
             self._stream.close()
@@ -55,11 +55,11 @@ class NpyFile:
         header = self._header(self.rows + len(rows))
         if len(header) != self._header_size:
             raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file can hold")
-        with named(self.path):
+        with with_file_name(self.path):
             self._stream.seek(0, io.SEEK_END)
-            remaining = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-            while remaining:  # one call of write may write only a part
-                remaining = remaining[self._stream.write(remaining) :]
+            remaining_bytes = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
+            while remaining_bytes:  # one call of write may write only a part
+                remaining_bytes = remaining_bytes[self._stream.write(remaining_bytes) :]
             self._stream.seek(0)
             self._stream.write(header)
         self.rows += len(rows)
@@ -68,7 +68,7 @@ class NpyFile:
         """Write everything to the disk (fsync) and close the file."""
         try:
             if not self._stream.closed:
-                with named(self.path):
+                with with_file_name(self.path):
                     sync(self._stream)
         finally:
             self._stream.close()
@@ -76,8 +76,8 @@ class NpyFile:
     def _header(self, rows: int) -> bytes:
         """Return the header; numpy pads it so that its length is the same for any number of rows."""
         stream = io.BytesIO()
-        what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
-        np.lib.format.write_array_header_1_0(stream, what)
+        header_fields = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
+        np.lib.format.write_array_header_1_0(stream, header_fields)
         return stream.getvalue()
 
     def __enter__(self) -> NpyFile:

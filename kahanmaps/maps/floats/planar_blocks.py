@@ -84,8 +84,8 @@ class PlanarBlocks:
         """The roots as short text; a complex root stands for itself and its conjugate."""
         labels = []
         for root in self.roots:
-            real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # the midpoint of a ball around 0
-            labels.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
+            real_part = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # the midpoint of a ball around 0
+            labels.append(f"{root.real:.6g}" if root.imag == 0 else f"{real_part:.6g}+-{root.imag:.6g}i")
         return tuple(labels)
 
     def integrals(self, z: FloatArray) -> NDArray[np.complex128]:
@@ -97,8 +97,8 @@ class PlanarBlocks:
                     U, V = z[2 * r : 2 * r + 2]
                     (a, b, c, d), kappa = coefficients.real, kappa.real
                 else:
-                    at = 4 * r - 2 * self.reals
-                    U, V = z[at] + 1j * z[at + 1], z[at + 2] + 1j * z[at + 3]
+                    row = 4 * r - 2 * self.reals
+                    U, V = z[row] + 1j * z[row + 1], z[row + 2] + 1j * z[row + 3]
                     a, b, c, d = coefficients
                 A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
                 integrals[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
@@ -121,32 +121,32 @@ def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
     if epsilon == 0:
         raise InputError("found eps = 0, expected another number: the Kahan map is the identity at eps = 0")
     for bits in _BITS:
-        with ctx.workprec(bits), suppress(_Unclear):
-            return _Blocks(form, epsilon).to_floats()
+        with ctx.workprec(bits), suppress(_InsufficientPrecision):
+            return _BallBlocks(form, epsilon).to_floats()
     raise InputError(f"the normal form needs more than {_BITS[-1]} bits: its coefficients are too long for doubles")
 
 
 def require_same_system(form: NormalForm, map_: MapFamily) -> None:
     """Raise InputError if the normal form belongs to another map."""
-    theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
-    if not isinstance(map_, KahanFamily) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
+    system = CubicHamiltonian(form.H, standard_structure(form.dim)).system
+    if not isinstance(map_, KahanFamily) or system.dim != map_.dim or system.renamed(map_.variables) != map_.system:
         raise InputError(
             "the normal form belongs to another system: pass normal_form(member) of the member with this system"
         )
 
 
-class _Unclear(Exception):
+class _InsufficientPrecision(Exception):
     """The working precision does not determine a sign or a rounded value."""
 
 
-class _Blocks:
+class _BallBlocks:
     """The computation of the blocks in balls of the working precision."""
 
     def __init__(self, form: NormalForm, eps: fmpq) -> None:
         self.form = form
         self.eps = arb(eps)
         m = form.m
-        self.inverse = [
+        self.S_inverse_columns = [
             (fmpq_poly(column[:m]), fmpq_poly(column[m:])) for column in form.S_inverse.transpose().tolist()
         ]
         a, b, c, d = form.coefficients
@@ -155,42 +155,42 @@ class _Blocks:
         ) % form.chi
         pairs: Any = form.chi.complex_roots()  # the type stub omits the multiplicities
         roots = [root for root, _ in pairs]
-        real = sorted((r for r in roots if r.imag.is_zero()), key=lambda r: float(r.real.mid()))
-        upper = [r for r in roots if not r.imag.is_zero() and r.imag > 0]
-        self.roots = real + sorted(upper, key=lambda r: (float(r.real.mid()), float(r.imag.mid())))
+        real_roots = sorted((r for r in roots if r.imag.is_zero()), key=lambda r: float(r.real.mid()))
+        upper_roots = [r for r in roots if not r.imag.is_zero() and r.imag > 0]
+        self.roots = real_roots + sorted(upper_roots, key=lambda r: (float(r.real.mid()), float(r.imag.mid())))
 
     def to_floats(self) -> PlanarBlocks:
-        """Round all numbers to doubles. Raises _Unclear if the precision is too low."""
+        """Round all numbers to doubles. Raises _InsufficientPrecision if the precision is too low."""
         coefficients, kappas = [], []
-        into: list[list[float]] = []
-        out: list[list[float]] = []
+        to_state: list[list[float]] = []
+        to_x: list[list[float]] = []
         for root in self.roots:
-            numbers, kappa, into_uv, out_uv = self._block(root)
-            real = root.imag.is_zero()
-            parts = _round_to_doubles([part for entry in numbers for part in (entry.real, entry.imag)])
-            coefficients.append([complex(x, y) for x, y in zip(parts[::2], parts[1::2], strict=True)])
+            canonical_cubic, kappa, forms, columns = self._block(root)
+            is_real = root.imag.is_zero()
+            doubles = _round_to_doubles([part for entry in canonical_cubic for part in (entry.real, entry.imag)])
+            coefficients.append([complex(x, y) for x, y in zip(doubles[::2], doubles[1::2], strict=True)])
             kappas.append(complex(*_round_to_doubles([kappa.real, kappa.imag])))
-            for row, column in zip(into_uv, out_uv, strict=True):
-                into.append(_round_to_doubles([entry.real for entry in row]))
+            for row, column in zip(forms, columns, strict=True):
+                to_state.append(_round_to_doubles([entry.real for entry in row]))
                 # A complex block represents two conjugate blocks, whose sum is twice the real part.
-                out.append(_round_to_doubles([entry.real if real else 2 * entry.real for entry in column]))
-                if not real:
-                    into.append(_round_to_doubles([entry.imag for entry in row]))
-                    out.append(_round_to_doubles([-2 * entry.imag for entry in column]))
-        tables = [np.array(coefficients), np.array(kappas), np.array(into), np.ascontiguousarray(np.array(out).T)]
-        if not all(np.isfinite(table).all() for table in tables):
+                to_x.append(_round_to_doubles([entry.real if is_real else 2 * entry.real for entry in column]))
+                if not is_real:
+                    to_state.append(_round_to_doubles([entry.imag for entry in row]))
+                    to_x.append(_round_to_doubles([-2 * entry.imag for entry in column]))
+        arrays = [np.array(coefficients), np.array(kappas), np.array(to_state), np.ascontiguousarray(np.array(to_x).T)]
+        if not all(np.isfinite(array).all() for array in arrays):
             raise InputError("the normal form exceeds the range of floating-point numbers: use exact arithmetic")
         reals = sum(1 for root in self.roots if root.imag.is_zero())
         roots = tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots)
-        return PlanarBlocks(reals, tables[0], tables[1], tables[2], tables[3], roots)
+        return PlanarBlocks(reals, arrays[0], arrays[1], arrays[2], arrays[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
         """Return (a, b, c, d); kappa; U and V as forms in x; and the columns that express x in U and V."""
-        cubic = [_value(coefficient, root) for coefficient in self.form.coefficients]
-        rows = [[_value(element[k], root) for element in self.inverse] for k in (0, 1)]
+        cubic = [_evaluate(coefficient, root) for coefficient in self.form.coefficients]
+        rows = [[_evaluate(element[k], root) for element in self.S_inverse_columns] for k in (0, 1)]
         kind, frame = self._frame(root, cubic, rows)
         det = frame[0][0] * frame[1][1] - frame[0][1] * frame[1][0]
-        a, b, c, d = (entry * det for entry in _transformed(cubic, _inverse(frame)))
+        a, b, c, d = (entry * det for entry in _substitute(cubic, _invert(frame)))
         if kind == LINES:
             scale_U, scale_V = b, c
         elif kind == CUBES:
@@ -198,108 +198,108 @@ class _Blocks:
             scale_U, scale_V = acb(_cube_root((27 * a * a * d).real)), acb(_cube_root((27 * a * d * d).real))
         else:
             scale_U, scale_V = acb(1), acb(1)
-        numbers = [acb(entry) for entry in _CANONICAL.get(kind, ())] or [3 * a, b, c, 3 * d]
+        canonical_cubic = [acb(entry) for entry in _CANONICAL.get(kind, ())] or [3 * a, b, c, 3 * d]
         if kind == GENERAL and all(self._vanishes(coefficient, root) for coefficient in self.form.coefficients):
-            numbers = [acb(0)] * 4
+            canonical_cubic = [acb(0)] * 4
         frame = ([entry * scale_U for entry in frame[0]], [entry * scale_V for entry in frame[1]])
         kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
         step = 2 * self.eps
-        into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
+        forms = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
         # The Lagrange polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at all other roots.
-        slope, carry = _value(self.form.chi.derivative(), root), acb(0)
+        chi_derivative, quotient = _evaluate(self.form.chi.derivative(), root), acb(0)
         lagrange: list[acb] = []
         for coefficient in reversed(self.form.chi.coeffs()[1:]):
-            carry = carry * root + arb(coefficient)
-            lagrange.insert(0, carry / slope)
+            quotient = quotient * root + arb(coefficient)
+            lagrange.insert(0, quotient / chi_derivative)
         m, S = self.form.m, self.form.S.tolist()
         x_u, x_v = (
-            [sum((arb(s) * l for s, l in zip(row[half], lagrange, strict=True)), acb(0)) for row in S]
-            for half in (slice(0, m), slice(m, None))
+            [sum((arb(s) * l for s, l in zip(row[columns], lagrange, strict=True)), acb(0)) for row in S]
+            for columns in (slice(0, m), slice(m, None))
         )
-        inverse_frame = _inverse(frame)
-        out = [
+        inverse_frame = _invert(frame)
+        point_columns = [
             [(x * inverse_frame[0][k] + y * inverse_frame[1][k]) / step for x, y in zip(x_u, x_v, strict=True)]
             for k in (0, 1)
         ]
-        return numbers, kappa, into, out
+        return canonical_cubic, kappa, forms, point_columns
 
     def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[str, Frame]:
         """Return the kind of h, and two linear forms in u and v, up to scale, that bring h to its canonical form."""
         if self._vanishes(self.discriminant, root):
             return GENERAL, self._orthonormal_frame(rows)
-        if root.imag.is_zero() and _value(self.discriminant, root).real < 0:
+        if root.imag.is_zero() and _evaluate(self.discriminant, root).real < 0:
             a, b, c, d = cubic
-            kind, lines = CUBES, _factors([3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c])
+            kind, linear_forms = CUBES, _linear_factors([3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c])
         else:
-            kind, lines = LINES, _factors(cubic)
+            kind, linear_forms = LINES, _linear_factors(cubic)
         if root.imag.is_zero():  # at a real root the factors are real
-            lines = [[acb(entry.real) for entry in line] for line in lines]
-        pairs = [(lines[i], lines[j]) for i in range(len(lines)) for j in range(i)]
-        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda candidate: candidate[0])
+            linear_forms = [[acb(entry.real) for entry in form] for form in linear_forms]
+        pairs = [(linear_forms[i], linear_forms[j]) for i in range(len(linear_forms)) for j in range(i)]
+        sine, frame = max(((_sine_of_angle(pair, rows), pair) for pair in pairs), key=lambda candidate: candidate[0])
         return (kind, frame) if sine > _MIN_SINE else (GENERAL, self._orthonormal_frame(rows))
 
     def _orthonormal_frame(self, rows: list[list[acb]]) -> Frame:
         """Return two linear forms in u and v that are orthonormal as forms in x."""
         one, zero = acb(1), acb(0)
-        length = acb(_inner(rows[0], rows[0]).real.sqrt())
-        slant = _inner(rows[1], rows[0]) / _inner(rows[0], rows[0]).real
-        remainder = [y - slant * x for x, y in zip(*rows, strict=True)]
-        height = acb(_inner(remainder, remainder).real.sqrt())
-        return [one / length, zero], [-slant / height, one / height]
+        length = acb(_inner_product(rows[0], rows[0]).real.sqrt())
+        projection = _inner_product(rows[1], rows[0]) / _inner_product(rows[0], rows[0]).real
+        remainder = [y - projection * x for x, y in zip(*rows, strict=True)]
+        height = acb(_inner_product(remainder, remainder).real.sqrt())
+        return [one / length, zero], [-projection / height, one / height]
 
     def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
         """Return whether an element of K is exactly 0 at the root."""
-        value = _value(element, root)
+        value = _evaluate(element, root)
         if not value.contains(acb(0)):
             return False
-        common = element.gcd(self.form.chi)  # since chi has simple roots, it is 0 at the root iff the element is
-        if common.degree() < 1 or not _value(common, root).contains(acb(0)):
-            raise _Unclear
-        if common.degree() < self.form.chi.degree() and _value(self.form.chi / common, root).contains(acb(0)):
-            raise _Unclear
+        gcd = element.gcd(self.form.chi)  # since chi has simple roots, it is 0 at the root iff the element is
+        if gcd.degree() < 1 or not _evaluate(gcd, root).contains(acb(0)):
+            raise _InsufficientPrecision
+        if gcd.degree() < self.form.chi.degree() and _evaluate(self.form.chi / gcd, root).contains(acb(0)):
+            raise _InsufficientPrecision
         return True
 
 
-def _factors(form: list[acb]) -> list[list[acb]]:
+def _linear_factors(form: list[acb]) -> list[list[acb]]:
     """Return the linear factors f u + g v, up to scale, of a binary form (u^k first) without repeated factors."""
     for p, q in _ROTATIONS:
         # u = p u' - q v', v = q u' + p v'
-        turned = _transformed(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
-        if not turned[0].contains(acb(0)):
+        rotated_form = _substitute(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
+        if not rotated_form[0].contains(acb(0)):
             try:
-                roots = acb_poly(turned[::-1]).roots(tol=arb(2) ** (ctx.prec // -2), maxprec=2 * ctx.prec)
+                roots = acb_poly(rotated_form[::-1]).roots(tol=arb(2) ** (ctx.prec // -2), maxprec=2 * ctx.prec)
             except ValueError as error:
-                raise _Unclear from error
+                raise _InsufficientPrecision from error
             # u' - root v', with u' = (p u + q v)/N, v' = (p v - q u)/N
             return [[p + root * q, q - root * p] for root in roots]
-    raise _Unclear
+    raise _InsufficientPrecision
 
 
-def _transformed(form: list[acb], matrix: Frame) -> list[acb]:
+def _substitute(form: list[acb], matrix: Frame) -> list[acb]:
     """Return the binary form after the substitution (u, v) = matrix (u', v')."""
     degree, (u, v) = len(form) - 1, (acb_poly(row) for row in matrix)  # u and v as polynomials in v', for u' = 1
-    total = sum((u ** (degree - k) * v**k * coefficient for k, coefficient in enumerate(form)), acb_poly([]))
-    return [total[k] for k in range(degree + 1)]
+    polynomial = sum((u ** (degree - k) * v**k * coefficient for k, coefficient in enumerate(form)), acb_poly([]))
+    return [polynomial[k] for k in range(degree + 1)]
 
 
-def _inverse(frame: Frame) -> Frame:
+def _invert(frame: Frame) -> Frame:
     (f, g), (k, l) = frame
     det = f * l - g * k
     return [l / det, -g / det], [-k / det, f / det]
 
 
-def _sine(frame: Frame, rows: list[list[acb]]) -> float:
+def _sine_of_angle(frame: Frame, rows: list[list[acb]]) -> float:
     """Return the sine of the angle between two forms in u and v, both expressed as forms in x."""
-    first, second = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
-    size = abs(_inner(first, second))
+    U, V = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
+    size = abs(_inner_product(U, V))
     # Not size**2: in python-flint 0.9.0 all powers except the 0th of an arb with midpoint 0 and nonzero radius are nan.
-    cosine = size * size / (_inner(first, first).real * _inner(second, second).real)
-    if not cosine.is_finite():
-        raise _Unclear
-    return float((1 - cosine).mid()) ** 0.5 if cosine < 1 else 0.0
+    squared_cosine = size * size / (_inner_product(U, U).real * _inner_product(V, V).real)
+    if not squared_cosine.is_finite():
+        raise _InsufficientPrecision
+    return float((1 - squared_cosine).mid()) ** 0.5 if squared_cosine < 1 else 0.0
 
 
-def _inner(left: list[acb], right: list[acb]) -> acb:
+def _inner_product(left: list[acb], right: list[acb]) -> acb:
     return sum((x * acb(y.real, -y.imag) for x, y in zip(left, right, strict=True)), acb(0))
 
 
@@ -308,8 +308,8 @@ def _cube_root(number: arb) -> arb:
     return root if number > 0 else -root
 
 
-def _value(polynomial: fmpq_poly, at: acb) -> acb:
-    return acb_poly(polynomial)(at)
+def _evaluate(polynomial: fmpq_poly, point: acb) -> acb:
+    return acb_poly(polynomial)(point)
 
 
 def _round_to_doubles(row: Sequence[arb]) -> list[float]:
@@ -322,5 +322,5 @@ def _round_to_doubles(row: Sequence[arb]) -> list[float]:
         elif entry.rel_accuracy_bits() >= _MIN_ACCURACY:
             doubles.append(float(entry.mid()))
         else:
-            raise _Unclear
+            raise _InsufficientPrecision
     return doubles

@@ -49,34 +49,41 @@ def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
                 f"found points with {len(ends[0])} and {len(ends[1])} coordinates, expected {dim}: "
                 f"{', '.join(variables)}"
             )
-        axes = [_values(low, high, pieces[2], dim) for low, high in zip(*ends, strict=True)]
+        axes = [_equidistant_values(low, high, pieces[2], dim) for low, high in zip(*ends, strict=True)]
         return np.stack(axes, axis=1)
     values = {name: np.zeros(1) for name in variables}
-    given = set[str]()
-    for part in text.split(","):
-        name, _, value = (piece.strip() for piece in part.partition("="))
-        if name not in values or name in given:
-            problem = f"{name} twice" if name in given else quoted(part.strip())
+    assigned_names = set[str]()
+    for assignment in text.split(","):
+        name, _, value = (piece.strip() for piece in assignment.partition("="))
+        if name not in values or name in assigned_names:
+            problem = f"{name} twice" if name in assigned_names else quoted(assignment.strip())
             raise InputError(f"found {problem}, expected NAME=LOW:HIGH:N or NAME=VALUE, with {', '.join(variables)}")
-        given.add(name)
+        assigned_names.add(name)
         pieces = value.split(":")
         if len(pieces) not in (1, 3):
             raise InputError(f"found {quoted(value)} for {name}, expected LOW:HIGH:N or a number: -1:1:20")
+        if pieces[2:] and pieces[2].strip() == "1":
+            raise InputError(f"found 1 point from LOW to HIGH for {name}, expected at least 2: type {name}={pieces[0]}")
         low, high = parse_number(pieces[0]), parse_number(pieces[-2] if len(pieces) == 3 else pieces[0])
-        values[name] = np.array([to_float(low)]) if len(pieces) == 1 else _values(low, high, pieces[2], dim)
+        values[name] = np.array([to_float(low)]) if len(pieces) == 1 else _equidistant_values(low, high, pieces[2], dim)
         if (size := prod(map(len, values.values()))) * dim > MAX_NUMBERS:
             raise InputError(f"found a grid of {size} points, expected at most {MAX_NUMBERS // dim} in dimension {dim}")
     return np.stack(np.meshgrid(*values.values(), indexing="ij"), axis=-1).reshape(-1, dim)
 
 
-def _values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArray:
+def _equidistant_values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArray:
     """Return equidistant numbers including both ends, each rounded to the nearest double."""
     digits = count.strip()
-    number = int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _MAX_DIGITS else 0
-    if not 2 <= number <= MAX_NUMBERS // dim:
+    point_count = int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _MAX_DIGITS else 0
+    if not 2 <= point_count <= MAX_NUMBERS // dim:
         raise InputError(f"found {quoted(digits)} points, expected 2 to {MAX_NUMBERS // dim} in dimension {dim}")
     to_float(low), to_float(high)  # raise the error for numbers that are too large for doubles
     denominator = int(low.q) * int(high.q)
-    first, last = int(low.p) * int(high.q), int(high.p) * int(low.q)
-    whole = number - 1  # a quotient of Python integers is rounded correctly
-    return np.array([(first * (whole - k) + last * k) / (denominator * whole) for k in range(number)])
+    low_numerator, high_numerator = int(low.p) * int(high.q), int(high.p) * int(low.q)
+    interval_count = point_count - 1  # a quotient of Python integers is rounded correctly
+    return np.array(
+        [
+            (low_numerator * (interval_count - k) + high_numerator * k) / (denominator * interval_count)
+            for k in range(point_count)
+        ]
+    )

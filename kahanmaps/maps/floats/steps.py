@@ -58,7 +58,7 @@ class FloatStep:
 
     def __init__(self, rows: int, write: Write, in_arrays: Callable[..., tuple[Any, ...]] | None = None) -> None:
         self.rows, self._write, self._in_arrays = rows, write, in_arrays
-        self.fast_code = self._code(careful=False)
+        self.fast_code = self._build_program(careful=False)
         self.operations = rows**3
         if self.fast_code is not None:
             self.operations = len(self.fast_code.operations)
@@ -67,7 +67,7 @@ class FloatStep:
     @cached_property
     def careful_code(self) -> StraightLineProgram | None:
         """The program of the careful step, written when it is first needed, since this is rare."""
-        return None if self.fast_code is None else self._code(careful=True)
+        return None if self.fast_code is None else self._build_program(careful=True)
 
     @cached_property
     def careful(self) -> Callable[..., tuple[Any, ...]]:
@@ -82,9 +82,9 @@ class FloatStep:
         """The step on floats with all checks, if the careful program exists."""
         return self.careful if self.careful_code is None else self.careful_code.function(float)
 
-    def _code(self, careful: bool) -> StraightLineProgram | None:
-        limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
-        code, checks = StraightLineProgram(self.rows, limit), StepChecks(careful)
+    def _build_program(self, careful: bool) -> StraightLineProgram | None:
+        max_operations = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
+        code, checks = StraightLineProgram(self.rows, max_operations), StepChecks(careful)
         try:
             image = self._write(code.arguments, checks)
             for x in image:
@@ -101,16 +101,16 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
     def write(z: Sequence[Any], checks: StepChecks) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
-            at, real = len(image), r < blocks.reals
-            if real:
-                U, V = z[at : at + 2]
+            row, is_real = len(image), r < blocks.reals
+            if is_real:
+                U, V = z[row : row + 2]
                 a, b, c, d = coefficients.real.tolist()
             else:
-                U, V = ComplexPair(z[at], z[at + 1]), ComplexPair(z[at + 2], z[at + 3])
+                U, V = ComplexPair(z[row], z[row + 1]), ComplexPair(z[row + 2], z[row + 3])
                 a, b, c, d = (ComplexPair(x.real, x.imag) for x in coefficients.tolist())
             A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
             for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], checks):
-                image += [x] if real else [x.x, x.y]
+                image += [x] if is_real else [x.x, x.y]
         return image
 
     return FloatStep(blocks.rows, write)
@@ -151,9 +151,7 @@ class FloatEquation(NamedTuple):
         y, n = self.monomials(x), len(self.constants)
         rows = []
         for constants, entries in zip(self.constants, self.terms, strict=True):
-            rows.append(
-                [sum((c * y[k] for k, c in terms), start) for start, terms in zip(constants, entries, strict=True)]
-            )
+            rows.append([sum((c * y[k] for k, c in terms), c0) for c0, terms in zip(constants, entries, strict=True)])
 
         def bound() -> Any:
             size: Any = 0.0
@@ -176,13 +174,13 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
     index: dict[tuple[int, ...], int] = {tuple(int(i == k) for i in range(n)): k for k in range(n)}
     products: list[tuple[int, int]] = []
 
-    def place(exponent: tuple[int, ...]) -> int:
+    def monomial_index(exponent: tuple[int, ...]) -> int:
         """Return the index of a monomial in the vector y."""
         if exponent not in index:
-            last = max(k for k, e in enumerate(exponent) if e)
-            smaller = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))
+            j = max(k for k, e in enumerate(exponent) if e)
+            divisor_index = monomial_index((*exponent[:j], exponent[j] - 1, *exponent[j + 1 :]))
             index[exponent] = n + len(products)
-            products.append((smaller, last))
+            products.append((divisor_index, j))
         return index[exponent]
 
     all_constants, all_terms = [], []
@@ -202,7 +200,7 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
                     ) from error
                 exponent = equation.exponents[k][:n]
                 if any(exponent):
-                    entries.append((place(exponent), value))
+                    entries.append((monomial_index(exponent), value))
                 else:
                     constants[j] = value
             terms.append(sorted(entries))
@@ -213,11 +211,11 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
 
 def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple[Any, ...]:
     """Take a careful step with partial pivoting in numpy arrays, for maps of many variables."""
-    near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
+    is_near_singular, is_singular, is_finite = (np.full(x[0].shape, value) for value in (False, False, True))
     image: Any = np.array(x)
     for equation in equations:
         n, y = len(x), equation.monomials(image)
-        M = np.zeros((n, n + 2, len(near)))
+        M = np.zeros((n, n + 2, len(is_near_singular)))
         M[:, :-1] = np.array(equation.constants)[:, :, None]
         for i, entries in enumerate(equation.terms):
             for j, terms in enumerate(entries):
@@ -225,11 +223,11 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
                     M[i, j] += c * y[k]
         M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # the sizes of the rows
         pivots = eliminate(M, n, 1)
-        near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
-        singular |= finite & (pivots == 0.0).any(axis=0)
+        is_near_singular |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+        is_singular |= is_finite & (pivots == 0.0).any(axis=0)
         image = M[:, n]
-        finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
-    return *image, near & finite & ~singular, singular, ~finite & ~singular
+        is_finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
+    return *image, is_near_singular & is_finite & ~is_singular, is_singular, ~is_finite & ~is_singular
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
@@ -265,14 +263,14 @@ def images_of(map_: Map, points: FloatArray) -> FloatArray:
             "and a map over QQ"
         )
     batch = BatchState.of(np.array(rows.T, order="C"))  # a copy, since steps overwrite the states
-    advance_by_numpy(_step_of(map_), batch, 0, 1, [])
+    advance_by_numpy(_cached_step(map_), batch, 0, 1, [])
     images = batch.z.T.copy()
     images[batch.status != RUNNING] = np.nan
     return images.reshape(points.shape)
 
 
 @lru_cache(maxsize=16)
-def _step_of(map_: Map) -> FloatStep:
+def _cached_step(map_: Map) -> FloatStep:
     return map_step(map_.factors)
 
 
@@ -294,19 +292,19 @@ class BatchState(NamedTuple):
     def of(cls, z: FloatArray) -> BatchState:
         """Return a batch of running orbits with these initial states."""
         n = z.shape[1]
-        counts = [np.full(n, start, dtype=np.int64) for start in (RUNNING, -1, 0, -1)]
-        return cls(np.ascontiguousarray(z), *counts)
+        columns = [np.full(n, value, dtype=np.int64) for value in (RUNNING, -1, 0, -1)]
+        return cls(np.ascontiguousarray(z), *columns)
 
-    def note(self, which: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
-        """Record the results of a careful step from `index`, for the orbits `which`; return which of these ended."""
-        near, singular, overflow = (np.broadcast_to(x, which.shape) for x in (near, singular, overflow))
-        ended = singular | overflow
-        self.status[which[ended]] = np.where(singular[ended], SINGULAR, OVERFLOW)
-        self.failed_at[which[ended]] = index + 1
-        close = which[near & ~ended]
-        self.near_at[close] = np.where(self.near[close] == 0, index, self.near_at[close])
-        self.near[close] += 1
-        return ended
+    def note(self, orbits: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
+        """Record the results of a careful step from `index`, for the orbits `orbits`; return which of these ended."""
+        near, singular, overflow = (np.broadcast_to(x, orbits.shape) for x in (near, singular, overflow))
+        has_ended = singular | overflow
+        self.status[orbits[has_ended]] = np.where(singular[has_ended], SINGULAR, OVERFLOW)
+        self.failed_at[orbits[has_ended]] = index + 1
+        near_orbits = orbits[near & ~has_ended]
+        self.near_at[near_orbits] = np.where(self.near[near_orbits] == 0, index, self.near_at[near_orbits])
+        self.near[near_orbits] += 1
+        return has_ended
 
 
 class RecordTable(NamedTuple):
@@ -317,56 +315,58 @@ class RecordTable(NamedTuple):
 
 
 _MAX_SINGLE_ORBITS = 16  # up to this number of orbits, Python floats are faster than arrays
-_GROUP = 4096  # number of orbits processed together, so that the arrays fit into the processor's cache
+_GROUP_SIZE = 4096  # number of orbits processed together, so that the arrays fit into the processor's cache
 
 
 def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
     """Advance all orbits by `steps` steps from the index `first`: in arrays, or in Python floats for a few orbits."""
     n = batch.z.shape[1]
-    single = n <= _MAX_SINGLE_ORBITS and step.fast_code is not None
-    width = 1 if single else _GROUP
+    is_single = n <= _MAX_SINGLE_ORBITS and step.fast_code is not None
+    group_size = 1 if is_single else _GROUP_SIZE
     with np.errstate(all="ignore"):
-        for start in range(0, n, width):
-            part = slice(start, min(n, start + width))
-            has_ended = batch.status[part] != RUNNING
-            path: list[list[Any]] = [[] for _ in tables]
-            x: Any = batch.z[:, start].tolist() if single else list(batch.z[:, part])
+        for start in range(0, n, group_size):
+            group = slice(start, min(n, start + group_size))
+            has_ended = batch.status[group] != RUNNING
+            buffers: list[list[Any]] = [[] for _ in tables]
+            x: Any = batch.z[:, start].tolist() if is_single else list(batch.z[:, group])
             for index in range(first, first + steps):
                 try:
                     if step.fast_code is None:
-                        image, good = x, False
-                    elif single:
-                        *image, good = step.fast_on_floats(*x)
-                        if not good and step.careful_code is not None:
-                            *image, near, singular, overflow = step.careful_on_floats(*x)
-                            good = not (near or singular or overflow)
+                        image, is_good = x, False
+                    elif is_single:
+                        *image, is_good = step.fast_on_floats(*x)
+                        if not is_good and step.careful_code is not None:
+                            *image, is_near_singular, is_singular, is_overflow = step.careful_on_floats(*x)
+                            is_good = not (is_near_singular or is_singular or is_overflow)
                     else:
-                        *image, good = step.fast(*x)
+                        *image, is_good = step.fast(*x)
                 except ZeroDivisionError:  # in arrays the result would be infinite
-                    image, good = x, False
+                    image, is_good = x, False
                 # Orbits in which the fast step is not valid repeat it as a careful step.
-                if good is not True and not np.all(good | has_ended):
-                    repeat = np.flatnonzero(~(good | has_ended))
+                if is_good is not True and not np.all(is_good | has_ended):
+                    repeated_orbits = np.flatnonzero(~(is_good | has_ended))
                     points_before, points_after = (
                         np.array([np.broadcast_to(row, has_ended.shape) for row in state]) for state in (x, image)
                     )
-                    *careful, near, singular, overflow = step.careful(*points_before[:, repeat])
-                    ended = batch.note(start + repeat, index, near, singular, overflow)
-                    for row, values in zip(points_after, careful, strict=True):
-                        row[repeat] = np.where(ended, 0.0, values)
-                    has_ended[repeat] |= ended
-                    image = points_after[:, 0].tolist() if single else list(points_after)
+                    *careful_image, is_near_singular, is_singular, is_overflow = step.careful(
+                        *points_before[:, repeated_orbits]
+                    )
+                    ends_now = batch.note(start + repeated_orbits, index, is_near_singular, is_singular, is_overflow)
+                    for row, values in zip(points_after, careful_image, strict=True):
+                        row[repeated_orbits] = np.where(ends_now, 0.0, values)
+                    has_ended[repeated_orbits] |= ends_now
+                    image = points_after[:, 0].tolist() if is_single else list(points_after)
                 x = image
-                for buffer, (interval, states) in zip(path, tables, strict=True):
-                    if (index + 1) % interval == 0 and single:
+                for buffer, (interval, states) in zip(buffers, tables, strict=True):
+                    if (index + 1) % interval == 0 and is_single:
                         buffer.append(x)
                     elif (index + 1) % interval == 0:
                         for row, values in zip(states[(index + 1) // interval - first // interval - 1], x, strict=True):
-                            row[part] = values
-                if single and has_ended[0]:
+                            row[group] = values
+                if is_single and has_ended[0]:
                     break
-            for buffer, (_, states) in zip(path, tables, strict=True):
+            for buffer, (_, states) in zip(buffers, tables, strict=True):
                 if buffer:
                     states[: len(buffer), :, start] = buffer
             for row, values in zip(batch.z, x, strict=True):
-                row[part] = np.where(has_ended, 0.0, values)
+                row[group] = np.where(has_ended, 0.0, values)

@@ -53,62 +53,64 @@ class StraightLineProgram:
         self.operations: list[tuple[str, tuple[Any, ...]]] = []
         self.outputs: Sequence[Any] = ()
         self._limit = limit
-        self._known: dict[tuple[str, tuple[Any, ...]], Value] = {}
+        self._value_of_operation: dict[tuple[str, tuple[Any, ...]], Value] = {}
         self.arguments = [Value(self, k) for k in range(inputs)]
 
     def emit(self, name: str, *operands: Any) -> Value:
         """Return the value of an operation, and record the operation unless it is already recorded."""
         keys = tuple(x.number if isinstance(x, Value) else ("constant", float(x)) for x in operands)
         key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
-        if key not in self._known:
+        if key not in self._value_of_operation:
             if self._limit is not None and len(self.operations) >= self._limit:
                 raise TooManyOperations
-            self._known[key] = Value(self, self.inputs + len(self.operations))
+            self._value_of_operation[key] = Value(self, self.inputs + len(self.operations))
             self.operations.append((name, operands))
-        return self._known[key]
+        return self._value_of_operation[key]
 
     def function(self, kind: type) -> Callable[..., tuple[Any, ...]]:
         """Compile the program to a Python function of floats, or of arrays if `kind` is np.ndarray."""
-        last = {
+        last_use = {
             x.number: k for k, (_, operands) in enumerate(self.operations) for x in operands if isinstance(x, Value)
         }
-        last |= {x.number: len(self.operations) for x in self.outputs if isinstance(x, Value)}
+        last_use |= {x.number: len(self.operations) for x in self.outputs if isinstance(x, Value)}
         names = {k: f"v{k}" for k in range(self.inputs)}
-        unused: list[str] = []  # names to be reused, so that fewer arrays have to fit into the processor's cache
+        free_names: list[str] = []  # names to be reused, so that fewer arrays have to fit into the processor's cache
 
-        def text(x: Any) -> str:
+        def operand_text(x: Any) -> str:
             return names[x.number] if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
 
         lines = [f"def step({', '.join(names.values())}):"]
         for k, (name, operands) in enumerate(self.operations):
-            if self.inputs + k not in last:
+            if self.inputs + k not in last_use:
                 continue
-            x = [text(operand) for operand in operands]
+            x = [operand_text(operand) for operand in operands]
             if name in _SYMBOLS:
-                right = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
+                expression = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
             elif name in ("neg", "not"):
-                right = f"-{x[0]}" if name == "neg" else f"{x[0]} ^ True"
+                expression = f"-{x[0]}" if name == "neg" else f"{x[0]} ^ True"
             elif name == "select" and kind is float:
-                right = f"{x[1]} if {x[0]} else {x[2]}"
+                expression = f"{x[1]} if {x[0]} else {x[2]}"
             else:
-                right = f"{name}({', '.join(x)})"
-            dying = {
-                v.number for v in operands if isinstance(v, Value) and last[v.number] == k and v.number >= self.inputs
+                expression = f"{name}({', '.join(x)})"
+            released_values = {
+                v.number
+                for v in operands
+                if isinstance(v, Value) and last_use[v.number] == k and v.number >= self.inputs
             }
-            free_names = [names[number] for number in sorted(dying)]
+            released_names = [names[number] for number in sorted(released_values)]
             if kind is not float and name in ("add", "sub", "mul", "div") and isinstance(operands[0], Value):
-                if name in ("add", "mul") and operands[0].number not in dying:
+                if name in ("add", "mul") and operands[0].number not in released_values:
                     x.reverse()
-                if x[0] in free_names:  # overwrite this array
-                    free_names.remove(x[0])
+                if x[0] in released_names:  # overwrite this array
+                    released_names.remove(x[0])
                     names[self.inputs + k] = x[0]
                     lines.append(f"    {x[0]} {_SYMBOLS[name]}= {x[1]}")
-                    unused += free_names
+                    free_names += released_names
                     continue
-            unused += free_names
-            names[self.inputs + k] = unused.pop() if unused else f"v{self.inputs + k}"
-            lines.append(f"    {names[self.inputs + k]} = {right}")
-        lines.append(f"    return ({''.join(f'{text(x)}, ' for x in self.outputs)})")
+            free_names += released_names
+            names[self.inputs + k] = free_names.pop() if free_names else f"v{self.inputs + k}"
+            lines.append(f"    {names[self.inputs + k]} = {expression}")
+        lines.append(f"    return ({''.join(f'{operand_text(x)}, ' for x in self.outputs)})")
         functions: dict[str, Any] = {"select": np.where, "max": np.maximum, "min": np.minimum}
         if kind is float:
             functions = {"max": max, "min": min}
@@ -124,8 +126,8 @@ class Value:
         self.code, self.number = code, number
 
     def __neg__(self) -> Any:
-        positive = _operand_of_negation(self)
-        return self.code.emit("neg", self) if positive is None else positive
+        operand = _operand_of_negation(self)
+        return self.code.emit("neg", self) if operand is None else operand
 
     def __add__(self, other: Any) -> Any:
         if is_zero(other):
@@ -168,8 +170,8 @@ class Value:
         return 0.0 if is_zero(other) else self.code.emit("div", other, self)
 
     def __abs__(self) -> Any:
-        positive = _operand_of_negation(self)
-        return self.code.emit("abs", self if positive is None else positive)
+        operand = _operand_of_negation(self)
+        return self.code.emit("abs", self if operand is None else operand)
 
     def __gt__(self, other: Any) -> Any:
         return self.code.emit("gt", self, other)
@@ -239,8 +241,10 @@ def select(condition: Any, if_true: Any, if_false: Any) -> Any:
     """Return `if_true` if the condition holds, otherwise `if_false` (for each orbit)."""
     if isinstance(condition, bool):
         return if_true if condition else if_false
-    same = if_true is if_false or (isinstance(if_true, float) and isinstance(if_false, float) and if_true == if_false)
-    return if_true if same else condition.code.emit("select", condition, if_true, if_false)
+    is_same = if_true is if_false or (
+        isinstance(if_true, float) and isinstance(if_false, float) and if_true == if_false
+    )
+    return if_true if is_same else condition.code.emit("select", condition, if_true, if_false)
 
 
 def extreme(name: str, x: Any, y: Any) -> Any:
@@ -271,11 +275,11 @@ class StepChecks:
         if isinstance(pivot, float):  # a constant, which is 0 if the matrix is singular at all points
             self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
             return
-        usual = abs(pivot) > threshold
+        is_large = abs(pivot) > threshold
         if self.careful:
-            self.near, self.zero = self.near | ~usual, self.zero | pivot.code.emit("eq", pivot, 0.0)
+            self.near, self.zero = self.near | ~is_large, self.zero | pivot.code.emit("eq", pivot, 0.0)
         else:
-            self.good = self.good & usual
+            self.good = self.good & is_large
         self.number(pivot)
 
     def number(self, x: Any) -> None:
@@ -291,8 +295,8 @@ class StepChecks:
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
-        fails = singular | _negation(self.finite)
-        return [self.near & _negation(fails), singular, fails & _negation(singular)]
+        has_failed = singular | _negation(self.finite)
+        return [self.near & _negation(has_failed), singular, has_failed & _negation(singular)]
 
 
 def _negation(x: Any) -> Any:
@@ -308,14 +312,14 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
     rhs, remaining, solution = [row[n] for row in rows], set(range(n)), [0.0] * n
     # A row with one entry is solved first. A column with one entry is solved last: only one row contains its unknown.
-    after: list[tuple[int, int]] = []
+    solved_last: list[tuple[int, int]] = []
     while remaining:
-        single = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
-        if single is not None:
-            remaining.remove(single)
-            ((j, pivot),) = matrix[single].items()
+        single_row = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
+        if single_row is not None:
+            remaining.remove(single_row)
+            ((j, pivot),) = matrix[single_row].items()
             checks.pivot(pivot, NEAR)
-            solution[j] = rhs[single] / pivot
+            solution[j] = rhs[single_row] / pivot
             for k in remaining:
                 if j in matrix[k]:
                     rhs[k] = rhs[k] - matrix[k].pop(j) * solution[j]
@@ -324,11 +328,11 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
         for i in sorted(remaining):
             for j in matrix[i]:
                 columns.setdefault(j, []).append(i)
-        alone = next((j for j in sorted(columns) if len(columns[j]) == 1), None)
-        if alone is None:
+        lone_column = next((j for j in sorted(columns) if len(columns[j]) == 1), None)
+        if lone_column is None:
             break
-        after.append((columns[alone][0], alone))
-        remaining.remove(columns[alone][0])
+        solved_last.append((columns[lone_column][0], lone_column))
+        remaining.remove(columns[lone_column][0])
     while remaining:  # split into connected blocks, i.e. rows that are linked by common unknowns
         block: set[int] = set()
         component = {min(remaining)}
@@ -336,15 +340,15 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
             block, unknowns = component, {j for i in component for j in matrix[i]}
             component = {i for i in remaining if unknowns & matrix[i].keys()} | block
         remaining -= block
-        order = sorted(unknowns)
-        if len(order) != len(block):  # the matrix is singular at all points
+        unknown_list = sorted(unknowns)
+        if len(unknown_list) != len(block):  # the matrix is singular at all points
             checks.pivot(0.0, NEAR)
             continue
-        square = [[*(matrix[i].get(j, 0.0) for j in order), rhs[i]] for i in sorted(block)]
-        values = solve_two(square, checks) if len(square) == 2 else _eliminate(square, bound, checks)
-        for j, value in zip(order, values, strict=True):
+        block_rows = [[*(matrix[i].get(j, 0.0) for j in unknown_list), rhs[i]] for i in sorted(block)]
+        values = solve_two(block_rows, checks) if len(block_rows) == 2 else _eliminate(block_rows, bound, checks)
+        for j, value in zip(unknown_list, values, strict=True):
             solution[j] = value
-    for i, j in reversed(after):
+    for i, j in reversed(solved_last):
         checks.pivot(matrix[i][j], NEAR)
         total = rhs[i]
         for k, entry in matrix[i].items():
@@ -357,15 +361,15 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
     # The bound for the pivot a d - b c grows with b c: digits are lost if a d and b c cancel, however large they are.
     (a, b, r), (c, d, s) = rows
-    product = b * c
-    det = a * d - product
+    bc = b * c
+    det = a * d - bc
     if isinstance(det, ComplexPair):
         norm = det.norm()
-        checks.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
-        share = _inverse(norm)
-        inverse: Any = ComplexPair(det.x * share, -(det.y * share))
+        checks.pivot(norm, NEAR**2 + NEAR**2 * bc.norm())
+        inverse_norm = _inverse(norm)
+        inverse: Any = ComplexPair(det.x * inverse_norm, -(det.y * inverse_norm))
     else:
-        checks.pivot(det, NEAR + NEAR * abs(product))
+        checks.pivot(det, NEAR + NEAR * abs(bc))
         inverse = _inverse(det)
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
@@ -373,70 +377,70 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
 def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
     """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small."""
     n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
-    order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
-    if len(order) < n:  # the matrix is singular at all points
+    pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
+    if len(pivots) < n:  # the matrix is singular at all points
         checks.pivot(0.0, NEAR)
         return [0.0] * n
     for row in M if checks.careful else ():
         for x in row[:n]:
             row[-1] = extreme("max", row[-1], abs(x))
     inverses: list[Any] = []
-    smallest, factors = np.inf, 0.0
-    for step, (i, j) in enumerate(order):
-        columns = [*(c for _, c in order[step + 1 :]), n]
-        later = [k for k, _ in order[step + 1 :]]
-        for k in later if checks.careful else ():
-            swap = abs(M[k][j]) > MAX_FACTOR * abs(M[i][j])
+    smallest_pivot, largest_factor = np.inf, 0.0
+    for step, (i, j) in enumerate(pivots):
+        columns = [*(c for _, c in pivots[step + 1 :]), n]
+        later_rows = [k for k, _ in pivots[step + 1 :]]
+        for k in later_rows if checks.careful else ():
+            is_swapped = abs(M[k][j]) > MAX_FACTOR * abs(M[i][j])
             for c in (j, *columns, n + 1):
-                entry, other = M[i][c], M[k][c]
-                M[i][c], M[k][c] = select(swap, other, entry), select(swap, entry, other)
+                entry, entry_below = M[i][c], M[k][c]
+                M[i][c], M[k][c] = select(is_swapped, entry_below, entry), select(is_swapped, entry, entry_below)
         inverses.append(_inverse(M[i][j]))
         if checks.careful:
             checks.pivot(M[i][j], NEAR * M[i][n + 1])
         else:
             checks.number(M[i][j])
-            smallest = extreme("min", smallest, abs(M[i][j]))
-        for k in later:
+            smallest_pivot = extreme("min", smallest_pivot, abs(M[i][j]))
+        for k in later_rows:
             if not is_zero(M[k][j]):
                 factor = M[k][j] * inverses[-1]
-                factors = extreme("max", factors, abs(factor))
+                largest_factor = extreme("max", largest_factor, abs(factor))
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
     if not checks.careful:
-        checks.good = checks.good & (smallest > NEAR * bound()) & (factors <= MAX_FACTOR)
+        checks.good = checks.good & (smallest_pivot > NEAR * bound()) & (largest_factor <= MAX_FACTOR)
     solution: list[Any] = [0.0] * n
-    for (i, j), inverse in zip(reversed(order), reversed(inverses), strict=True):
+    for (i, j), inverse in zip(reversed(pivots), reversed(inverses), strict=True):
         solution[j] = M[i][n] * inverse
-        for k, _ in order:
+        for k, _ in pivots:
             if k == i:
                 break
             M[k][n] = M[k][n] - M[k][j] * solution[j]
     return solution
 
 
-def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
+def _choose_pivots(nonzero_columns: list[set[int]]) -> list[tuple[int, int]]:
     """Return row and column of each pivot, on the diagonal if possible, with little fill-in (Markowitz).
 
     The result has fewer pivots than rows if the positions of the zeros make the matrix singular.
     """
-    rows, order = {i: set(row) for i, row in enumerate(pattern)}, []
+    rows, pivots = {i: set(row) for i, row in enumerate(nonzero_columns)}, []
     while rows:
-        counts: dict[int, int] = {}
+        column_counts: dict[int, int] = {}
         for row in rows.values():
             for j in row:
-                counts[j] = counts.get(j, 0) + 1
+                column_counts[j] = column_counts.get(j, 0) + 1
         candidates = [(i, j) for i, row in rows.items() for j in row]
         candidates = [(i, j) for i, j in candidates if i == j] or candidates
         if not candidates:
             break
-        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (counts[entry[1]] - 1), entry))
-        pivot = rows.pop(i)
-        order.append((i, j))
+        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (column_counts[entry[1]] - 1), entry))
+        pivot_row = rows.pop(i)
+        pivots.append((i, j))
         for row in rows.values():
             if j in row:
-                row |= pivot
+                row |= pivot_row
                 row.discard(j)
-    return order
+    return pivots
 
 
 def _inverse(x: Any) -> Any:

@@ -46,9 +46,11 @@ class Closure:
     @property
     def text(self) -> str:
         """The result as one line."""
-        verb = "not dense" if self.is_dense is False else "dense"
-        zariski = f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
-        return f"{verb} in the real components that it visits ({self.status}: {self.reason}){zariski}"
+        answer = "not dense" if self.is_dense is False else "dense"
+        zariski_text = (
+            f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
+        )
+        return f"{answer} in the real components that it visits ({self.status}: {self.reason}){zariski_text}"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -72,14 +74,14 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
     """
     if any(order is not None for order in orders):
         return Closure(False, "a translation has finite order")
-    values = fmpq_poly([1])
+    gamma_polynomial = fmpq_poly([1])
     for gamma in gammas:
-        values *= fmpq_poly([-gamma, 1]) if isinstance(gamma, fmpq) else fmpq_poly(gamma.matrix.charpoly())
-    if values.gcd(values.derivative()).degree() > 0:
+        gamma_polynomial *= fmpq_poly([-gamma, 1]) if isinstance(gamma, fmpq) else fmpq_poly(gamma.matrix.charpoly())
+    if gamma_polynomial.gcd(gamma_polynomial.derivative()).degree() > 0:
         return Closure(False, "gamma has the same value at two roots of chi, so the rotation numbers are dependent")
     if len(numbers) == 1:
         return Closure(True, "the translation of a circle has infinite order")
-    bound, prime = excluded_relations(numbers), separating_prime(values)
+    bound, prime = excluded_relations(numbers), separating_prime(gamma_polynomial)
     if bound < _SUPPORT:
         return Closure(None, "the rotation numbers may be dependent", None, prime)
     return Closure(None, f"no integer relation of the rotation numbers has coefficients up to {bound}", bound, prime)
@@ -103,8 +105,8 @@ def separating_prime(values: fmpq_poly) -> int | None:
             continue
         squares, discriminants = {x * x % p for x in range(1, p)}, []
         for gamma in roots:
-            cubics = [(((x + 9 + 3 * gamma) * x + 48 * gamma) * x + 64 * gamma * gamma) % p for x in range(p)]
-            trace = sum(1 if y else 0 for y in cubics) - 2 * sum(y in squares for y in cubics)
+            cubic_values = [(((x + 9 + 3 * gamma) * x + 48 * gamma) * x + 64 * gamma * gamma) % p for x in range(p)]
+            trace = sum(1 if y else 0 for y in cubic_values) - 2 * sum(y in squares for y in cubic_values)
             discriminants.append(trace * trace - 4 * p)
         products = (x * y for x, y in combinations(discriminants, 2))
         if all(isqrt(product) ** 2 != product for product in products):
@@ -129,16 +131,16 @@ def excluded_relations(numbers: Sequence[arb]) -> int:
             integer = (_SCALE * x).mid().floor().unique_fmpz()
         assert integer is not None  # a midpoint is an exact number
         rows.append([int(i == k) for i in range(d)] + [integer])
-    reduced = fmpz_mat([*rows, [0] * d + [_SCALE]]).lll().tolist()
-    orthogonal: list[list[fmpq]] = []
-    lengths: list[fmpq] = []
-    for row in reduced:
+    reduced_basis = fmpz_mat([*rows, [0] * d + [_SCALE]]).lll().tolist()
+    orthogonal_basis: list[list[fmpq]] = []
+    squared_lengths: list[fmpq] = []
+    for row in reduced_basis:
         vector = [fmpq(x) for x in row]
-        for other, length in zip(orthogonal, lengths, strict=True):
-            factor = sum((x * y for x, y in zip(row, other, strict=True)), fmpq(0)) / length
-            vector = [x - factor * y for x, y in zip(vector, other, strict=True)]
-        orthogonal.append(vector)
-        lengths.append(sum((x * x for x in vector), fmpq(0)))
+        for previous_vector, squared_length in zip(orthogonal_basis, squared_lengths, strict=True):
+            factor = sum((x * y for x, y in zip(row, previous_vector, strict=True)), fmpq(0)) / squared_length
+            vector = [x - factor * y for x, y in zip(vector, previous_vector, strict=True)]
+        orthogonal_basis.append(vector)
+        squared_lengths.append(sum((x * x for x in vector), fmpq(0)))
     # [C rho] has an error of at most 3, so the last entry of a relation is at most 3 d N.
-    least = min(lengths)
-    return isqrt(int((least.p - 1) // (least.q * d * (1 + 9 * d))))
+    min_squared_length = min(squared_lengths)
+    return isqrt(int((min_squared_length.p - 1) // (min_squared_length.q * d * (1 + 9 * d))))

@@ -41,11 +41,11 @@ class PeriodicLevels:
     @cached_property
     def primitive(self) -> fmpz_poly:
         """The primitive part of psi_N, without the factors that it shares with psi_d for proper divisors d of N."""
-        polynomial, table = self.psi, division_polynomials(self.period)
+        polynomial, psi = self.psi, division_polynomials(self.period)
         for d in range(1, self.period):
             if self.period % d == 0:
-                while (common := polynomial.gcd(table[d])).degree() > 0:
-                    polynomial = polynomial / common
+                while (common_factor := polynomial.gcd(psi[d])).degree() > 0:
+                    polynomial = polynomial / common_factor
         return polynomial / polynomial.content()
 
     @cached_property
@@ -75,10 +75,10 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     """
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
-    def product(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """The product of psi at these indices, as a term of psi_n: three superfluous cube roots give a factor gamma."""
-        cube_roots = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
-        value = _GAMMA ** (cube_roots // 3)
+    def term(n: int, indices: tuple[int, ...]) -> fmpz_poly:
+        """Return the product of psi at these indices; three superfluous cube roots give a factor gamma."""
+        cube_root_count = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
+        value = _GAMMA ** (cube_root_count // 3)
         for k in indices:
             value = value * psi[k]
         return value
@@ -86,9 +86,9 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     for n in range(5, largest + 1):
         k = n // 2
         if n % 2:
-            psi.append(product(n, (k + 2, k, k, k)) - product(n, (k - 1, k + 1, k + 1, k + 1)))
+            psi.append(term(n, (k + 2, k, k, k)) - term(n, (k - 1, k + 1, k + 1, k + 1)))
         else:
-            psi.append((product(n, (k, k + 2, k - 1, k - 1)) - product(n, (k, k - 2, k + 1, k + 1))) / 2)
+            psi.append((term(n, (k, k + 2, k - 1, k - 1)) - term(n, (k, k - 2, k + 1, k + 1))) / 2)
     return psi[: largest + 1]
 
 

@@ -31,7 +31,7 @@ from kahanmaps.maps.normal_form.closure import Closure, closure
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
-from kahanmaps.maps.normal_form.plane_heights import plane_height
+from kahanmaps.maps.normal_form.plane_heights import plane_height, value_at_root
 from kahanmaps.maps.normal_form.splitting import Plane, Splitting
 from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
 from kahanmaps.maps.values import as_point
@@ -107,26 +107,27 @@ class PlaneGeometry:
         lines = [f"plane {self.name}\t{self.kind}"]
         if self.j is None or self.point is None or self.bad_primes is None:
             return lines
-        order = "infinite order" if self.order is None else f"order {self.order}"
-        minimal = self.bad_primes.minimal_discriminant
+        order_text = "infinite order" if self.order is None else f"order {self.order}"
+        minimal_discriminant = self.bad_primes.minimal_discriminant
         lines += [
             f"  k^3\t{_text(self.delta)}",
             f"  Weierstrass model\tY^2 = x^3 + (9 + 3 g) x^2 + 48 g x + 64 g^2, g = 1 - k^3 = {_text(self.gamma)}",
             f"  j-invariant\t{_text(self.j)}",
-            f"  discriminant\t{_text(self.discriminant)}" + ("" if minimal is None else f", minimal {minimal}"),
+            f"  discriminant\t{_text(self.discriminant)}"
+            + ("" if minimal_discriminant is None else f", minimal {minimal_discriminant}"),
             f"  bad primes\t{self.bad_primes.text}" + (" (the primes of Q below them)" if self.degree > 1 else ""),
-            f"  translation\t({', '.join(map(_text, self.point))}), {order} (proved: {self.reason})",
+            f"  translation\t({', '.join(map(_text, self.point))}), {order_text} (proved: {self.reason})",
         ]
         if self.height is not None:
             is_accurate = self.height_error <= _HEIGHT_ACCURACY
-            error = f"{self.height:.10g}" if is_accurate else f"{self.height:.5g} +/- {self.height_error:.1g}"
-            lines.append(f"  canonical height\t{error}")
+            height_text = f"{self.height:.10g}" if is_accurate else f"{self.height:.5g} +/- {self.height_error:.1g}"
+            lines.append(f"  canonical height\t{height_text}")
         for rotation in self.rotations:
             note = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
             if len(rotation.numbers) == 2:
                 note = ", on a connected torus of real dimension 2"
-            numbers = ", ".join(x.str(12) for x in rotation.numbers)
-            lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{note}")
+            numbers_text = ", ".join(x.str(12) for x in rotation.numbers)
+            lines.append(f"  rotation number\t{numbers_text} at t = {rotation.root}{note}")
             if rotation.component is not None:
                 lines.append(f"    initial point\ton the {rotation.component} component")
             if rotation.flow is not None:
@@ -138,7 +139,7 @@ class PlaneGeometry:
     def to_json(self) -> dict[str, Any]:
         """Return plain data; exact numbers are given as text."""
         names = ("delta", "gamma", "j", "discriminant")
-        exact = {name: None if (x := getattr(self, name)) is None else _text(x) for name in names}
+        exact_texts = {name: None if (x := getattr(self, name)) is None else _text(x) for name in names}
         rotations = [
             {
                 "root": rotation.root,
@@ -150,10 +151,10 @@ class PlaneGeometry:
             }
             for rotation in self.rotations
         ]
-        plain = {"name": self.name, "kind": self.kind.name.lower(), "order": self.order, "reason": self.reason}
+        summary = {"name": self.name, "kind": self.kind.name.lower(), "order": self.order, "reason": self.reason}
         return {
-            **plain,
-            **exact,
+            **summary,
+            **exact_texts,
             "point": None if self.point is None else [_text(x) for x in self.point],
             "bad_primes": None if self.bad_primes is None else self.bad_primes.to_json(),
             "height": self.height,
@@ -272,39 +273,39 @@ def geometry(
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
     """Return the geometry for a system whose normal form is given; see `geometry`."""
     planes = []
-    for plane, triple, kind, gamma, rotations in _levels(normal_form, eps, start):
+    for plane, triple, kind, gamma, rotations in _plane_levels(normal_form, eps, start):
         if kind is not PeriodKind.SMOOTH:
             planes.append(PlaneGeometry(plane.name, kind, degree=plane.degree))
             continue
         delta = 1 - gamma
         order, reason = torsion_order(gamma)
-        height: arb | None = None
+        height_ball: arb | None = None
         is_rational = isinstance(gamma, fmpq)
         bits = gamma.height_bits() if is_rational else max(x.height_bits() for x in gamma.coefficients)
         if order is not None:
-            height = arb(0)
+            height_ball = arb(0)
         elif bits <= _LONGEST_HEIGHT and is_rational:
             curve = Jacobian(gamma)
-            height = canonical_height(curve, curve.T)
+            height_ball = canonical_height(curve, curve.T)
         elif bits <= _LONGEST_HEIGHT and plane.degree <= _MAX_HEIGHT_DEGREE:
-            height = plane_height(plane.block, triple)
+            height_ball = plane_height(plane.block, triple)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
-        middle = None if height is None else float(height.mid())
-        error = _HEIGHT_ACCURACY if height is None else max(_HEIGHT_ACCURACY, float(height.rad()))
-        bad = bad_primes_of_plane(gamma)
-        planes.append(
-            PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, middle, rotations, error, plane.degree, bad)
-        )
+        height_value = None if height_ball is None else float(height_ball.mid())
+        height_error = _HEIGHT_ACCURACY if height_ball is None else max(_HEIGHT_ACCURACY, float(height_ball.rad()))
+        bad_primes = bad_primes_of_plane(gamma)
+        last_fields = rotations, height_error, plane.degree, bad_primes
+        planes.append(PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, height_value, *last_fields))
     # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
-    moving = [plane for plane in planes if plane.kind is not PeriodKind.FIXED]
-    constant = None
-    if moving and all(plane.height is not None for plane in moving):
-        constant = sum(3 * plane.degree * plane.height for plane in moving if plane.height is not None) / math.log(2)
-    closed = None
-    if moving and all(plane.kind is PeriodKind.SMOOTH for plane in moving):
-        numbers = [number for plane in moving for rotation in plane.rotations for number in rotation.numbers]
-        closed = closure([plane.gamma for plane in moving], [plane.order for plane in moving], numbers)
-    return LevelGeometry(tuple(planes), constant, closed)
+    moving_planes = [plane for plane in planes if plane.kind is not PeriodKind.FIXED]
+    height_constant, orbit_closure = None, None
+    heights = [3 * plane.degree * plane.height for plane in moving_planes if plane.height is not None]
+    if moving_planes and len(heights) == len(moving_planes):
+        height_constant = sum(heights) / math.log(2)
+    if moving_planes and all(plane.kind is PeriodKind.SMOOTH for plane in moving_planes):
+        gammas, orders = [plane.gamma for plane in moving_planes], [plane.order for plane in moving_planes]
+        all_rotations = [rotation for plane in moving_planes for rotation in plane.rotations]
+        orbit_closure = closure(gammas, orders, [number for rotation in all_rotations for number in rotation.numbers])
+    return LevelGeometry(tuple(planes), height_constant, orbit_closure)
 
 
 def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> dict[str, Rotation]:
@@ -312,16 +313,18 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 
     Raises PrecisionLost if a level is almost singular.
     """
-    return {rotation.root: rotation for *_, of_plane in _levels(normal_form, eps, start) for rotation in of_plane}
+    return {
+        rotation.root: rotation for *_, rotations in _plane_levels(normal_form, eps, start) for rotation in rotations
+    }
 
 
-def _levels(
+def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
     """Yield for each plane the point, the kind of its level curve, gamma, and the rotations if the level is smooth."""
     form: Any = getattr(normal_form, "form", normal_form)
-    exact = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
-    for plane, triple in zip(exact.planes, exact.triples([QQ.convert(x) for x in start]), strict=True):
+    splitting = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
+    for plane, triple in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
         kind, gamma = classify(plane.block, triple)
         rotations: tuple[Rotation, ...] = ()
         if kind is PeriodKind.SMOOTH:
@@ -349,19 +352,21 @@ def rotations_of(gamma: Any, block: PlanarBlock, point: Triple, name: str) -> tu
     Raises PrecisionLost if 32768 bits do not suffice.
     """
     (U, V, _), (p, q, r) = point, block.D
-    exact = gamma, block.discriminant, block.h(U, V), p * U * U + q * U * V + r * V * V
+    exact_values = gamma, block.discriminant, block.h(U, V), p * U * U + q * U * V + r * V * V
     for bits in (128, 512, 2048, 8192, MAX_BITS):
         with RR(bits).working(), suppress(PrecisionLost):
             rotations = []
             if isinstance(gamma, fmpq):
-                rotations.append(_real_rotation(*map(arb, exact), root=name.removeprefix("t = ")))
+                rotations.append(_real_rotation(*map(arb, exact_values), root=name.removeprefix("t = ")))
             else:
                 roots: Any = gamma.field.chi.complex_roots()
                 for root in (acb(root) for root, _ in roots if not root.imag < 0):
                     is_real, label = root.imag == 0, root.str(8, radius=False)
-                    at = [_at(x, root.real if is_real else root) for x in exact]
+                    values = [value_at_root(x, root.real if is_real else root) for x in exact_values]
                     rotations.append(
-                        _real_rotation(*at, root=label) if is_real else Rotation(label, _complex_rotation(at[0]))
+                        _real_rotation(*values, root=label)
+                        if is_real
+                        else Rotation(label, _complex_rotation(values[0]))
                     )
             balls = [x for rotation in rotations for x in (*rotation.numbers, rotation.flow) if x is not None]
             errors = [rotation.phase_error for rotation in rotations if rotation.phase_error is not None]
@@ -375,57 +380,43 @@ def rotations_of(gamma: Any, block: PlanarBlock, point: Triple, name: str) -> tu
     )
 
 
-def _at(element: Any, root: Any) -> Any:
-    """Return the value of an element of Q[t]/g at a root of g."""
-    total = 0 * root
-    for coefficient in reversed(element.polynomial.coeffs()):
-        total = total * root + arb(coefficient)
-    return total
-
-
 def _real_rotation(gamma: arb, disc: arb, h: arb, D: arb, *, root: str) -> Rotation:
     """Return the rotation at a real root of chi."""
     curve = Jacobian(gamma)
     # For gamma < 0 the cubic polynomial of the Jacobian has three real roots, and T lies on the oval.
     number, steps = rotation_number(curve, curve.T, has_oval=not gamma > 0)
-    flow, error, component = _flow_rotation(disc, h), None, None
+    # On a level of h, p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2 along the flow u' = h_v, v' = -h_u. If h has three
+    # real roots, p has three poles in a period, one at each point at infinity.
+    g3, one_third = 27 * disc * h * h, arb(1) / 3
+    unit_period = one_third.gamma() ** 3 / (2 * arb.pi())  # the period of p'^2 = 4 p^3 - 1
+    period = unit_period / abs(g3).root(6)
+    flow = 1 / (3 * period) if g3 > 0 else 1 / (period * arb(3).sqrt())
+    phase_error, component = None, None
     if not (D + 1 > 0 or D + 1 < 0) or (steps == 2 and not (D + 3 > 0 or D + 3 < 0)):
         raise PrecisionLost("the position of the point on its level cannot be decided")
     if steps == 2:
         component = "oval" if D + 3 > 0 else "unbounded"
     elif D + 1 > 0:  # gamma > 0 for all smaller eps, and 0 < number < 1/2 is a continuous function of eps
-        error = number - flow
-    return Rotation(root, (number,), steps, flow, error, component)
-
-
-def _flow_rotation(disc: arb, h: arb) -> arb:
-    """Return 1/period of the flow u' = h_v, v' = -h_u on a level of h.
-
-    On this level p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2. If h has three real roots, p has three poles in a
-    period, one at each point at infinity.
-    """
-    g3 = 27 * disc * h * h
-    unit = arb(1) / 3
-    period = unit.gamma() ** 3 / (2 * arb.pi()) / abs(g3).root(6)  # the period of p'^2 = 4 p^3 - 1, for g3 > 0
-    return 1 / (3 * period) if g3 > 0 else 1 / (period * arb(3).sqrt())
+        phase_error = number - flow
+    return Rotation(root, (number,), steps, flow, phase_error, component)
 
 
 def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     """Return the coordinates of T in a reduced basis of the periods."""
     a, b, c = sorted((-root for root in complex_roots(Jacobian(gamma))), key=lambda e: (e.real.mid(), e.imag.mid()))
     zero = acb(0)
-    first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
+    omega1, omega2 = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
     while True:  # Gauss's reduction of a binary quadratic form
-        if abs(first) > abs(second):
-            first, second = second, first
-        quotient = (second / first).real
+        if abs(omega1) > abs(omega2):
+            omega1, omega2 = omega2, omega1
+        quotient = (omega2 / omega1).real
         if not quotient.is_finite():
             raise PrecisionLost("the periods are too inaccurate")
-        number = round(float(quotient.mid()))
-        if not number:
+        multiple = round(float(quotient.mid()))
+        if not multiple:
             break
-        second = second - number * first
-    elapsed = acb.elliptic_rf(a, b, c)
-    area = (first.conjugate() * second).imag
-    x, y = (elapsed.conjugate() * second).imag / area, (first.conjugate() * elapsed).imag / area
+        omega2 = omega2 - multiple * omega1
+    elliptic_logarithm = acb.elliptic_rf(a, b, c)
+    area = (omega1.conjugate() * omega2).imag
+    x, y = (elliptic_logarithm.conjugate() * omega2).imag / area, (omega1.conjugate() * elliptic_logarithm).imag / area
     return tuple(z - round(float(z.mid())) for z in (x, y))  # type: ignore[return-value]

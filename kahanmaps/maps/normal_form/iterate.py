@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
     from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
-_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field of which all points are computed
+_MAX_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field of which all points are computed
 
 
 class NthIterate:
@@ -43,7 +43,7 @@ class NthIterate:
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
-        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last orbit over Q, with its arguments
+        self._cached_orbit: tuple[Any, OrbitInPlanes] | None = None  # the last orbit over Q, with its arguments
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Return Phi^n(start) for n >= 0: over Q a PlanesPoint if chi splits, otherwise the coordinates.
@@ -58,30 +58,30 @@ class NthIterate:
             from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
             key = (tuple(start), max_bits)
-            if self._rational is None or self._rational[0] != key:
-                self._rational = key, OrbitInPlanes(self.normal_form, self.eps, start, max_bits)
-            return self._rational[1].value(n)
+            if self._cached_orbit is None or self._cached_orbit[0] != key:
+                self._cached_orbit = key, OrbitInPlanes(self.normal_form, self.eps, start, max_bits)
+            return self._cached_orbit[1].value(n)
         with self.field.working():
             x = [self.field.convert(entry) for entry in start]
             triples = []
             for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
-                triples.append(self._in_plane(plane.block, triple, n))
+                triples.append(self._point_in_plane(plane.block, triple, n))
                 if self.field.is_zero(triples[-1][2]):
                     raise SingularStep(f"the map has a pole: its iterate {n} is not defined at the initial point")
             return self.splitting.point(triples)
 
-    def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
+    def _point_in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
         """Return P_n over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):
             return start
-        balls = isinstance(self.field, BallField)
+        is_inexact = isinstance(self.field, BallField)
         if not (isinstance(self.field, PrimeField) and self.field.prime < 5):
             try:
-                return translation.iterate(block, start, n, self.field.is_zero, inexact=balls)
+                return translation.iterate(block, start, n, self.field.is_zero, inexact=is_inexact)
             except translation.NoTranslation:
-                if balls:
+                if is_inexact:
                     raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None
         from kahanmaps.maps.normal_form.planar_block import same_point
         from kahanmaps.maps.normal_form.rational_iterate import point_by_steps
@@ -89,7 +89,7 @@ class NthIterate:
         # Over a small finite field an orbit soon returns or reaches a pole.
         point = start
         for k in range(1, n + 1):
-            if k > _CYCLE:
+            if k > _MAX_CYCLE:
                 raise InputError(f"the iterate {n} cannot be reached directly here: use fewer steps or another prime")
             point = point_by_steps(block, point, 1)
             if same_point(point, start):

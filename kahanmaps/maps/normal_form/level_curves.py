@@ -16,7 +16,7 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 
 _MAX_DIGIT = 2000
-_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm; this takes about 2^17 steps
+_MAX_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm; this takes about 2^17 steps
 
 
 class Jacobian(EllipticCurve):
@@ -43,19 +43,19 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
     Finally k is divided by all prime factors that it contains in excess of the order of T.
     """
     curve = Jacobian(gamma)
-    radius, middle, unit = isqrt(4 * q), q + 1, 1
+    radius, center, modulus = isqrt(4 * q), q + 1, 1
     if q < 1000:  # adding T until the sum is 0 is faster than a search, and needs no Hasse interval
         point, order = curve.add(curve.T, None), 1
         while point is not None:
             point, order = curve.add(point, curve.T), order + 1
         return order
-    if radius > _RADIUS:
+    if radius > _MAX_RADIUS:
         field = fq_default_ctx(q, 1) if context is None else context
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, curve.a6))
-        trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
-        # The representative of the trace closest to 0, so that all candidates are near `middle`.
-        middle -= trace if 2 * trace <= unit else trace - unit
-    k = _annihilator(curve, middle, unit, radius // unit + 2)
+        trace, modulus = trace_modulo(a2, a4, a6, field, radius // _MAX_RADIUS)
+        # The representative of the trace closest to 0, so that all candidates are near `center`.
+        center -= trace if 2 * trace <= modulus else trace - modulus
+    k = _annihilator(curve, center, modulus, radius // modulus + 2)
     for factor, exponent in fmpz(k).factor():
         for _ in range(int(exponent)):
             if curve.multiple(k // int(factor), curve.T) is not None:
@@ -64,30 +64,31 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
     return k
 
 
-def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
-    """Return some k > 0 with k T = 0; it must have the form `middle` + m `unit` with |m| <= `radius`.
+def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int:
+    """Return some k > 0 with k T = 0; it must have the form `center` + m `modulus` with |m| <= `radius`.
 
-    m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
+    m is written as i (2b + 1) - j with |j| <= b: b baby steps of `modulus` T, and giant steps of (2b + 1) `modulus` T.
     """
-    baby_steps, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
+    baby_step_count, step = isqrt(radius) + 2, curve.multiple(modulus, curve.T)
     index: dict[Any, tuple[int, Any]] = {}
     point = step
-    for j in range(1, baby_steps + 1):
+    for j in range(1, baby_step_count + 1):
         if point is None:
-            return unit * j
-        index.setdefault(point[0], (unit * j, point[1]))
+            return modulus * j
+        index.setdefault(point[0], (modulus * j, point[1]))
         point = curve.add(point, step)
-    stride = (2 * baby_steps + 1) * unit
-    giant_step, upward = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
-    negative_giant_step, downward = curve.negative(giant_step), upward
-    for i in range(radius * unit // stride + 3):
-        for k, point in ((middle + i * stride, upward), (middle - i * stride, downward)):
+    stride = (2 * baby_step_count + 1) * modulus
+    giant_step, upper_multiple = curve.multiple(stride, curve.T), curve.multiple(center, curve.T)
+    negative_giant_step, lower_multiple = curve.negative(giant_step), upper_multiple
+    for i in range(radius * modulus // stride + 3):
+        for k, point in ((center + i * stride, upper_multiple), (center - i * stride, lower_multiple)):
             if point is None:
                 return abs(k)
             if point[0] in index:
                 j, y = index[point[0]]  # k T = +-j T
                 return abs(k - j if point[1] == y else k + j)
-        upward, downward = curve.add(upward, giant_step), curve.add(downward, negative_giant_step)
+        upper_multiple = curve.add(upper_multiple, giant_step)
+        lower_multiple = curve.add(lower_multiple, negative_giant_step)
     raise AssertionError("no multiple of T in the Hasse interval is zero: please report this")
 
 
@@ -99,7 +100,7 @@ class LevelCubic:
 
     def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
         self.block, self.numerator, self.denominator, self.zero = block, numerator, denominator, zero
-        self._opposite = self.third(zero, zero)
+        self._tangential_point = self.third_point(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
         """Return the three derivatives at P of F = denominator h - numerator W (W^2 + D)."""
@@ -113,7 +114,7 @@ class LevelCubic:
             -self.numerator * (3 * W * W + p * U * U + q * U * V + r * V * V),
         )
 
-    def third(self, P: Triple, Q: Triple) -> Triple:
+    def third_point(self, P: Triple, Q: Triple) -> Triple:
         """Return the third point of the cubic on the line through P and Q, or on the tangent if they are equal."""
         # The cubic form on a line has four coefficients. As P and Q are zeros, two coefficients remain, and these are
         # derivatives; no equation has to be solved.
@@ -130,11 +131,11 @@ class LevelCubic:
 
     def add(self, P: Triple, Q: Triple) -> Triple:
         """Return P + Q."""
-        return self.third(self.zero, self.third(P, Q))
+        return self.third_point(self.zero, self.third_point(P, Q))
 
     def subtract(self, P: Triple, Q: Triple) -> Triple:
         """Return P - Q."""
-        return self.add(P, self.third(Q, self._opposite))
+        return self.add(P, self.third_point(Q, self._tangential_point))
 
     def multiple(self, n: int, P: Triple) -> Triple:
         """Return n P for n >= 0."""
@@ -156,29 +157,30 @@ class LevelCubic:
             return False
         # The number of points of the curve, if only one multiple of the order of T lies in the Hasse interval.
         radius = isqrt(4 * q)
-        points = -(-(q + 1 - radius) // order) * order
-        if points + order <= q + 1 + radius:
+        point_count = -(-(q + 1 - radius) // order) * order
+        if point_count + order <= q + 1 + radius:
             return None
         is_unknown = False
         for factor, exponent in fmpz(order).factor():
             prime, power = int(factor), int(factor) ** int(exponent)
-            if points // order % prime != 0:
+            if point_count // order % prime != 0:
                 continue
             if prime > _MAX_DIGIT:
                 is_unknown = True
                 continue
             # The logarithm of the part of P to the base of the part of T, of order `power`, by Pohlig and Hellman.
             P_part, T_part = self.multiple(order // power, P), self.multiple(order // power, T)
-            generator, unit = self.multiple(power // prime, T_part), 1
-            while unit < power:
-                # `P_part` is reduced by the digits known so far; `multiple` runs through the multiples of `generator`.
-                cofactor, digit, multiple = self.multiple(power // prime // unit, P_part), 0, self.zero
-                while not same_point(cofactor, multiple):
-                    digit, multiple = digit + 1, self.add(multiple, generator)
+            generator, digit_weight = self.multiple(power // prime, T_part), 1
+            while digit_weight < power:
+                # The known digits are subtracted from `P_part`; `generator_multiple` is `digit` times `generator`.
+                P_multiple = self.multiple(power // prime // digit_weight, P_part)
+                digit, generator_multiple = 0, self.zero
+                while not same_point(P_multiple, generator_multiple):
+                    digit, generator_multiple = digit + 1, self.add(generator_multiple, generator)
                     if digit == prime:
                         return False
-                P_part = self.subtract(P_part, self.multiple(digit * unit, T_part))
-                unit *= prime
+                P_part = self.subtract(P_part, self.multiple(digit * digit_weight, T_part))
+                digit_weight *= prime
             if not self.is_zero(P_part):
                 return False
         return None if is_unknown else True

@@ -137,7 +137,7 @@ def orbit_period(
 
 
 # Status, period, and whether a pole is met, for those kinds for which they do not depend on the field.
-_KNOWN = {
+_PERIOD_OF_KIND = {
     PeriodKind.FIXED: ("periodic", 1, False),
     PeriodKind.UNDEFINED: ("undefined", None, True),
     PeriodKind.AT_POLE: ("periodic", 4, True),
@@ -163,19 +163,19 @@ def plane_period(
     """
     q = prime if context is None else int(context.order())
     if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate homogeneous coordinates, through poles
-        kind, image, met_pole = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
+        kind, image, has_met_pole = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
         for step in range(1, min(q * q + q + 1, _MAX_WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
                 return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
-            met_pole = met_pole or bool(image[2] == 0)
+            has_met_pole = has_met_pole or bool(image[2] == 0)
             if same_point(image, point):
-                return PlanePeriod(name, q, kind, "periodic", step, met_pole)
+                return PlanePeriod(name, q, kind, "periodic", step, has_met_pole)
         reason = f"no return to the initial point within {_MAX_WALK} steps"
-        return PlanePeriod(name, q, kind, "undecided", None, met_pole or None, reason)
+        return PlanePeriod(name, q, kind, "undecided", None, has_met_pole or None, reason)
     kind, gamma = classify(block, point)
-    if kind in _KNOWN:
-        return PlanePeriod(name, q, kind, *_KNOWN[kind])
+    if kind in _PERIOD_OF_KIND:
+        return PlanePeriod(name, q, kind, *_PERIOD_OF_KIND[kind])
     if kind is PeriodKind.ADDITIVE:
         # A step decreases W/s by 1, where s^2 = -D: is W/s an element of GF(p)?
         a, b, c = block.D
@@ -184,7 +184,7 @@ def plane_period(
             square = -W * W / D
             meets_pole = bool(square ** ((prime - 1) // 2) == square * 0 + 1)
         return PlanePeriod(name, q, kind, "periodic", prime, meets_pole)
-    at_infinity = poles(block, prime, context)
+    poles_of_block = poles(block, prime, context)
     if kind is PeriodKind.TRIANGLE:
         order = prime - 1  # a multiple of the order of -8; superfluous prime factors are removed below
         for factor, exponent in fmpz(order).factor():
@@ -192,23 +192,25 @@ def plane_period(
                 if pow(-8, order // int(factor), prime) != 1:
                     break
                 order //= int(factor)
-        meets_pole_at = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
+        meets_pole_at = _meets_pole_by_iteration(block, point, 3 * order) if poles_of_block else False
         return PlanePeriod(name, q, kind, "periodic", 3 * order, meets_pole_at)
     if q > largest:
-        size, bound = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
-        reason = f"its field has {size} elements, more than {bound}"
-        return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
+        size_text, bound_text = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
+        reason = f"its field has {size_text} elements, more than {bound_text}"
+        return PlanePeriod(name, q, kind, "undecided", None, None if poles_of_block else False, reason)
     order = translation_order(gamma, q, context)
     # With a pole as zero of the group, T is the image of the pole, and the orbit meets the pole if and only if the
     # point is a multiple of T.
-    answers: list[bool | None] = []
-    for pole in at_infinity:
-        answers.append(LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q))
-        if answers[-1]:
+    pole_answers: list[bool | None] = []
+    for pole in poles_of_block:
+        pole_answers.append(
+            LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q)
+        )
+        if pole_answers[-1]:
             break
     else:
-        answers.append(_walk_meets_pole(block, point, order) if None in answers else False)
-    return PlanePeriod(name, q, kind, "periodic", order, answers[-1])
+        pole_answers.append(_meets_pole_by_iteration(block, point, order) if None in pole_answers else False)
+    return PlanePeriod(name, q, kind, "periodic", order, pole_answers[-1])
 
 
 def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
@@ -242,7 +244,7 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     """
     zero = 0 * block.a
     one = zero + 1
-    poles: list[Triple] = [(one, zero, zero)] if block.a == 0 else []
+    pole_triples: list[Triple] = [(one, zero, zero)] if block.a == 0 else []
     coefficients: list[Any] = [block.d, block.c, block.b, block.a]
     if context is None:
         ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
@@ -250,10 +252,10 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     else:
         factors = fq_default_poly_ctx(context)(coefficients).factor()[1]  # type: ignore[arg-type]
     roots = [-factor[0] for factor, _ in factors if factor.degree() == 1]
-    return poles + [(zero + (int(root) if context is None else root), one, zero) for root in roots]
+    return pole_triples + [(zero + (int(root) if context is None else root), one, zero) for root in roots]
 
 
-def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
+def _meets_pole_by_iteration(block: PlanarBlock, point: Triple, period: int) -> bool | None:
     """Return whether an orbit reaches a pole, by iteration; None if the period is too long."""
     image = point
     for _ in range(min(period, _MAX_WALK)):
@@ -293,12 +295,12 @@ def period_of(
         else:
             planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
     # The orbit is periodic if and only if it is in every plane; otherwise its status is the worst status of a plane.
-    statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
-    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
+    statuses, pole_answers = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
+    worst_status = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
     return OrbitPeriod(
-        lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None,
-        worst,
-        True if True in poles_met else None if None in poles_met else False,
+        lcm(*(plane.period or 1 for plane in planes)) if worst_status == "periodic" else None,
+        worst_status,
+        True if True in pole_answers else None if None in pole_answers else False,
         tuple(planes),
     )
 
@@ -367,15 +369,15 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
     'the plane: period 5 (a smooth level cubic; 5 T = 0)'
     """
     kind, gamma = classify(block, point)
-    if kind in _KNOWN:
-        return PlanePeriod(name, 0, kind, *_KNOWN[kind])
+    if kind in _PERIOD_OF_KIND:
+        return PlanePeriod(name, 0, kind, *_PERIOD_OF_KIND[kind])
     if kind is not PeriodKind.SMOOTH:
         reason = "a parabolic map" if kind is PeriodKind.ADDITIVE else "-8 is no root of unity"
         return PlanePeriod(name, 0, kind, "aperiodic", None, None, reason)
     order, reason = torsion_order(gamma)
     if order is None:
         return PlanePeriod(name, 0, kind, "aperiodic", None, None, reason)
-    return PlanePeriod(name, 0, kind, "periodic", order, _walk_meets_pole(block, point, order), reason)
+    return PlanePeriod(name, 0, kind, "periodic", order, _meets_pole_by_iteration(block, point, order), reason)
 
 
 def torsion_order(gamma: Any) -> tuple[int | None, str]:

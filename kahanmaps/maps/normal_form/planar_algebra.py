@@ -23,16 +23,16 @@ from kahanmaps.algebra.integers import (
     SMALL_PRIMES,
     common_part,
     content,
+    coprime_part,
     over_common_denominator,
     radical,
     split_by_primes,
-    without,
 )
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
-_SHORT = 1 << 20  # a value counts as short if its bad part, and the ratio of its lengths at two roots, is smaller
-_LEAST = arb(2) ** -50  # smallest length at a root that is used, relative to the largest
+_MAX_LENGTH_RATIO = 1 << 20  # a value is short if its bad part, and the ratio of its lengths at two roots, is smaller
+_MIN_RELATIVE_LENGTH = arb(2) ** -50  # smallest length at a root that is used, relative to the largest
 
 
 class AlgebraBlock(LevelBlock):
@@ -52,8 +52,8 @@ class AlgebraBlock(LevelBlock):
         numbers += [e.polynomial.denom() for e in (cubic.a, cubic.b, cubic.c, cubic.d, disc, *self.start)]
         if disc != 0:
             numbers.append(self.algebra.norm(disc).p)
-        image = [self.algebra.norm(entry) for entry in self.lifts[2]]
-        numbers += [content(norm.p for norm in image), *(norm.q for norm in image)]
+        image_norms = [self.algebra.norm(entry) for entry in self.lifts[2]]
+        numbers += [content(norm.p for norm in image_norms), *(norm.q for norm in image_norms)]
         return radical(*numbers)
 
     @cached_property
@@ -102,15 +102,15 @@ class AlgebraBlock(LevelBlock):
             if k < algebra.degree - 1:
                 power = W * cofactor
         # N is rational, so one coefficient of the last product suffices; the full product would cost more.
-        norm, shifted = fmpq(0), cofactor
+        norm, multiple = fmpq(0), cofactor
         for entry in W.coefficients:
-            norm += entry * shifted.polynomial[0]
-            shifted = shifted * algebra.generator
+            norm += entry * multiple.polynomial[0]
+            multiple = multiple * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        coprime_part, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
+        coprime_content, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         # One common factor is removed from all coordinates: reducing each fraction separately costs as many gcds.
-        common = common_part([norm.p, *numerators], self.bad**4 * other_part)
-        return [entry // common for entry in numerators], norm.p // common, coprime_part
+        common_factor = common_part([norm.p, *numerators], self.bad**4 * other_part)
+        return [entry // common_factor for entry in numerators], norm.p // common_factor, coprime_content
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
         """Return a number divisible by all primes at which form and denominator may cancel; None if all primes may.
@@ -119,10 +119,10 @@ class AlgebraBlock(LevelBlock):
         dual to 1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).
         """
         g, degree = self.algebra.chi, self.algebra.degree
-        dual = [self.algebra.convert(fmpq_poly([g[j] for j in range(k + 1, degree + 1)])) for k in range(degree)]
+        dual_basis = [self.algebra.convert(fmpq_poly([g[j] for j in range(k + 1, degree + 1)])) for k in range(degree)]
         alpha, beta = (
-            sum((c * e for c, e in zip(half, dual, strict=True)), self.algebra.zero)
-            for half in (form[:degree], form[degree:])
+            sum((c * e for c, e in zip(coefficients, dual_basis, strict=True)), self.algebra.zero)
+            for coefficients in (form[:degree], form[degree:])
         )
         value = self.block.h(beta, -alpha)
         if value == 0:
@@ -161,15 +161,51 @@ class ShortElements:
     """Values of tau functions over K, each a product of an element of Z[t] with short coefficients and a scale in K."""
 
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
-        self._algebra, self._power = algebra, bad**3
+        self._algebra, self._bad_power = algebra, bad**3
         roots: Any = algebra.chi.complex_roots()
         # Complex balls, not floating-point numbers: roots may exceed the range of the latter.
-        self._powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
+        self._root_powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
         """Write a nonzero value as the product of a short element and a scale."""
-        multiplier = self._multiplier(value)
-        return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
+        degree, denominator = self._algebra.degree, value.polynomial.denom()
+        integers = [(entry * denominator).p for entry in value.coefficients]
+        residue = self._algebra.convert(fmpq_poly([entry % self._bad_power for entry in integers]))
+        bad_part = self._bad_power.gcd(self._algebra.norm(residue).p % self._bad_power)
+        # Midpoints suffice: the lengths only weight the lattice, and the multiplication is exact.
+        min_length = max(abs(entry) for entry in integers) * _MIN_RELATIVE_LENGTH
+        embeddings = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._root_powers)
+        lengths = [max(min_length, abs(embedding).mid()) for embedding in embeddings]
+        if denominator == 1 and bad_part < _MAX_LENGTH_RATIO and max(lengths) < _MAX_LENGTH_RATIO * min(lengths):
+            return value, self._algebra.one
+        # All b with b value = 0 modulo `bad_part`.
+        rows = (residue.matrix.transpose() if bad_part != 1 else residue.matrix).numer_denom()[0].tolist()
+        augmented_rows = [
+            [entry % bad_part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)
+        ]
+        augmented_rows += [[bad_part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
+        lattice = fmpz_mat([row[degree:] for row in fmpz_mat(augmented_rows).hnf().tolist()[degree:]])
+        weights = [2.0**60 * max((length / max(lengths)).mid(), _MIN_RELATIVE_LENGTH) for length in lengths]
+        real_approximation: list[Any] = [
+            [
+                (weight * x).mid().floor().unique_fmpz()
+                for powers, weight in zip(self._root_powers, weights, strict=True)
+                for x in ([powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag])
+            ]
+            for k in range(degree)
+        ]
+        _, transformation = (lattice * fmpz_mat(real_approximation)).lll(True)
+        rows = (transformation * lattice).tolist()
+        for signs in _sign_vectors(degree):
+            row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
+            candidate = self._algebra.convert(fmpq_poly(row))
+            if coprime_part(self._algebra.norm(candidate).p, self._bad_power) in (1, -1):
+                multiplier = candidate * fmpq(denominator, bad_part)
+                return value * multiplier, 1 / multiplier
+        if denominator == 1:
+            return value, self._algebra.one
+        multiplier = self._algebra.convert(denominator)
+        return value * multiplier, 1 / multiplier
 
     @staticmethod
     def prepared_divisor(value: EtaleElement) -> EtaleElement:
@@ -206,66 +242,29 @@ class ShortElements:
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
         common_denominator = reduce(fmpz.lcm, (denominator for _, denominator in factors))
-        scaled: list[fmpz] = []
+        scaled_terms: list[fmpz] = []
         for (factor, denominator), term in zip(factors, terms, strict=True):
             column = fmpz_mat(degree, 1, [entry.p for entry in term.coefficients])
-            scaled += (factor * (common_denominator // denominator) * column).entries()
+            scaled_terms += (factor * (common_denominator // denominator) * column).entries()
         matrix, lifts_denominator = lifts
-        entries = (matrix * fmpz_mat(3 * degree, 1, scaled)).entries()
-        common = common_denominator * lifts_denominator
+        entries = (matrix * fmpz_mat(3 * degree, 1, scaled_terms)).entries()
+        remaining_denominator = common_denominator * lifts_denominator
         for entry in entries:
-            common = common.gcd(entry % common)
-        integers = [entry // common for entry in entries] if common != 1 else entries
+            remaining_denominator = remaining_denominator.gcd(entry % remaining_denominator)
+        integers = [entry // remaining_denominator for entry in entries] if remaining_denominator != 1 else entries
         U, V, W = (
             EtaleElement(self._algebra, fmpq_poly(integers[k : k + degree])) for k in range(0, 3 * degree, degree)
         )
         return U, V, W
 
-    def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
-        """Return a factor that makes a value short; None if the value is already short."""
-        degree, denominator = self._algebra.degree, value.polynomial.denom()
-        integers = [(entry * denominator).p for entry in value.coefficients]
-        residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
-        bad_part = self._power.gcd(self._algebra.norm(residue).p % self._power)
-        # Midpoints suffice: the lengths only weight the lattice, and the multiplication is exact.
-        smallest = max(abs(entry) for entry in integers) * _LEAST
-        sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
-        lengths = [max(smallest, abs(value).mid()) for value in sums]
-        if denominator == 1 and bad_part < _SHORT and max(lengths) < _SHORT * min(lengths):
-            return None
-        # All b with b value = 0 modulo `bad_part`.
-        rows = (residue.matrix.transpose() if bad_part != 1 else residue.matrix).numer_denom()[0].tolist()
-        augmented = [
-            [entry % bad_part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)
-        ]
-        augmented += [[bad_part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
-        lattice = fmpz_mat([row[degree:] for row in fmpz_mat(augmented).hnf().tolist()[degree:]])
-        scale = [2.0**60 * max((length / max(lengths)).mid(), _LEAST) for length in lengths]
-        real_approximation: list[Any] = [
-            [
-                (s * x).mid().floor().unique_fmpz()
-                for p, s in zip(self._powers, scale, strict=True)
-                for x in ([p[k].real] if p[1].imag == 0 else [p[k].real, p[k].imag])
-            ]
-            for k in range(degree)
-        ]
-        _, change = (lattice * fmpz_mat(real_approximation)).lll(True)
-        rows = (change * lattice).tolist()
-        for signs in _signs(degree):
-            row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
-            short = self._algebra.convert(fmpq_poly(row))
-            if without(self._algebra.norm(short).p, self._power) in (1, -1):
-                return short * fmpq(denominator, bad_part)
-        return None if denominator == 1 else self._algebra.convert(denominator)
-
 
 @lru_cache
-def _signs(count: int) -> list[tuple[int, ...]]:
+def _sign_vectors(count: int) -> list[tuple[int, ...]]:
     """Return the vectors with at most four entries 1 or -1 and other entries 0, up to sign, fewest entries first."""
     vectors = []
-    for entries in range(1, min(count, 4) + 1):
-        for positions in combinations(range(count), entries):
-            for signs in product((1, -1), repeat=entries - 1):
-                chosen = dict(zip(positions, (1, *signs), strict=True))
-                vectors.append(tuple(chosen.get(k, 0) for k in range(count)))
+    for nonzero_count in range(1, min(count, 4) + 1):
+        for positions in combinations(range(count), nonzero_count):
+            for signs in product((1, -1), repeat=nonzero_count - 1):
+                sign_at = dict(zip(positions, (1, *signs), strict=True))
+                vectors.append(tuple(sign_at.get(k, 0) for k in range(count)))
     return vectors

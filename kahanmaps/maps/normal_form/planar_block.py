@@ -66,8 +66,8 @@ class PlanarBlock:
     def preimage(self, point: Sequence[Any]) -> Triple:
         """Return the preimage of (U : V : W) under Psi, not divided by its content."""
         U, V, W = point
-        first, second, third = self.image((U, V, -W))
-        return -first, -second, third
+        U_image, V_image, W_image = self.image((U, V, -W))
+        return -U_image, -V_image, W_image
 
     def h(self, U: Any, V: Any) -> Any:
         """Return the value of the cubic form h."""

@@ -83,11 +83,11 @@ class IntegerBlock(LevelBlock):
 
     def __init__(self, cubic: Sequence[fmpq], eps: fmpq, u: fmpq, v: fmpq) -> None:
         integers, denominator = over_common_denominator(cubic)
-        common = content(integers)
-        if common == 0:
-            common = fmpz(1)
-        self.block = PlanarBlock(*(entry // common for entry in integers))
-        self.scale: fmpq = 2 * eps * fmpq(common, denominator)
+        gcd = content(integers)
+        if gcd == 0:
+            gcd = fmpz(1)
+        self.block = PlanarBlock(*(entry // gcd for entry in integers))
+        self.scale: fmpq = 2 * eps * fmpq(gcd, denominator)
         (U, V), W = over_common_denominator((u * self.scale, v * self.scale))
         self.start = U, V, W
 
@@ -113,8 +113,8 @@ class IntegerBlock(LevelBlock):
         one, points = fmpq(1), list(islice(self.triples(), 2))
         if len(points) < 2:  # the start is a pole
             points.append(primitive(self.block.image(self.start)))
-        first, second = (tuple(one * entry for entry in P) for P in points)
-        return self.block, first, second
+        start_lift, image_lift = (tuple(one * entry for entry in P) for P in points)
+        return self.block, start_lift, image_lift
 
     slack = 0
 
@@ -151,7 +151,7 @@ class IntegerBlock(LevelBlock):
     @staticmethod
     def integral(triple: Triple) -> IntegerTriple:
         """Return a rational triple as a primitive triple of integers."""
-        return primitive(_cleared([triple])[0])
+        return primitive(_clear_denominators([triple])[0])
 
     @staticmethod
     def residue_map(prime: int) -> Callable[[fmpz], nmod] | None:
@@ -169,29 +169,29 @@ class PlaneIntegers(Integers):
 
     def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
         """Multiply triples of rational numbers by a common denominator."""
-        return _cleared(points)
+        return _clear_denominators(points)
 
     def combined(
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
         """Return the primitive triple of the sum of scale * term * lift; `divisor` divides the sum."""
         factors, _ = over_common_denominator(scales)
-        undivided = [
+        undivided_entries = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
         # The divisor contains no bad prime.
-        U, V, W = divide_exactly(undivided, common_part(undivided[::-1], self.power) * divisor)
+        U, V, W = divide_exactly(undivided_entries, common_part(undivided_entries[::-1], self.power) * divisor)
         return U, V, W
 
 
-def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
+def _clear_denominators(points: Sequence[Triple]) -> list[IntegerTriple]:
     integers, _ = over_common_denominator(chain(*points))
     return list(zip(integers[::3], integers[1::3], integers[2::3], strict=True))
 
 
 def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
     """Divide the triple by its content."""
-    common = content(triple)
+    gcd = content(triple)
     U, V, W = triple
-    return (U, V, W) if common <= 1 else (U // common, V // common, W // common)
+    return (U, V, W) if gcd <= 1 else (U // gcd, V // gcd, W // gcd)

@@ -26,7 +26,7 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 _MULTIPLES = 24  # the largest m for which the reduction of m T is examined
 _LARGE_MULTIPLE = 50  # if no such m T is nonsingular at all primes, a multiple with m of at least this size is used
-_SMALL = 3  # largest coefficient of elements by which the model is reduced
+_MAX_COEFFICIENT = 3  # largest coefficient of elements by which the model is reduced
 _TERMS = 40  # terms of the series; they decrease like 4^-n
 _ACCURACY = 1e-14
 
@@ -43,48 +43,48 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     """
     K = point[0].field
     coefficients, (U, V, W) = [block.a, block.b, block.c, block.d], point
-    scale, multiple = _denominator(coefficients), _denominator(point)
+    scale, point_scale = _denominator(coefficients), _denominator(point)
     # Multiplying both h and W by `scale` changes neither delta nor the orbit.
     a, b, c, d = (scale * x for x in coefficients)
-    block, U, V, W = PlanarBlock(a, b, c, d), multiple * U, multiple * V, multiple * scale * W
+    block, U, V, W = PlanarBlock(a, b, c, d), point_scale * U, point_scale * V, point_scale * scale * W
     p, q, r = block.D
     u, h = W * (W * W + p * U * U + q * U * V + r * V * V), block.h(U, V)
     G = u * u - block.discriminant * h * h
-    (b2, b4, b6, b8), w = _reduced((9 * u * u + 3 * G, 6 * G * u * u, 4 * G * G * u * u, 3 * G**3 * u * u))
+    (b2, b4, b6, b8), w = _reduce_model((9 * u * u + 3 * G, 6 * G * u * u, 4 * G * G * u * u, 3 * G**3 * u * u))
     curve, T = EllipticCurve(b2 / 4, b4 / 2, b6 / 4), (K.zero, G * u / w**3)
     resultant = (16 * curve.discriminant) ** 2
     norm = abs(K.norm(resultant)).p
 
-    def uncertain(Q: Any) -> fmpz:
+    def uncertain_part(Q: Any) -> fmpz:
         """Return the part of the norm of R at the primes at which doubling Q cancels factors; 1 if there are none."""
         # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
-        left = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
-        cancelled = left / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
-        return split_by_primes(norm, cancelled.p)[1]
+        full_norm = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
+        cancelled_norm = full_norm / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
+        return split_by_primes(norm, cancelled_norm.p)[1]
 
     multiples, Q = list[tuple[fmpz, int, Any]](), T
     while len(multiples) < _MULTIPLES and (not multiples or multiples[-1][0] > 1):
-        multiples.append((uncertain(Q), len(multiples) + 1, Q))
+        multiples.append((uncertain_part(Q), len(multiples) + 1, Q))
         Q = curve.add(Q, T)  # type: ignore[assignment]
-    part, m, Q = min(multiples, key=lambda entry: float(arb(entry[0]).log()) / entry[1] ** 2)
-    while part > 1 and m < _LARGE_MULTIPLE:  # doubling adds no uncertain primes
+    cancelled_part, m, Q = min(multiples, key=lambda entry: float(arb(entry[0]).log()) / entry[1] ** 2)
+    while cancelled_part > 1 and m < _LARGE_MULTIPLE:  # doubling adds no uncertain primes
         m, Q = 2 * m, curve.add(Q, Q)  # type: ignore[assignment]
-    height = _archimedean(Q[0], (b2, b4, b6, b8), resultant)
+    height = _archimedean_height(Q[0], (b2, b4, b6, b8), resultant)
     with RR(128).working():  # the remaining cancelled factors divide R, and lower the height
-        sixth = arb(part).log() / (6 * K.degree)
-        result: arb = (height - sixth + arb(0, sixth.upper())) / (2 * m * m)
+        correction = arb(cancelled_part).log() / (6 * K.degree)
+        result: arb = (height - correction + arb(0, correction.upper())) / (2 * m * m)
     return result
 
 
-def _reduced(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
+def _reduce_model(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
     """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and a product w of small elements for which these are integral.
 
     The curve must keep an integral Weierstrass equation at each prime; for primes over 2 this equation is searched for.
     """
-    K, total = b[0].field, b[0].field.one
-    vectors = list(product(range(-_SMALL, _SMALL + 1), repeat=K.degree))
+    K, divisor = b[0].field, b[0].field.one
+    vectors = list(product(range(-_MAX_COEFFICIENT, _MAX_COEFFICIENT + 1), repeat=K.degree))
     elements = [K.convert(fmpq_poly(list(vector))) * _denominator([K.generator]) for vector in vectors if any(vector)]
-    small = sorted((abs(K.norm(w)), k) for k, w in enumerate(elements))
+    indices_by_norm = sorted((abs(K.norm(w)), k) for k, w in enumerate(elements))
     residues = [K.convert(fmpq_poly(list(vector))) for vector in product((0, 1), repeat=K.degree)]
 
     def has_equation(b2: Any, b4: Any, b6: Any) -> bool:
@@ -94,14 +94,14 @@ def _reduced(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
             for a3 in residues
         )
 
-    for norm, k in small:
+    for norm, k in indices_by_norm:
         w = elements[k]
         while norm > 1:
-            divided = tuple(x / w**power for x, power in zip(b, (2, 4, 6, 8), strict=True))
-            if not all(map(_is_integral, divided)) or (norm.p % 2 == 0 and not has_equation(*divided[:3])):
+            quotients = tuple(x / w**power for x, power in zip(b, (2, 4, 6, 8), strict=True))
+            if not all(map(_is_integral, quotients)) or (norm.p % 2 == 0 and not has_equation(*quotients[:3])):
                 break
-            b, total = divided, total * w
-    return b, total
+            b, divisor = quotients, divisor * w
+    return b, divisor
 
 
 def _is_integral(element: Any) -> bool:
@@ -110,22 +110,21 @@ def _is_integral(element: Any) -> bool:
 
 def _denominator(elements: Any) -> int:
     """Return an integer such that the products of these elements of Q[t]/g with it are integral."""
-    common = fmpz(1)
+    denominator = fmpz(1)
     for element in elements:
-        common = common.lcm(element.polynomial.denom())
+        denominator = denominator.lcm(element.polynomial.denom())
     field = elements[0].field
-    return int(common * field.chi.denom() ** (field.degree - 1))
+    return int(denominator * field.chi.denom() ** (field.degree - 1))
 
 
-def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
+def _archimedean_height(x: Any, b: Any, resultant: Any) -> arb:
     """Return the height of x plus the archimedean terms of Tate's series."""
     K = x.field
     for bits in (1 << 9, 1 << 11, 1 << 13, MAX_BITS):
         with RR(bits).working():
             total = arb(leading_coefficient(x)).log()
             for root, _ in K.chi.complex_roots():
-                values = [_at(element, acb(root)) for element in (x, *b, resultant)]
-                X, b2, b4, b6, b8, R = values
+                X, b2, b4, b6, b8, R = (value_at_root(element, acb(root)) for element in (x, *b, resultant))
                 Z, scale = acb(1), arb(1)
                 largest = sum((abs(c) for c in (b2, 2 * b4, 2 * b6, b8)), arb(4))
                 bound = abs(abs(R).log()) + 8 * largest.log() + math.log(math.factorial(8))
@@ -145,9 +144,9 @@ def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
     raise PrecisionLost(f"the height needs more than {MAX_BITS} bits: the level is almost singular")
 
 
-def _at(element: Any, root: acb) -> acb:
-    """Return the value of an element of Q[t]/g at a root of g."""
-    total = acb(0)
+def value_at_root(element: Any, root: Any) -> Any:
+    """Return the value of an element of Q[t]/g at a root of g, a real or complex ball."""
+    total = 0 * root
     for coefficient in reversed(element.polynomial.coeffs()):
         total = total * root + arb(coefficient)
     return total

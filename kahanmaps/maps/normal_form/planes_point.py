@@ -19,7 +19,7 @@ from typing import Any
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_common_denominator, radical
+from kahanmaps.algebra.integers import content, divide_exactly, has_full_multiplicity, over_common_denominator, radical
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -30,18 +30,18 @@ from kahanmaps.maps.normal_form.tau import triples
 Block = IntegerBlock | AlgebraBlock
 
 # Powers of the fixed primes up to this size are found from one residue.
-_POWER = 3
+_PRIME_POWER = 3
 
 
 @dataclass(frozen=True)
-class _Row:
+class _Coordinate:
     """A coordinate: the sum of (alpha_i U_i + beta_i V_i)/(denominator W_i) over the planes of `support`."""
 
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
     denominator: fmpz
     fixed_number: fmpz  # contains the fixed primes that numerator and denominator may have in common
-    dividing: tuple[int, ...]  # the planes in which the form alpha U + beta V divides h
+    divisor_planes: tuple[int, ...]  # the planes in which the form alpha U + beta V divides h
 
 
 class Assembly:
@@ -50,7 +50,7 @@ class Assembly:
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
         self.dim = len(matrices[0])
-        self.rows: list[_Row] = []
+        self.rows: list[_Coordinate] = []
         for r in range(self.dim):
             forms = [
                 [entry / planar_block.scale for entry in table[r]]
@@ -59,7 +59,7 @@ class Assembly:
             support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
             _, denominator = over_common_denominator(chain(*forms))
             integers = [tuple((entry * denominator).p for entry in forms[i]) for i in support]
-            factors, dividing = [denominator], []
+            factors, divisor_planes = [denominator], []
             for i, form in zip(support, integers, strict=True):
                 block = blocks[i]
                 if block.is_constant:
@@ -70,10 +70,12 @@ class Assembly:
                     factors += block.primes
                 value = None if block.level is None else block.fixed_number(form)
                 if value is None:
-                    dividing.append(i)
+                    divisor_planes.append(i)
                 else:
                     factors.append(value)
-            self.rows.append(_Row(support, tuple(integers), denominator, radical(*factors), tuple(dividing)))
+            self.rows.append(
+                _Coordinate(support, tuple(integers), denominator, radical(*factors), tuple(divisor_planes))
+            )
         self.fixed_number = radical(*(row.fixed_number for row in self.rows))
         # The indices of the rows with the same support, and the integer coefficients of their forms.
         self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
@@ -145,50 +147,50 @@ class PlanesPoint:
 
     def common(self) -> tuple[list[fmpz], fmpz]:
         """Return the numerators of all coordinates and a common denominator; common factors of the W_i remain."""
-        column, product = _scaled([(numerators, W) for numerators, W, _ in self._fractions])
+        column, product = _scale_to_common_denominator([(numerators, W) for numerators, W, _ in self._fractions])
         return (self._assembly.forms * column).entries(), self._assembly.denominator * product
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Return numerator and denominator of each coordinate in lowest terms, with positive denominators."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
-        suspects = fmpz(1)  # divisible by all primes that divide two of the W_i
-        *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest W is only reduced
-        while others:
-            number = others.pop()
-            suspects = suspects * number.gcd(product % number)
-            if others:
-                product = product * number
+        possible_primes = fmpz(1)  # divisible by all primes that divide two of the W_i
+        *denominators, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest W is only reduced
+        while denominators:
+            longest = denominators.pop()
+            possible_primes = possible_primes * longest.gcd(product % longest)
+            if denominators:
+                product = product * longest
         for _, _, primes in self._fractions:
-            suspects = suspects * primes
-        modulus = (self._assembly.fixed_number * suspects) ** _POWER
+            possible_primes = possible_primes * primes
+        modulus = (self._assembly.fixed_number * possible_primes) ** _PRIME_POWER
         residues = [([entry % modulus for entry in numerator], W % modulus) for numerator, W in planes]
-        fractions, reduced = self._fractions_of(planes), self._fractions_of(residues)
+        fractions, residue_pairs = self._fractions_of(planes), self._fractions_of(residues)
         divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd suffices for all rows with the same form
         pairs = []
-        for row, (numerator, denominator), residue in zip(self._assembly.rows, fractions, reduced, strict=True):
+        for row, (numerator, denominator), residue in zip(self._assembly.rows, fractions, residue_pairs, strict=True):
             if numerator == 0:
                 pairs.append((numerator, fmpz(1)))
                 continue
-            common = fmpz(1)
+            common_factor = fmpz(1)
             for i, form in zip(row.support, row.forms, strict=True):
-                if i in row.dividing:  # gcd(alpha U + beta V, W) up to fixed primes, if the form divides h
+                if i in row.divisor_planes:  # gcd(alpha U + beta V, W) up to fixed primes, if the form divides h
                     factor = content(form)
                     key = (i, *(int(entry // factor) for entry in form))
                     if key not in divisors:
                         divisors[key] = sum(map(mul, map(fmpz, key[1:]), planes[i][0]), fmpz(0)).gcd(planes[i][1])
-                    common = common * divisors[key]
-            if common != 1:
-                numerator, denominator = divide_exactly((numerator, denominator), common)
-                common = _common_part(numerator, denominator, modulus)
+                    common_factor = common_factor * divisors[key]
+            if common_factor != 1:
+                numerator, denominator = divide_exactly((numerator, denominator), common_factor)
+                common_factor = _common_part(numerator, denominator, modulus)
             else:
-                common = _common_part(*residue, modulus)
+                common_factor = _common_part(*residue, modulus)
             power = modulus
-            while common != 1:
-                numerator, denominator = numerator // common, denominator // common
-                if is_all(common, power):
+            while common_factor != 1:
+                numerator, denominator = numerator // common_factor, denominator // common_factor
+                if has_full_multiplicity(common_factor, power):
                     break
                 power = power * power  # a prime may occur with a high exponent
-                common = _common_part(numerator, denominator, power)
+                common_factor = _common_part(numerator, denominator, power)
             pairs.append((numerator, denominator) if denominator > 0 else (-numerator, -denominator))
         return pairs
 
@@ -196,11 +198,11 @@ class PlanesPoint:
         """Return numerators and denominators of all coordinates, from those of the planes or from their residues."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
-        for support, (numbers, forms) in self._assembly.by_support.items():
-            column, product = _scaled([planes[i] for i in support])
+        for support, (row_indices, forms) in self._assembly.by_support.items():
+            column, product = _scale_to_common_denominator([planes[i] for i in support])
             numerators = (forms * column).entries()
             fractions |= {
-                k: (entry, rows[k].denominator * product) for k, entry in zip(numbers, numerators, strict=True)
+                k: (entry, rows[k].denominator * product) for k, entry in zip(row_indices, numerators, strict=True)
             }
         return [fractions[k] for k in range(len(rows))]
 
@@ -209,19 +211,19 @@ class PlanesPoint:
         return tuple(fmpq(numerator, denominator) for numerator, denominator in self.lowest_terms())
 
 
-def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
+def _scale_to_common_denominator(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
     """Return the numerators of each plane times the W of all other planes, in one column, and the product of all W."""
     *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
     products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
-    others = (before * after for before, after in zip(products_before, products_after, strict=True))
-    column = [entry * other for (numerators, _), other in zip(planes, others, strict=True) for entry in numerators]
+    factors = (before * after for before, after in zip(products_before, products_after, strict=True))
+    column = [entry * factor for (numerators, _), factor in zip(planes, factors, strict=True) for entry in numerators]
     return fmpz_mat(len(column), 1, column), product
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
     """Return the greatest common factor of two numbers and the modulus; high powers of a prime may be missed."""
-    common = modulus.gcd(numerator % modulus)
-    return common if common == 1 else common.gcd(denominator % common)
+    gcd = modulus.gcd(numerator % modulus)
+    return gcd if gcd == 1 else gcd.gcd(denominator % gcd)
 
 
 class NormalSteps:

@@ -60,7 +60,7 @@ class OrbitInPlanes:
         self._planes = [_Plane(plane.block, P) for plane, P in zip(steps.splitting.planes, triples, strict=True)]
         self._numbers_stay_short = all(plane.numbers_stay_short for plane in self._planes)
         self._limit = _MAX_BITS if max_bits is None else max_bits
-        self._end: SingularStep | OverBudget | None = None
+        self._end_error: SingularStep | OverBudget | None = None
         self._period: int | None = None
         self._first_points: list[PlanesPoint] = []  # the points of the first steps, computed exactly
         for step, value in enumerate(steps.points(x)):
@@ -68,7 +68,7 @@ class OrbitInPlanes:
             if step == 0 or not bits:
                 self._first_points.append(value)  # not charged to the budget, since the user gave the initial point
             if bits:
-                self._end = OverBudget(step, bits)
+                self._end_error = OverBudget(step, bits)
                 break
             if step > 0 and value == self._first_points[0]:
                 self._period = step
@@ -76,8 +76,8 @@ class OrbitInPlanes:
             if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
-            self._end = _undefined_step(len(self._first_points) - 1)
-        self._reachable = (
+            self._end_error = _undefined_step(len(self._first_points) - 1)
+        self._last_reachable_step = (
             len(self._first_points) - 1
         )  # the last step known to be within the budget and before all poles
 
@@ -85,8 +85,8 @@ class OrbitInPlanes:
         """Return Phi^n(start). Raises SingularStep or OverBudget, whichever belongs to the earlier step."""
         if n < len(self._first_points):
             return self._first_points[n]
-        if self._end is not None:
-            raise self._end
+        if self._end_error is not None:
+            raise self._end_error
         if self._period is not None:
             return self._first_points[n % self._period]
         step, value, bits = self._step_within_budget(n)
@@ -100,7 +100,7 @@ class OrbitInPlanes:
             raise OverBudget(step, bits)
         if value is None:
             raise ArithmeticError("an iterate is a pole over Q, but not modulo any prime: please report this")
-        self._reachable = max(self._reachable, n)
+        self._last_reachable_step = max(self._last_reachable_step, n)
         return value
 
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
@@ -108,26 +108,30 @@ class OrbitInPlanes:
 
         The value is None if it was not computed or if step n is a pole.
         """
-        step = max(1, min(self._reachable, n - 1))
-        target = n if self._numbers_stay_short else _halved(n, step)
+        step = max(1, min(self._last_reachable_step, n - 1))
+        target_step = n if self._numbers_stay_short else _halve_above(n, step)
         previous: tuple[int, int] | None = None
         while True:
             try:
-                value = self._point(target)
+                value = self._point(target_step)
             except SingularStep:
-                return target, None, 0
+                return target_step, None, 0
             bits = value.exceeding(self._limit)
-            if target == n or bits:
-                return target, value, bits
-            current = target, value.bits
+            if target_step == n or bits:
+                return target_step, value, bits
+            current = target_step, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # Linear extrapolation, up to four times the budget, where the budget is certainly exceeded.
                 surely_exceeded_after = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
-                if surely_exceeded_after <= min(n - target, _MAX_MODULAR_STEPS):
-                    return target + surely_exceeded_after, None, None
+                if surely_exceeded_after <= min(n - target_step, _MAX_MODULAR_STEPS):
+                    return target_step + surely_exceeded_after, None, None
             previous = current
             # Heights may grow like n^2: the step is doubled only if four times the height is within the budget.
-            target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
+            target_step = (
+                _halve_above(n, target_step)
+                if 4 * current[1] <= self._limit
+                else min(n, target_step + target_step // 2)
+            )
 
     def _point(self, n: int) -> PlanesPoint:
         """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""
@@ -143,16 +147,16 @@ class OrbitInPlanes:
         """Return the first undefined step up to n; `value`, the n-th point, serves as a check modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.numbers_stay_short]
-        generator = random.Random(f"first pole {n}")  # the same primes, hence the same work, on every machine
+        rng = random.Random(f"first pole {n}")  # the same primes, hence the same work, on every machine
         for _ in range(_PRIMES):
             poles: list[int] = []
             for i in undecided_planes:
-                block, residue = self._blocks[i], None
-                while residue is None:  # find a homomorphism to the residues modulo a random prime
-                    residue = block.residue_map(random_prime(generator))
-                pole, point = _steps_modulo(block, n, residue)
+                block, residue_map = self._blocks[i], None
+                while residue_map is None:  # find a homomorphism to the residues modulo a random prime
+                    residue_map = block.residue_map(random_prime(rng))
+                pole, point = _steps_modulo(block, n, residue_map)
                 if pole is None:
-                    if value is not None and not same_point(list(map(residue, value.triples[i])), point):
+                    if value is not None and not same_point(list(map(residue_map, value.triples[i])), point):
                         raise ArithmeticError("the iterate disagrees with the orbit modulo a prime: please report this")
                     continue
                 try:
@@ -167,7 +171,7 @@ class OrbitInPlanes:
         raise ArithmeticError("the orbit meets a pole modulo many primes, but not over Q: please report this")
 
 
-def _halved(n: int, step: int) -> int:
+def _halve_above(n: int, step: int) -> int:
     """Return the least of n, n/2, n/4, ..., rounded down, that is above `step`: a table for n contains its value."""
     while n >> 1 > step:
         n >>= 1
@@ -249,13 +253,13 @@ def _point_in_plane(block: Block, n: int) -> Triple:
     return block.integral(triple)
 
 
-def _steps_modulo(block: Block, n: int, residue: Callable[[Any], nmod]) -> tuple[int | None, Triple]:
+def _steps_modulo(block: Block, n: int, residue_map: Callable[[Any], nmod]) -> tuple[int | None, Triple]:
     """Return P_n modulo a prime, or the first step at which W vanishes modulo the prime."""
     cubic = block.block
-    modulo = PlanarBlock(*map(residue, (cubic.a, cubic.b, cubic.c, cubic.d)))
-    point: Triple = tuple(map(residue, block.start))  # type: ignore[assignment]  # a tuple of three
+    block_modulo_prime = PlanarBlock(*map(residue_map, (cubic.a, cubic.b, cubic.c, cubic.d)))
+    point: Triple = tuple(map(residue_map, block.start))  # type: ignore[assignment]  # a tuple of three
     for k in range(1, n + 1):
-        point = modulo.image(point)
+        point = block_modulo_prime.image(point)
         if point[2] == 0:
             return k, point
     return None, point

@@ -26,7 +26,7 @@ class _Divisor(Exception):
         super().__init__()
 
 
-class _Torsion:
+class _TorsionPoints:
     """Points (X, y Y) of y^2 = c = x^3 + A x + B with X and Y modulo f."""
 
     def __init__(self, f: Poly, c: Poly, A: Any) -> None:
@@ -34,9 +34,9 @@ class _Torsion:
 
     def inverse(self, value: Poly) -> Poly:
         """Return 1/value modulo f. Raises _Divisor."""
-        common, inverse, _ = value.xgcd(self.f)
-        if common.degree() > 0:
-            raise _Divisor(common)
+        common_factor, inverse, _ = value.xgcd(self.f)
+        if common_factor.degree() > 0:
+            raise _Divisor(common_factor)
         return inverse % self.f
 
     def add(self, P: Point, Q: Point) -> Point:
@@ -81,23 +81,25 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             continue
         f, residue = division_polynomials[prime], None
         while residue is None:
-            torsion = _Torsion(f, c, A)  # find the trace that satisfies the equation on the points with f = 0
+            torsion = _TorsionPoints(f, c, A)  # find the trace that satisfies the equation on the points with f = 0
             try:
                 frobenius = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 frobenius_squared = (pow(frobenius[0], q, f), frobenius[1] * pow(frobenius[1], q, f) % f)
-                target = torsion.add(frobenius_squared, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
+                target_point = torsion.add(
+                    frobenius_squared, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1))
+                )
                 image: Point = None
-                for t in range(1, prime // 2 + 1) if target else ():
+                for t in range(1, prime // 2 + 1) if target_point else ():
                     image = torsion.add(image, frobenius)
-                    if image is not None and target is not None and image[0] == target[0]:
-                        residue = t if image[1] == target[1] else prime - t
+                    if image is not None and target_point is not None and image[0] == target_point[0]:
+                        residue = t if image[1] == target_point[1] else prime - t
                         break
                 else:
-                    if target is not None:
+                    if target_point is not None:
                         raise AssertionError("no trace of Frobenius fits: please report this")
                     residue = 0
-            except _Divisor as smaller:
-                f = smaller.divisor
+            except _Divisor as error:
+                f = error.divisor
         trace += modulus * ((residue - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
@@ -107,31 +109,30 @@ class _DivisionPolynomials:
     """The polynomials psi_n for odd n, and psi_n / (2y) for even n, as polynomials in x."""
 
     def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
-        xx = x * x
-        xxx = xx * x
-        self._square = 16 * c * c
+        x2 = x * x
+        x3 = x2 * x
+        self._sixteen_c_squared = 16 * c * c
         self._values: dict[int, Poly] = {
             -1: 0 * x - 1,
             0: 0 * x,
             1: 0 * x + 1,
             2: 0 * x + 1,
-            3: 3 * xx * xx + 6 * A * xx + 12 * B * x - A * A,
-            4: 2
-            * (xxx * xxx + 5 * A * xx * xx + 20 * B * xxx - 5 * A * A * xx - 4 * A * B * x - 8 * B * B - A * A * A),
+            3: 3 * x2 * x2 + 6 * A * x2 + 12 * B * x - A * A,
+            4: 2 * (x3 * x3 + 5 * A * x2 * x2 + 20 * B * x3 - 5 * A * A * x2 - 4 * A * B * x - 8 * B * B - A * A * A),
         }
 
     def __getitem__(self, n: int) -> Poly:
         if n not in self._values:
-            m, odd = divmod(n, 2)
+            m, is_odd = divmod(n, 2)
             # psi_n with an even n is stored without its factor 2 y. In the recurrence for an odd index, one of the two
             # products contains four such factors, 16 y^4 = 16 c^2.
-            if odd:
+            if is_odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
                 self._values[n] = (
-                    first_product - second_product * self._square
+                    first_product - second_product * self._sixteen_c_squared
                     if m % 2
-                    else first_product * self._square - second_product
+                    else first_product * self._sixteen_c_squared - second_product
                 )
             else:
                 bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]

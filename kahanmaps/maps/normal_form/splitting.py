@@ -56,12 +56,12 @@ class Splitting:
             self._scale = 2 * self.eps
             if self.eps == 0:
                 raise BadPrime(f"eps = 0 in {field}: use another prime", field.characteristic)
-            self._inverse = field.convert_matrix(S.inv())
+            self._S_inverse = field.convert_matrix(S.inv())
             # The planes, and for each plane the elements of K that correspond to the basis of its field.
             if field is QQ or isinstance(field, PrimeField):
-                planes, bases = _by_factors(form, field)
+                planes, bases = _planes_by_factors(form, field)
             elif isinstance(field, BallField):
-                planes, bases = _over_balls(form, field)
+                planes, bases = _planes_over_balls(form, field)
             else:
                 raise InputError(f"found the field {field}, expected QQ, GF(p) or real balls")
             self.planes: tuple[Plane, ...] = tuple(planes)
@@ -71,9 +71,9 @@ class Splitting:
             self._matrices = []
             for basis in bases:
                 columns = []
-                for half in (0, m):
+                for first_column in (0, m):
                     for column in basis:
-                        pairs = [zip(row[half : half + m], column, strict=True) for row in rows]
+                        pairs = [zip(row[first_column : first_column + m], column, strict=True) for row in rows]
                         columns.append([sum((a * b for a, b in pair), field.zero) for pair in pairs])
                 self._matrices.append(columns)
 
@@ -92,7 +92,7 @@ class Splitting:
         if len(x) != n:
             raise InputError(f"found a point with {counted(len(x), 'coordinate')}, expected {n}")
         with self.field.working():
-            z = (self._inverse * self.field.matrix(n, 1, list(x))).entries()
+            z = (self._S_inverse * self.field.matrix(n, 1, list(x))).entries()
             z = [entry * self._scale for entry in z]
             triples = []
             for plane in self.planes:
@@ -103,17 +103,17 @@ class Splitting:
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
         """Return the point with these homogeneous coordinates. Raises SingularStep if a triple is at infinity."""
         with self.field.working():
-            total = [self.field.zero] * self.dim
+            coordinates = [self.field.zero] * self.dim
             for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):
                 if W == 0:
                     raise SingularStep("one of the planes is at infinity: the map has a pole here")
                 values = [*plane.coefficients(U / W), *plane.coefficients(V / W)]
                 for column, value in zip(columns, values, strict=True):
-                    total = [entry + factor * value for entry, factor in zip(total, column, strict=True)]
-            return tuple(entry / self._scale for entry in total)
+                    coordinates = [entry + factor * value for entry, factor in zip(coordinates, column, strict=True)]
+            return tuple(entry / self._scale for entry in coordinates)
 
 
-def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
+def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
     """Return the planes over Q or GF(p), one for each irreducible factor of chi."""
     p = field.characteristic
     chi: Any
@@ -133,7 +133,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
     def polynomial(coefficients: Sequence[Any]) -> Any:
         return ring([fmpz(int(c)) for c in coefficients]) if p else fmpq_poly(list(coefficients))
 
-    def planes_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
+    def plane_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
         """Return the plane of a factor, and its basis as coefficients in K of elements that are 0 in other planes."""
         degree, generator = int(factor.degree()), polynomial([0, 1])
         context: Any = None
@@ -177,13 +177,13 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
                 return value.coefficients
 
         block = PlanarBlock(*(residue(e.coeffs()) for e in elements))
-        others = chi // factor
-        idempotent = others * others.xgcd(factor)[1] % chi
+        cofactor = chi // factor
+        idempotent = cofactor * cofactor.xgcd(factor)[1] % chi
         powers = [idempotent * generator**k % chi for k in range(degree)]
         basis = [[field.convert(int(f[i]) if p else f[i]) for i in range(form.m)] for f in powers]
         return Plane(name, degree, block, residue, coefficients, context), basis
 
-    planes, bases = zip(*map(planes_of, factors), strict=True)
+    planes, bases = zip(*map(plane_of, factors), strict=True)
     return list(planes), list(bases)
 
 
@@ -193,7 +193,7 @@ def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 
 
-def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
+def _planes_over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
     planes, bases = [], []
     chi_derivative = form.chi.derivative()
     for complex_root in form.chi.complex_roots():
@@ -209,22 +209,22 @@ def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[l
                 total = total * root_ball + coefficient
             return total
 
-        block = PlanarBlock(*(value_at(_balls(c, field)) for c in form.coefficients))
+        block = PlanarBlock(*(value_at(_to_balls(c, field)) for c in form.coefficients))
         # chi / (t - root) by Horner's rule; divided by chi'(root), it is 1 at the root and 0 at all other roots.
-        chi, denominator = _balls(form.chi, field), value_at(_balls(chi_derivative, field))
+        chi, denominator = (_to_balls(form.chi, field), value_at(_to_balls(chi_derivative, field)))
         quotient = [chi[-1]]
         for coefficient in chi[-2:0:-1]:
             quotient.append(quotient[-1] * root_ball + coefficient)
-        unit = [entry / denominator for entry in reversed(quotient)]
+        idempotent = [entry / denominator for entry in reversed(quotient)]
         if is_real:
             planes.append(Plane(f"t = {root_ball.str(8, radius=False)}", 1, block, value_at, lambda value: [value]))
-            bases.append([unit])
+            bases.append([idempotent])
         else:
             name = f"t = {acb(root_ball).str(8, radius=False)} and its conjugate"
             planes.append(Plane(name, 2, block, value_at, lambda value: [value.real, value.imag]))
-            bases.append([[2 * acb(e).real for e in unit], [-2 * acb(e).imag for e in unit]])
+            bases.append([[2 * acb(e).real for e in idempotent], [-2 * acb(e).imag for e in idempotent]])
     return planes, bases
 
 
-def _balls(element: fmpq_poly, field: BallField) -> list[Any]:
+def _to_balls(element: fmpq_poly, field: BallField) -> list[Any]:
     return [field.convert(c) for c in element.coeffs()]

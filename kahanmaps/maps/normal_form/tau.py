@@ -30,9 +30,9 @@ from typing import Any
 from kahanmaps.maps.normal_form.planar_block import Triple, determinant
 from kahanmaps.maps.somos import Terms
 
-_BASES = 3
-_FIRST = 2  # the least n: for smaller n, psi_{n-1} would be 0
-_SHARED = 8  # number of points taken from one table, which then holds about ten times the digits of a point
+_MAX_BASES = 3
+_MIN_INDEX = 2  # the least n: for smaller n, psi_{n-1} would be 0
+_MAX_SHARED_POINTS = 8  # number of points taken from one table, which then holds about ten times the digits of a point
 
 
 def triples(block: Any) -> Iterator[Triple]:
@@ -44,7 +44,7 @@ def triples(block: Any) -> Iterator[Triple]:
     if table is None:
         yield from block.triples()
         return
-    yield from islice(block.triples(), table.base + _FIRST)
+    yield from islice(block.triples(), table.base + _MIN_INDEX)
     yield from table.points()
 
 
@@ -54,12 +54,12 @@ def iterate(block: Any, n: int) -> Triple | None:
     They do not apply if the cubic is singular, T has small order, or n is small. Poles at earlier steps are ignored.
     """
     if block.is_constant:
-        at_rest: Triple = block.start
-        return at_rest
-    if block.table is None or block.table.points_taken >= _SHARED:
+        fixed_point: Triple = block.start
+        return fixed_point
+    if block.table is None or block.table.points_taken >= _MAX_SHARED_POINTS:
         block.table = table_near(block)
     table: TauTable | None = block.table
-    if table is None or n - table.base < _FIRST:
+    if table is None or n - table.base < _MIN_INDEX:
         return None
     table.points_taken += 1
     return table.point(n - table.base)
@@ -74,13 +74,13 @@ def table_near(block: Any) -> TauTable | None:
         return None
     over_field, P0, P1 = block.lifts
     lifts = {0: P0, 1: P1}
-    for k in range(1, _BASES + 2):
+    for k in range(1, _MAX_BASES + 2):
         if lifts[k - 1][2] == 0 or lifts[k][2] == 0:
             break
-        lifts[k + 1] = _over(over_field.image(lifts[k]), lifts[k - 1][2])
+        lifts[k + 1] = _divide(over_field.image(lifts[k]), lifts[k - 1][2])
     if P1[2] != 0:
-        lifts[-1] = _over(over_field.preimage(P0), P1[2])
-    for base in range(_BASES):
+        lifts[-1] = _divide(over_field.preimage(P0), P1[2])
+    for base in range(_MAX_BASES):
         if all(k in lifts and lifts[k][2] != 0 for k in range(base - 1, base + 4)):
             P = {k: lifts[base + k] for k in range(-1, 4)}
             chi = first_chi(P, range(5))
@@ -89,7 +89,7 @@ def table_near(block: Any) -> TauTable | None:
     return None
 
 
-def _over(triple: Triple, denominator: Any) -> Triple:
+def _divide(triple: Triple, denominator: Any) -> Triple:
     U, V, W = triple
     return U / denominator, V / denominator, W / denominator
 
@@ -120,7 +120,7 @@ class TauTable:
 
     def points(self) -> Iterator[Triple]:
         """Yield P_2, P_3, ... as primitive triples, as long as the map is defined."""
-        for n in count(_FIRST):
+        for n in count(_MIN_INDEX):
             point = self.point(n)
             if point[2] == 0:
                 return

@@ -25,8 +25,8 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.tau import first_chi
 
 # Number of base points that are tried until no divisor is zero.
-_BASES = 12
-_STEPPED = 16  # up to this n, the point is computed by single steps
+_MAX_BASES = 12
+_MAX_SINGLE_STEPS = 16  # up to this n, the point is computed by single steps
 
 
 class NoTranslation(Exception):
@@ -50,24 +50,37 @@ def iterate(
     >>> same_point(point, iterate(block, start, 100, F.is_zero))
     True
     """
-    points = _first_points(block, [start], min(n, _STEPPED if n <= _STEPPED else 4), is_zero)
+    points = _first_points(block, [start], min(n, _MAX_SINGLE_STEPS if n <= _MAX_SINGLE_STEPS else 4), is_zero)
     if len(points) > n:
         return points[n]
     numerator, denominator = block.level(start)
     if numerator == 0 or block.discriminant == 0:
-        return _parabolic(block, start, n)
+        # delta = 0, and the start has an image. (U/W, V/W) is the sum of a part with h = 0, or in the simple root of h,
+        # which is multiplied by r/(r - n), and a part in the double root, which is multiplied by
+        # ((r - n)^2 - 1)/(r^2 - 1).
+        U, V, W = block.image(start)
+        pairs = [(start[0] / start[2], U / W), (start[1] / start[2], V / W)]  # coordinates of the start and its image
+        r = parabolic_ratio(block, start)
+        if r is None:
+            u, v = (z + n * (w - z) for z, w in pairs)
+            return u, v, W / W
+        difference, divisor = r - n, r * r - 1
+        factor = difference * (difference * difference - 1)
+        double_root_parts = [(z * r * (r + 1) - w * divisor) / (3 * r) for z, w in pairs]
+        u, v = ((z - part) * r * divisor + part * factor for (z, _), part in zip(pairs, double_root_parts, strict=True))
+        return u, v, difference * divisor
     level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
     if is_zero(gamma):  # three lines, permuted by Psi: P_n, P_{n+3}, ... are on the same line
         points = _first_points(block, points, n % 3 + 10, is_zero)
-        return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
+        return _point_along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
     # The formulas divide by values that are zero at special points: in that case the next base point is tried.
-    for base in range(3, _BASES + 3):
+    for base in range(3, _MAX_BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
-            point = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
+            point = _point_by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
         else:
-            point = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
+            point = _point_by_doublings(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
         if point is not None:
             return point
     raise NoTranslation
@@ -80,39 +93,24 @@ def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     a positive integer, and no pole otherwise. r is a rational function of the values of r^2 at the start and its image.
     """
 
-    def square(point: Triple) -> Any:
+    def squared_ratio(point: Triple) -> Any:
         U, V, W = point
-        p, q, r = block.D
-        denominator = p * (U * U) + q * (U * V) + r * (V * V)
+        a, b, c = block.D
+        denominator = a * (U * U) + b * (U * V) + c * (V * V)
         return None if denominator == 0 else -(W * W) / denominator
 
-    square_at_start = square(start)
-    return None if square_at_start is None else (square_at_start - square(block.image(start)) + 1) / 2
+    squared_ratio_at_start = squared_ratio(start)
+    return (
+        None if squared_ratio_at_start is None else (squared_ratio_at_start - squared_ratio(block.image(start)) + 1) / 2
+    )
 
 
-def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """Return P_n for delta = 0, in characteristic 0 or at least 5; the start has an image.
-
-    (U/W, V/W) is the sum of a part with h = 0, or in the simple root of h, which is multiplied by r/(r - n), and a part
-    in the double root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
-    """
-    U, V, W = block.image(start)
-    point, image = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
-    r = parabolic_ratio(block, start)
-    if r is None:
-        u, v = (z + n * (w - z) for z, w in zip(point, image, strict=True))
-        return u, v, W / W
-    difference, denominator = r - n, r * r - 1
-    factor = difference * (difference * difference - 1)
-    pairs = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
-    u, v = ((z - double) * r * denominator + double * factor for z, double in pairs)
-    return u, v, difference * denominator
-
-
-def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
+def _first_points(
+    block: PlanarBlock, points: list[Triple], last_index: int, is_zero: Callable[[Any], bool]
+) -> list[Triple]:
     """Return P_0, P_1, ..., P_last, as natural lifts from the second point on. Raises SingularStep at a pole."""
     points = list(points)
-    for k in range(len(points) - 1, last):
+    for k in range(len(points) - 1, last_index):
         U, V, W = block.image(points[k])
         if is_zero(W):
             raise SingularStep(f"the map is not defined at step {k}")
@@ -123,7 +121,7 @@ def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: 
     return points
 
 
-def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
+def _point_along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
     """Return the n-th point of an orbit of a projective map of a line, from its first four points."""
     P, Q = points[0], points[1]
     if same_point(P, Q):
@@ -156,16 +154,33 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     return (x * P[0] + y * Q[0], x * P[1] + y * Q[1], x * P[2] + y * Q[2])
 
 
-def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
+def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
     """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor is zero."""
     P = dict(zip(range(-2, 3), points, strict=False))
     chi = first_chi(P, range(-1, 3))
     if any(is_zero(value) for value in chi.values()):
         return None
-    Q = _multiple_of_T(gamma, n, is_zero)
-    if Q is None:
+    # n T = (x, Y), None for zero, from an expansion of n with digits 0 and odd digits from -3 to 3. With x + shift
+    # instead of x the curve is Y^2 = x^3 + c x + ...
+    one, shift, c = gamma / gamma, 3 + gamma, -3 * (gamma - 1) * (gamma - 9)
+    odd_multiples = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
+    odd_multiples |= {-k: (x, -y) for k, (x, y) in odd_multiples.items()}
+    nT: tuple[Any, Any] | None = None
+    for digit, zero_count in _digits(n):
+        x, y = odd_multiples[digit]
+        if nT is None:
+            nT = x, y
+        elif is_zero(difference := x - nT[0]):
+            nT = _times_power(x, y, c, 1) if is_zero(y - nT[1]) else None
+        else:
+            chord_slope = (y - nT[1]) / difference
+            x_sum = chord_slope * chord_slope - nT[0] - x
+            nT = x_sum, chord_slope * (x - x_sum) - y
+        if nT is not None:
+            nT = _times_power(*nT, c, zero_count)
+    if nT is None:
         return P[0]
-    x, Y = Q
+    x, Y = nT[0] - shift, nT[1]
     ratio = 1 / (chi[0] * chi[2] * chi[-1])
     x_u = -4 * chi[-1] * chi[1] * (ratio * chi[2] * chi[-1]) * (ratio * chi[2] * chi[-1])
     eight_gamma = 8 * gamma
@@ -176,31 +191,6 @@ def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[A
     C = -chi[1] * (dY - (Y_u - eight_gamma) * slope)
     U, V, W = (A * p + B * q + C * r for p, q, r in zip(P[0], P[1], P[-1], strict=True))
     return None if all(map(is_zero, (U, V, W))) else (U, V, W)
-
-
-def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[Any, Any] | None:
-    """Return n T = (x, Y), n > 0, None for zero, from an expansion of n with digits 0 and odd digits from -3 to 3."""
-    # With x + shift instead of x the curve is Y^2 = x^3 + c x + ...
-    one, shift, c = gamma / gamma, 3 + gamma, -3 * (gamma - 1) * (gamma - 9)
-    table = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
-    table |= {-k: (x, -y) for k, (x, y) in table.items()}
-    point: tuple[Any, Any] | None = None
-    for digit, zeros in _digits(n):
-        x, y = table[digit]
-        if point is None:
-            point = x, y
-        else:
-            X, Y = point
-            dx, dy = x - X, y - Y
-            if not is_zero(dx):
-                slope = dy / dx
-                X = slope * slope - X - x
-                point = X, slope * (x - X) - y
-            else:
-                point = _times_power(x, y, c, 1) if is_zero(dy) else None
-        if point is not None:
-            point = _times_power(*point, c, zeros)
-    return None if point is None else (point[0] - shift, point[1])
 
 
 def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
@@ -223,17 +213,17 @@ def _digits(n: int) -> list[tuple[int, int]]:
     >>> _digits(100)
     [(3, 3), (1, 2)]
     """
-    digits, length = [], 0
+    digits, zeros_after = [], 0
     while n:
-        zeros = (n & -n).bit_length() - 1
-        n, length = n >> zeros, zeros
+        zero_count = (n & -n).bit_length() - 1
+        n, zeros_after = n >> zero_count, zero_count
         digit = (n + 4) % 8 - 4
-        digits.append((digit, length))
+        digits.append((digit, zeros_after))
         n -= digit
     return digits[::-1]
 
 
-def _doubled(
+def _point_by_doublings(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
     """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor is zero."""
@@ -247,40 +237,40 @@ def _doubled(
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None
     one = gamma / gamma
-    half = one / 2
+    one_half = one / 2
     inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
     # The values psi_{-2}, ..., psi_5 and chi_0, chi_1, chi_2 around the index 1.
-    window = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
-    chi_values, centre = [chi[k] for k in range(3)], 1
+    psi_values = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
+    chi_values, center = [chi[k] for k in range(3)], 1
     for digit in f"{n:b}"[1:]:
-        # The values around 2 centre + digit, computed from the values around `centre`.
-        first = centre - 3
-        squares = [value * value for value in window]
-        neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
+        # The values around 2 centre + digit, computed from the values around `center`.
+        first_index = center - 3
+        squares = [value * value for value in psi_values]
+        neighbours = [None, *(psi_values[k + 1] * psi_values[k - 1] for k in range(1, 7)), None]
         # The squares for a partner whose index is divisible by 3, and for one whose index is not.
-        squares_by_index = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
-        shift = 2 * centre + int(digit) - 3
-        window = []
+        squares_by_index = [gamma * s if (first_index + k) % 3 == 0 else s for k, s in enumerate(squares)]
+        shift = 2 * center + int(digit) - 3
+        psi_values = []
         for m in range(shift, shift + 8):
-            k = m // 2 - first
+            k = m // 2 - first_index
             a, b = (k + 1, k) if m % 2 else (k + 1, k - 1)
             # Of two indices at distance 1 or 2 at most one is divisible by 3, so `squares_by_index` is right for both.
             value = neighbours[a] * squares_by_index[b] - neighbours[b] * squares_by_index[a]
-            window.append(value if m % 2 else value * half)
+            psi_values.append(value if m % 2 else value * one_half)
         neighbour_product, square = chi_values[0] * chi_values[2], chi_values[1] * chi_values[1]
-        centre_is_divisible, chi_values = centre % 3 == 0, []
+        is_center_divisible, chi_values = center % 3 == 0, []
         for m in (shift + 2, shift + 3, shift + 4):
-            b = m - centre
-            k = b - first
-            if centre_is_divisible and b % 3 == 0:
+            b = m - center
+            k = b - first_index
+            if is_center_divisible and b % 3 == 0:
                 value = neighbour_product * squares[k] - neighbours[k] * square
             else:
                 value = neighbour_product * squares_by_index[k] - neighbours[k] * (
-                    gamma * square if centre_is_divisible else square
+                    gamma * square if is_center_divisible else square
                 )
-            chi_values.append(value * inverse[centre - b])
-        centre = 2 * centre + int(digit)
-    psi_before, psi_n, psi_after = window[2:5]
+            chi_values.append(value * inverse[center - b])
+        center = 2 * center + int(digit)
+    psi_before, psi_n, psi_after = psi_values[2:5]
     A, B, C = (
         -2 * (psi_before * psi_after * chi_values[1]),
         psi_n * psi_after * chi_values[0],

@@ -28,36 +28,36 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     """
     n = matrix.nrows()
     rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous = fmpz(1)  # the previous pivot; 1 after a pivot that need not divide the entries
+    previous_pivot = fmpz(1)  # the previous pivot; 1 after a pivot that need not divide the entries
     for k in range(0, n - 1, 2):
         a, b, rows_below, m = rows[k], rows[k + 1], rows[k + 2 :], n - k - 2
-        # Replace each entry of the other rows by its minor of order 3 with the two pivot rows, divided by `previous`.
+        # Replace each entry of the other rows by its minor of order 3 with the pivot rows, over the previous pivot.
         pivot, *cofactors = (
             x[k] * y[k + 1] - x[k + 1] * y[k]
             for x, y in [(a, b), *((row, a) for row in rows_below), *((b, row) for row in rows_below)]
         )
-        if previous != 1:
-            quotients = [divmod(minor, previous) for minor in (pivot, *cofactors)]
+        if previous_pivot != 1:
+            quotients = [divmod(minor, previous_pivot) for minor in (pivot, *cofactors)]
             if any(remainder != 0 for _, remainder in quotients):
-                candidate_divisor, previous = abs(previous), fmpz(1)
+                candidate_divisor, previous_pivot = abs(previous_pivot), fmpz(1)
             else:
                 pivot, *cofactors = (quotient for quotient, _ in quotients)
         if pivot == 0:
             return None
         minors = [
-            [pivot * row[j] + of_b * b[j] + of_a * a[j] for j in range(k + 2, n + 1)]
-            for row, of_b, of_a in zip(rows_below, cofactors[:m], cofactors[m:], strict=True)
+            [pivot * row[j] + factor_of_b * b[j] + factor_of_a * a[j] for j in range(k + 2, n + 1)]
+            for row, factor_of_b, factor_of_a in zip(rows_below, cofactors[:m], cofactors[m:], strict=True)
         ]
-        divisor = previous
-        if previous == 1 and minors:
+        divisor = previous_pivot
+        if previous_pivot == 1 and minors:
             # The divisor is determined from a few entries only.
             entries = [entry for row in minors for entry in row]
-            divisor = _shared(candidate_divisor, entries[:: max(1, len(entries) // 3)])
+            divisor = _divisor_of_all(candidate_divisor, entries[:: max(1, len(entries) // 3)])
         for row, entries in zip(rows_below, minors, strict=True):
             row[k + 2 :] = entries if divisor == 1 else [entry // divisor for entry in entries]
-        b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous for j in range(k + 2, n + 1))]
-        if k == 0 or previous != 1:
-            previous = pivot
+        b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous_pivot for j in range(k + 2, n + 1))]
+        if k == 0 or previous_pivot != 1:
+            previous_pivot = pivot
         else:
             candidate_divisor = abs(pivot)
     if any(rows[i][i] == 0 for i in range(n)):
@@ -95,18 +95,18 @@ def is_unique_solution(point: IntegerPoint, matrix: fmpz_mat, rhs: fmpz_mat) -> 
     return bool(matrix * fmpz_mat(rhs.nrows(), 1, point.numerators) == rhs * point.denominator)
 
 
-def _shared(candidate_divisor: fmpz, values: list[fmpz]) -> fmpz:
+def _divisor_of_all(candidate_divisor: fmpz, values: list[fmpz]) -> fmpz:
     """Return the part of `candidate_divisor` without small primes that divides all values, or 1 if this part is short.
 
     Small primes are excluded: they often divide all minors of order 3 by chance, but not the minors of higher order
     with the exponent needed.
     """
-    common, small_primes = candidate_divisor, fmpz.primorial_ui(fmpz(1000))
-    while (small := common.gcd(small_primes)) != 1:  # done first: the remaining part usually divides the values
-        common = common // small
+    divisor, small_primes = candidate_divisor, fmpz.primorial_ui(fmpz(1000))
+    while (small_part := divisor.gcd(small_primes)) != 1:  # done first: the remaining part usually divides the values
+        divisor = divisor // small_part
     for value in values:
-        if (remainder := value % common) != 0:
-            common = common.gcd(remainder)
-            if common.bit_length() < _USEFUL_BITS:
+        if (remainder := value % divisor) != 0:
+            divisor = divisor.gcd(remainder)
+            if divisor.bit_length() < _USEFUL_BITS:
                 return fmpz(1)
-    return common if common.bit_length() >= _USEFUL_BITS else fmpz(1)
+    return divisor if divisor.bit_length() >= _USEFUL_BITS else fmpz(1)

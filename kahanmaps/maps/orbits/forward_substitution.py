@@ -22,35 +22,35 @@ class _Row:
     """A row of the equation: the exponents of p_k and q_k in each monomial, and the coefficients of the entries."""
 
     unknown: int
-    known: tuple[int, ...]
+    known_unknowns: tuple[int, ...]
     powers: tuple[tuple[tuple[int, int, int], ...], ...]
     entries: fmpz_mat  # rows: coefficients of the unknown and of the solved coordinates, then the right-hand side
     divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row
 
-    def solved(self, point: Sequence[Fraction], solved: Sequence[Fraction]) -> Fraction | None:
+    def solve_unknown(self, point: Sequence[Fraction], solved_coordinates: Sequence[Fraction]) -> Fraction | None:
         """Return the unknown, given the point and the coordinates solved; None if the unknown has coefficient 0."""
         monomials = []
         for powers in self.powers:
-            total = fmpz(1)
-            for x, of_p, of_q in powers:
+            monomial = fmpz(1)
+            for x, p_exponent, q_exponent in powers:
                 p, q = point[x]
-                total *= (p**of_p if of_p else 1) * (q**of_q if of_q else 1)
-            monomials.append(total)
-        denominator_form, *others, numerator = (self.entries * fmpz_mat(len(monomials), 1, monomials)).entries()
+                monomial *= (p**p_exponent if p_exponent else 1) * (q**q_exponent if q_exponent else 1)
+            monomials.append(monomial)
+        denominator_form, *known_entries, numerator = (self.entries * fmpz_mat(len(monomials), 1, monomials)).entries()
         if denominator_form == 0 or any(point[x][0] == 0 for x in self.divisors):
             return None
         denominator = fmpz(1)
-        for k, entry in zip(self.known, others, strict=True):
+        for k, entry in zip(self.known_unknowns, known_entries, strict=True):
             # Compute numerator/denominator - entry p/q with gcds of short numbers only.
-            p, q = solved[k]
-            common = entry.gcd(q)
-            p, q = entry // common * p, q // common
-            common_denominator = denominator.gcd(q)
-            numerator = numerator * (q // common_denominator) - p * (denominator // common_denominator)
-            common_again = numerator.gcd(common_denominator)
-            numerator, denominator = numerator // common_again, denominator // common_denominator * (q // common_again)
-        common = numerator.gcd(denominator_form) if denominator_form > 0 else -numerator.gcd(denominator_form)
-        return numerator // common, denominator * (denominator_form // common)
+            p, q = solved_coordinates[k]
+            gcd = entry.gcd(q)
+            p, q = entry // gcd * p, q // gcd
+            denominator_gcd = denominator.gcd(q)
+            numerator = numerator * (q // denominator_gcd) - p * (denominator // denominator_gcd)
+            numerator_gcd = numerator.gcd(denominator_gcd)
+            numerator, denominator = numerator // numerator_gcd, denominator // denominator_gcd * (q // numerator_gcd)
+        gcd = numerator.gcd(denominator_form) if denominator_form > 0 else -numerator.gcd(denominator_form)
+        return numerator // gcd, denominator * (denominator_form // gcd)
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class ForwardSubstitution:
         coordinates = point.lowest_terms()
         image = list(coordinates)
         for row in self.rows:
-            value = row.solved(coordinates, image)
+            value = row.solve_unknown(coordinates, image)
             if value is None:
                 return None
             image[row.unknown] = value
@@ -76,35 +76,35 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
 
     `forms` has one row of coefficients for each entry of (M | r), and one column for each monomial in `exponents`.
     """
-    table = forms.tolist()
-    rows = [table[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
-    solved: list[_Row] = []
-    remaining = list(range(n))
+    form_rows = forms.tolist()
+    rows = [form_rows[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
+    solved_rows: list[_Row] = []
+    remaining_rows = list(range(n))
     # The first row with a single new unknown is always a good choice: a row that can be solved now can be solved later.
-    while remaining:
-        solved_unknowns = {row.unknown for row in solved}
-        occurring = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}
-        i = next((i for i in remaining if len(set(occurring[i]) - solved_unknowns) == 1), None)
+    while remaining_rows:
+        solved_unknowns = {row.unknown for row in solved_rows}
+        unknowns_of_row = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining_rows}
+        i = next((i for i in remaining_rows if len(set(unknowns_of_row[i]) - solved_unknowns) == 1), None)
         if i is None:
             return None
-        unknown = next(j for j in occurring[i] if j not in solved_unknowns)
-        others = tuple(j for j in occurring[i] if j in solved_unknowns)
-        entries = [rows[i][j] for j in (unknown, *others, n)]
+        unknown = next(j for j in unknowns_of_row[i] if j not in solved_unknowns)
+        known_unknowns = tuple(j for j in unknowns_of_row[i] if j in solved_unknowns)
+        entries = [rows[i][j] for j in (unknown, *known_unknowns, n)]
         terms = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
         min_exponents = [min(exponents[k][x] for k in terms) for x in range(n)]
-        shifted = [[exponents[k][x] - min_exponents[x] for x in range(n)] for k in terms]
-        max_exponents = [max(powers[x] for powers in shifted) for x in range(n)]
-        in_matrix = [k for k in terms if any(entry[k] for entry in entries[:-1])]
+        reduced_exponents = [[exponents[k][x] - min_exponents[x] for x in range(n)] for k in terms]
+        max_exponents = [max(powers[x] for powers in reduced_exponents) for x in range(n)]
+        matrix_terms = [k for k in terms if any(entry[k] for entry in entries[:-1])]
         row = _Row(
             unknown,
-            others,
+            known_unknowns,
             tuple(
                 tuple((x, e, max_exponents[x] - e) for x, e in enumerate(powers) if max_exponents[x])
-                for powers in shifted
+                for powers in reduced_exponents
             ),
             fmpz_mat([[entry[k] for k in terms] for entry in entries]),
-            tuple(x for x in range(n) if min(exponents[k][x] for k in in_matrix) > 0),
+            tuple(x for x in range(n) if min(exponents[k][x] for k in matrix_terms) > 0),
         )
-        solved.append(row)
-        remaining.remove(i)
-    return ForwardSubstitution(solved)
+        solved_rows.append(row)
+        remaining_rows.remove(i)
+    return ForwardSubstitution(solved_rows)

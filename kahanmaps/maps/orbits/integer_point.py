@@ -54,7 +54,7 @@ class IntegerPoint:
 
         A common factor of some numerator and W is also a factor of W and the product of all numerators modulo W.
         """
-        return _lowest_terms(self.numerators, self.denominator, _common_with_product(self.numerators, self.denominator))
+        return _lowest_terms(self.numerators, self.denominator, _gcd_with_product(self.numerators, self.denominator))
 
     def residues(self, prime: int) -> list[int] | None:
         """Return the coordinates modulo a prime, followed by 1; None if the prime divides the denominator."""
@@ -91,15 +91,15 @@ class IntegerPoint:
         return f"IntegerPoint({self.numerators}, {self.denominator})"
 
 
-def _common_with_product(numerators: Sequence[fmpz], W: fmpz) -> fmpz:
+def _gcd_with_product(numerators: Sequence[fmpz], W: fmpz) -> fmpz:
     product = fmpz(1)
     for entry in numerators:
         product = product * entry % W
     return W.gcd(product)
 
 
-def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common: fmpz) -> list[Fraction]:
-    return [(entry // g, W // g) for entry in numerators for g in [common.gcd(entry % common)]]
+def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common_factors: fmpz) -> list[Fraction]:
+    return [(entry // g, W // g) for entry in numerators for g in [common_factors.gcd(entry % common_factors)]]
 
 
 class UnreducedPoint(IntegerPoint):
@@ -111,14 +111,14 @@ class UnreducedPoint(IntegerPoint):
     become `_LONGER` times as long, or when coordinates are read. After a long common factor all points are reduced.
     """
 
-    def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:
+    def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous_point: IntegerPoint) -> None:
         if denominator < 0:
             numerators, denominator = [-entry for entry in numerators], -denominator
-        self._previous = previous.has_long_factors, previous.reduced_bits
+        self._previous_state = previous_point.has_long_factors, previous_point.reduced_bits
         self._integers = numerators, denominator
-        self._common: fmpz | None = None  # a multiple of the common factor, if known
+        self._common_factor_multiple: fmpz | None = None  # a multiple of the common factor, if known
         bits = self._bits_with_factors
-        self.keeps_factors = _LONG_BITS <= bits < _LONGER * self._previous[1] and not self._previous[0]
+        self.keeps_factors = _LONG_BITS <= bits < _LONGER * self._previous_state[1] and not self._previous_state[0]
         if self.keeps_factors:
             self._divide(common_part([denominator, *numerators], _SMALL_PRIMES))
 
@@ -135,14 +135,15 @@ class UnreducedPoint(IntegerPoint):
     @property
     def integers(self) -> tuple[Sequence[fmpz], fmpz]:
         """Return numerators and denominator for the next step; they may have a short common factor."""
-        return self._integers if self.keeps_factors else self._reduced
+        return self._integers if self.keeps_factors else self._reduced_integers
 
     @cached_property
-    def _reduced(self) -> tuple[tuple[fmpz, ...], fmpz]:
+    def _reduced_integers(self) -> tuple[tuple[fmpz, ...], fmpz]:
         numerators, denominator = self._integers
-        factor = content((denominator if self._common is None else self._common, *numerators))
+        multiple = denominator if self._common_factor_multiple is None else self._common_factor_multiple
+        factor = content((multiple, *numerators))
         bits = self._bits_with_factors
-        self.has_long_factors = self._previous[0] or factor.bit_length() > _SHORT_BITS + bits // _SHORT_PART
+        self.has_long_factors = self._previous_state[0] or factor.bit_length() > _SHORT_BITS + bits // _SHORT_PART
         self._divide(factor)
         numerators, denominator = self._integers
         return tuple(numerators), denominator
@@ -150,23 +151,23 @@ class UnreducedPoint(IntegerPoint):
     @property
     def numerators(self) -> tuple[fmpz, ...]:  # type: ignore[override]
         """The coordinates times the least common denominator."""
-        return self._reduced[0]
+        return self._reduced_integers[0]
 
     @property
     def denominator(self) -> fmpz:  # type: ignore[override]
         """The least common denominator of the coordinates."""
-        return self._reduced[1]
+        return self._reduced_integers[1]
 
     @property
     def reduced_bits(self) -> int:
         """The bit length of the last point of the orbit whose integers certainly have no common factor."""
-        return self._previous[1] if self.keeps_factors else self.bits
+        return self._previous_state[1] if self.keeps_factors else self.bits
 
     def lowest_terms(self) -> list[Fraction]:
         """Return the reduced numerator and denominator of each coordinate, with a single gcd of large numbers."""
         numerators, W = self._integers
-        self._common = _common_with_product(numerators, W)
-        return _lowest_terms(numerators, W, self._common)
+        self._common_factor_multiple = _gcd_with_product(numerators, W)
+        return _lowest_terms(numerators, W, self._common_factor_multiple)
 
     def exceeding(self, limit: int) -> int:
         """Return the bit length if it exceeds the limit, otherwise 0; a gcd is computed only near the limit."""
@@ -175,8 +176,8 @@ class UnreducedPoint(IntegerPoint):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, IntegerPoint):
             return NotImplemented
-        (numerators, W), (others, V) = self._integers, other.integers
-        return all(x * V == y * W for x, y in zip(numerators, others, strict=True))
+        (numerators, W), (other_numerators, V) = self._integers, other.integers
+        return all(x * V == y * W for x, y in zip(numerators, other_numerators, strict=True))
 
     __hash__ = IntegerPoint.__hash__
 

@@ -26,7 +26,7 @@ _ELIMINATION_DIMENSION = 16  # above this dimension FLINT's solver is faster as 
 _SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes longer than it saves
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
 _CRAMER_BITS = 500
-_TRIALS = 2  # after this number of failures, the elimination is no longer tried
+_MAX_TRIALS = 2  # after this number of failures, the elimination is no longer tried
 
 
 class IntegerSteps:
@@ -52,10 +52,10 @@ class IntegerSteps:
                         sign * coefficient.p * (denominator // coefficient.q)
                     )
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
-        self._modular: nmod_mat | None = None  # the forms modulo the last prime used
-        self._remaining_trials = _TRIALS
+        self._forms_modulo_prime: nmod_mat | None = None  # the forms modulo the last prime used
+        self._remaining_trials = _MAX_TRIALS
         self._substitution = forward_substitution(exponents, self._forms, n)
-        self._constant: ConstantRows | None = None
+        self._constant_rows: ConstantRows | None = None
         if not self._substitution and n > _SMALL_DIMENSION:
             # Rows of M that do not contain x are eliminated in advance, unless they are linearly dependent.
             forms = self._forms.tolist()
@@ -68,7 +68,7 @@ class IntegerSteps:
                 A = fmpq_mat(
                     [[fmpq(forms[i * (n + 1) + j][constant_monomials[0]]) for j in range(n)] for i in constant_rows]
                 )
-                self._constant = ConstantRows(constant_rows, A) if A.rank() == len(constant_rows) else None
+                self._constant_rows = ConstantRows(constant_rows, A) if A.rank() == len(constant_rows) else None
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """Return the image, or None if the map is not defined at the point."""
@@ -77,35 +77,31 @@ class IntegerSteps:
         matrix, rhs = self._equation(point)
         _, W = point.integers
         scale = W**self._degree
-        if self._constant is not None:
-            whole_rhs = rhs
-            matrix, rhs = self._constant.reduce(matrix, rhs, scale)
+        if self._constant_rows is not None:
+            full_rhs = rhs
+            matrix, rhs = self._constant_rows.reduce(matrix, rhs, scale)
         if 0 < matrix.nrows() <= _CRAMER_DIMENSION and matrix[0, 0].bit_length() >= _CRAMER_BITS:
             numerators, denominator = by_determinants(matrix, rhs)
             if denominator == 0:
                 return None
-            if self._constant is not None:
-                numerators, denominator = self._constant.extend(whole_rhs, scale, numerators, denominator)
+            if self._constant_rows is not None:
+                numerators, denominator = self._constant_rows.extend(full_rhs, scale, numerators, denominator)
             return UnreducedPoint(numerators, denominator, point)
-        solution = self._solved(matrix, rhs, W) if matrix.nrows() else IntegerPoint((), fmpz(1))
-        if self._constant is None or solution is None:
-            return solution
-        return lowest(*self._constant.extend(whole_rhs, scale, solution.numerators, solution.denominator))
-
-    def _solved(self, matrix: fmpz_mat, rhs: fmpz_mat, W: fmpz) -> IntegerPoint | None:
-        """Return the solution of matrix x = rhs in lowest terms; None if the matrix is singular."""
-        is_long = matrix[0, 0].bit_length() >= _ELIMINATION_BITS
+        solution = None if matrix.nrows() else IntegerPoint((), fmpz(1))
+        is_long = solution is None and matrix[0, 0].bit_length() >= _ELIMINATION_BITS
         if self._remaining_trials and is_long and matrix.nrows() <= _ELIMINATION_DIMENSION:
-            point = solve_fraction_free(matrix, rhs, W)
-            if point is not None:
-                return point
-            self._remaining_trials -= 1
-        try:
-            solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub has a less precise type
-        except ZeroDivisionError:
-            return None
-        column, denominator = solution.numer_denom()
-        return IntegerPoint(tuple(column.entries()), denominator)
+            solution = solve_fraction_free(matrix, rhs, W)
+            self._remaining_trials -= solution is None
+        if solution is None:
+            try:
+                rational_solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub is less precise
+            except ZeroDivisionError:
+                return None
+            column, denominator = rational_solution.numer_denom()
+            solution = IntegerPoint(tuple(column.entries()), denominator)
+        if self._constant_rows is None:
+            return solution
+        return lowest(*self._constant_rows.extend(full_rhs, scale, solution.numerators, solution.denominator))
 
     @property
     def is_triangular(self) -> bool:
@@ -124,22 +120,22 @@ class IntegerSteps:
 
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
         """Return `length` points of the orbit modulo a prime below 2^63, each followed by 1; None if not defined."""
-        points, last = list[list[int]](), point.residues(prime)
-        while last is not None:
-            points.append(last)
+        points, coordinates = list[list[int]](), point.residues(prime)
+        while coordinates is not None:
+            points.append(coordinates)
             if len(points) == length:
                 return points
-            last = self.image_modulo(last, prime)
+            coordinates = self.image_modulo(coordinates, prime)
         return None
 
     def image_modulo(self, point: Sequence[int], prime: int) -> list[int] | None:
         """Return the image of coordinates modulo a prime, followed by 1; None if the map is not defined there."""
-        if self._modular is None or self._modular.modulus() != prime:
-            self._modular = nmod_mat(self._forms, prime)
+        if self._forms_modulo_prime is None or self._forms_modulo_prime.modulus() != prime:
+            self._forms_modulo_prime = nmod_mat(self._forms, prime)
         n, monomials = self.dim, list(point)
         if self._degree != 1:
             monomials = [int(_monomial(point, exponent) % prime) for exponent in self._exponents]
-        values = (self._modular * nmod_mat(len(monomials), 1, monomials, prime)).entries()
+        values = (self._forms_modulo_prime * nmod_mat(len(monomials), 1, monomials, prime)).entries()
         rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
         try:
             image = nmod_mat([row[:n] for row in rows], prime).solve(nmod_mat([row[n:] for row in rows], prime))
@@ -174,24 +170,24 @@ def by_determinants(matrix: fmpz_mat, rhs: fmpz_mat) -> tuple[list[fmpz], fmpz]:
         (a, b, r), (c, d, s) = rows
         return [r * d - b * s, a * s - r * c], a * d - b * c
     (a, b, c, r), (d, e, f, s), (g, h, k, t) = rows
-    first, second, third = e * k - f * h, c * h - b * k, b * f - c * e  # minors of the last two columns
-    fourth, fifth, sixth = d * h - e * g, b * g - a * h, a * e - b * d  # minors of the first two columns
+    A, D, G = e * k - f * h, c * h - b * k, b * f - c * e  # cofactors of the first column
+    C, F, K = d * h - e * g, b * g - a * h, a * e - b * d  # cofactors of the last column
     s_t, r_t, r_s = s * k - f * t, c * t - r * k, r * f - c * s  # minors of the last column and the right side
     return [
-        r * first + s * second + t * third,
+        r * A + s * D + t * G,
         a * s_t + d * r_t + g * r_s,
-        r * fourth + s * fifth + t * sixth,
-    ], a * first + d * second + g * third
+        r * C + s * F + t * K,
+    ], a * A + d * D + g * G
 
 
 def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
     """Return the point in lowest terms; None if the denominator is 0."""
     if denominator == 0:
         return None
-    common = content((denominator, *numerators))
+    gcd = content((denominator, *numerators))
     if denominator < 0:
-        common = -common
-    return IntegerPoint(tuple(numerator // common for numerator in numerators), denominator // common)
+        gcd = -gcd
+    return IntegerPoint(tuple(numerator // gcd for numerator in numerators), denominator // gcd)
 
 
 class ConstantRows:
@@ -205,15 +201,17 @@ class ConstantRows:
 
     def __init__(self, rows: Sequence[int], A: fmpq_mat) -> None:
         n, row_indices = A.ncols(), range(A.nrows())
-        reduced, rank = A.rref()
+        echelon_form, rank = A.rref()
         self._rows = list(rows)
-        self._columns = [next(j for j in range(n) if reduced[i, j] != 0) for i in range(rank)]
+        self._eliminated_columns = [next(j for j in range(n) if echelon_form[i, j] != 0) for i in range(rank)]
         self._other_rows = [i for i in range(n) if i not in self._rows]
-        self._free = [j for j in range(n) if j not in self._columns]
-        inverse = fmpq_mat([[A[i, j] for j in self._columns] for i in row_indices]).inv()
-        augmented = [[*inverse.tolist()[i], *(reduced[i, j] for j in self._free)] for i in row_indices]
-        integers, self._denominator = fmpq_mat(augmented).numer_denom()
-        self._inverse = _submatrix(integers, row_indices, row_indices)
+        self._free_columns = [j for j in range(n) if j not in self._eliminated_columns]
+        inverse = fmpq_mat([[A[i, j] for j in self._eliminated_columns] for i in row_indices]).inv()
+        augmented_rows = [
+            [*inverse.tolist()[i], *(echelon_form[i, j] for j in self._free_columns)] for i in row_indices
+        ]
+        integers, self._denominator = fmpq_mat(augmented_rows).numer_denom()
+        self._A_inverse = _submatrix(integers, row_indices, row_indices)
         self._free_part = _submatrix(integers, row_indices, range(len(row_indices), n))
 
     def reduce(self, matrix: fmpz_mat, rhs: fmpz_mat, scale: fmpz) -> tuple[fmpz_mat, fmpz_mat]:
@@ -221,25 +219,26 @@ class ConstantRows:
 
         In the matrix, A is multiplied by the factor `scale`. The system may be empty.
         """
-        constant_part = self._inverse * _submatrix(rhs, self._rows, [0])
-        of_eliminated, of_free = (
-            _submatrix(matrix, self._other_rows, self._columns),
-            _submatrix(matrix, self._other_rows, self._free),
+        constant_part = self._A_inverse * _submatrix(rhs, self._rows, [0])
+        eliminated_columns, free_columns = (
+            _submatrix(matrix, self._other_rows, self._eliminated_columns),
+            _submatrix(matrix, self._other_rows, self._free_columns),
         )
         reduced_rhs = (
-            _submatrix(rhs, self._other_rows, [0]) * (scale * self._denominator) - of_eliminated * constant_part
+            _submatrix(rhs, self._other_rows, [0]) * (scale * self._denominator) - eliminated_columns * constant_part
         )
-        return of_free * self._denominator - of_eliminated * self._free_part, reduced_rhs
+        return free_columns * self._denominator - eliminated_columns * self._free_part, reduced_rhs
 
     def extend(
         self, rhs: fmpz_mat, scale: fmpz, numerators: Sequence[fmpz], denominator: fmpz
     ) -> tuple[list[fmpz], fmpz]:
         """Return numerators and denominator of the full solution, perhaps with a common factor."""
-        free = fmpz_mat(len(numerators), 1, list(numerators))
-        eliminated = self._inverse * _submatrix(rhs, self._rows, [0]) * denominator - self._free_part * free
-        values_by_column = dict(zip(self._columns, eliminated.entries(), strict=True))
-        values_by_column |= {j: entry * self._denominator for j, entry in zip(self._free, numerators, strict=True)}
-        return [values_by_column[j] for j in range(len(values_by_column))], scale * denominator * self._denominator
+        free_values = fmpz_mat(len(numerators), 1, list(numerators))
+        constant_part = self._A_inverse * _submatrix(rhs, self._rows, [0])
+        eliminated_values = constant_part * denominator - self._free_part * free_values
+        values = dict(zip(self._eliminated_columns, eliminated_values.entries(), strict=True))
+        values |= {j: entry * self._denominator for j, entry in zip(self._free_columns, numerators, strict=True)}
+        return [values[j] for j in range(len(values))], scale * denominator * self._denominator
 
 
 def _submatrix(matrix: fmpz_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpz_mat:

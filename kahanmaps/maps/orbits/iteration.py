@@ -101,7 +101,7 @@ class OrbitPoint:
     @property
     def digits(self) -> int:
         """Approximate number of decimal digits of the largest integer over the common denominator; 0 except over Q."""
-        return 0 if isinstance(self.value, tuple) else _digits(self.value.bits)
+        return 0 if isinstance(self.value, tuple) else _digits_of_bits(self.value.bits)
 
     def __repr__(self) -> str:
         return f"OrbitPoint({self.step}: {','.join(shorten(text, 60) for text in self.text)})"
@@ -186,7 +186,7 @@ class Orbit(HtmlDisplay):
         self.first: list[OrbitPoint] = []  # at most FIRST_POINTS points
         self.last: OrbitPoint | None = None
         self._interrupted = False
-        self._busy_thread: int | None = None  # the thread that computes an iterate directly
+        self._computing_thread: int | None = None  # the thread that computes an iterate directly
         self._rational_orbit: RationalOrbit | None = None
 
     def __repr__(self) -> str:
@@ -196,8 +196,9 @@ class Orbit(HtmlDisplay):
     @property
     def relations(self) -> str | None:
         """The relations between points that are in use, and the first step that uses them; None if there are none."""
-        walk = self._rational_orbit
-        return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
+        if self._rational_orbit is None or self._rational_orbit.relations is None:
+            return None
+        return f"{self._rational_orbit.relations.name} from step {self._rational_orbit.since} on"
 
     def interrupt(self) -> None:
         """Stop a running orbit after the current step (safe to call from a signal handler).
@@ -205,23 +206,23 @@ class Orbit(HtmlDisplay):
         If an iterate is being computed directly, which may take long, the computation is abandoned.
         """
         self._interrupted = True
-        if self._busy_thread == get_ident():
+        if self._computing_thread == get_ident():
             raise _IterateInterrupted
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         self.first, self.last = [], None
         try:
-            for point in self._points() if self.at is None else self._iterates(self.at):
+            for point in self._points() if self.at is None else self._iterates_by_doubling(self.at):
                 if len(self.first) < FIRST_POINTS:
                     self.first.append(point)
                 self.last = point
                 yield point
         except _IterateInterrupted:
-            self._end_interrupted(0 if self.last is None else self.last.step)
+            self._set_interrupted(0 if self.last is None else self.last.step)
         finally:
-            self._busy_thread = None
+            self._computing_thread = None
 
-    def _end_interrupted(self, step: int, period: int | None = None) -> None:
+    def _set_interrupted(self, step: int, period: int | None = None) -> None:
         self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
 
     def _points(self) -> Iterator[OrbitPoint]:
@@ -235,7 +236,7 @@ class Orbit(HtmlDisplay):
             return
         while self.steps is None or step < self.steps:
             if self._interrupted:
-                self._end_interrupted(step, period)
+                self._set_interrupted(step, period)
                 return
             try:
                 value = next(images)
@@ -279,8 +280,9 @@ class Orbit(HtmlDisplay):
                 yield value
         elif field is QQ:
             start = IntegerPoint.from_rationals(self.start)
-            walk = self._rational_orbit = RationalOrbit(self.map, start, _bits(self.max_digits), self._is_requested)
-            yield from walk
+            max_bits = _bits_of_digits(self.max_digits)
+            self._rational_orbit = RationalOrbit(self.map, start, max_bits, self._is_requested)
+            yield from self._rational_orbit
         else:
             value = self.start
             while True:
@@ -289,7 +291,7 @@ class Orbit(HtmlDisplay):
 
     def _bits_over_budget(self, value: Any) -> int:
         """Return the bit length of a point that exceeds the budget, otherwise 0."""
-        limit = _bits(self.max_digits)
+        limit = _bits_of_digits(self.max_digits)
         if limit is None:
             return 0
         if not isinstance(value, tuple):
@@ -300,7 +302,7 @@ class Orbit(HtmlDisplay):
         bits = max((max(x.p.bit_length(), x.q.bit_length()) for x in numbers), default=0)
         return bits if bits > limit else 0
 
-    def _iterates(self, at: Sequence[int]) -> Iterator[OrbitPoint]:
+    def _iterates_by_doubling(self, at: Sequence[int]) -> Iterator[OrbitPoint]:
         """Yield the requested iterates, each computed directly."""
         from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
@@ -308,11 +310,11 @@ class Orbit(HtmlDisplay):
         last_step = 0
         for step in at:
             if self._interrupted:
-                self._end_interrupted(last_step)
+                self._set_interrupted(last_step)
                 return
             try:
-                self._busy_thread = get_ident()
-                value = self._nth_iterate.value(self.start, step, _bits(self.max_digits))
+                self._computing_thread = get_ident()
+                value = self._nth_iterate.value(self.start, step, _bits_of_digits(self.max_digits))
             except SingularStep as error:
                 self.end = OrbitEnd("singular", last_step, f"step {step} cannot be reached: {error}")
                 return
@@ -323,7 +325,7 @@ class Orbit(HtmlDisplay):
                 self.end = OrbitEnd("budget", last_step, _budget_text(error.step, error.bits, self.max_digits, step))
                 return
             finally:
-                self._busy_thread = None
+                self._computing_thread = None
             last_step = step
             yield OrbitPoint(step, self.map.field, value)
         self.end = OrbitEnd("completed", last_step, f"{counted(len(at), 'iterate')} computed directly")
@@ -336,7 +338,7 @@ def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | Non
     """
     max_length = max(LONGEST_INPUT, max_digits or 0)
     for name, numbers in (("eps", () if eps is None else (eps,)), ("start", start)):
-        digits = max((_digits(max(x.p.bit_length(), x.q.bit_length())) for x in numbers), default=0)
+        digits = max((_digits_of_bits(max(x.p.bit_length(), x.q.bit_length())) for x in numbers), default=0)
         if digits > max_length:
             raise InputError(
                 f"found numbers of about {digits} digits for {name}, expected at most {max_length}: "
@@ -344,7 +346,7 @@ def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | Non
             )
 
 
-def _bits(max_digits: int | None) -> int | None:
+def _bits_of_digits(max_digits: int | None) -> int | None:
     """Convert a budget of decimal digits to bits."""
     return None if max_digits is None else max_digits * 100_000 // 30103
 
@@ -352,14 +354,14 @@ def _bits(max_digits: int | None) -> int | None:
 def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
     """Return a sentence saying that a step, perhaps one before the requested step, exceeds the budget."""
     limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
-    size_text = (
-        "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
-    )
+    size_text = "would have longer numbers"
+    if bits is not None:
+        size_text = f"has numbers of {counted(_digits_of_bits(bits), 'digit')}, more"
     text = f"step {step} {size_text} than {limit}"
     return text if requested is None or requested == step else f"step {requested} cannot be reached: {text}"
 
 
-def _digits(bits: int) -> int:
+def _digits_of_bits(bits: int) -> int:
     return int(bits * _DIGITS_PER_BIT) + 1
 
 

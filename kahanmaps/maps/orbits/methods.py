@@ -65,8 +65,8 @@ def choose_method(
     if arithmetic == "float":
         return Method("normal-form", normal_form.text)
     if at is not None and max(at, default=0) >= DOUBLING_FROM[arithmetic]:
-        dense = arithmetic == "exact" and len(at) * 10 > max(at)
-        if not dense:
+        is_dense = arithmetic == "exact" and len(at) * 10 > max(at)
+        if not is_dense:
             return Method("doubling", f"{normal_form.text}; each iterate by doublings")
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")

@@ -45,7 +45,9 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _MAX_SINGLE_STEPS = 10**13  # more single steps would take years
-_MIN_STEPS = 3  # up to this number of steps, a search for a normal form takes longer than it saves
+# Up to these numbers of steps, no normal form is searched for: an exact search takes longer than it saves. In floating
+# point and with balls it also makes the points more accurate.
+_MAX_STEPS_WITHOUT_SEARCH = {"exact": 20, "float": 3, "ball": 3, "mod": DOUBLING_FROM["mod"] - 1}
 _LONG_INPUT = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
 _MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
 _FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
@@ -177,24 +179,24 @@ def orbit(
         numbers = [entry for entry in start if not isinstance(entry, EtaleElement)]
         require_short(request.eps, [rational(entry) for entry in numbers], max_digits)
     if normal_form is None:
-        normal_form = _normal_form(request, method, arithmetic, hamiltonian, member)
-    chosen = choose_method(method, arithmetic.kind, normal_form, at)
-    if chosen.name != "doubling" and last_step > _MAX_SINGLE_STEPS:
+        normal_form = _find_normal_form(request, method, arithmetic, hamiltonian, member)
+    choice = choose_method(method, arithmetic.kind, normal_form, at)
+    if choice.name != "doubling" and last_step > _MAX_SINGLE_STEPS:
         raise InputError(
             f"step {last_step} is too large for single steps (at most {_MAX_SINGLE_STEPS:.0e}), "
-            f"and no other method is available: {chosen.reason}"
+            f"and no other method is available: {choice.reason}"
         )
-    used_form = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
+    form = normal_form if choice.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
             bits = bits_for(
-                lambda bits: request.points_by(chosen.name, used_form, Arithmetic("ball", bits)), accuracy, progress
+                lambda bits: request.points_by(choice.name, form, Arithmetic("ball", bits)), accuracy, progress
             )
         except NotAccurate as error:
             bits, remark = _FALLBACK_BITS, str(error)
         arithmetic = Arithmetic("ball", bits)
-    return Trajectory(request.points_by(chosen.name, used_form, arithmetic), request, arithmetic, chosen, remark)
+    return Trajectory(request.points_by(choice.name, form, arithmetic), request, arithmetic, choice, remark)
 
 
 class OrbitRequest(NamedTuple):
@@ -227,11 +229,9 @@ class OrbitRequest(NamedTuple):
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
             return Orbit(map_at_eps, self.start, at=self.at or (), normal_form=normal_form, **limits)
-        used_normal_form = normal_form if method == "normal-form" else None
+        form_of_steps = normal_form if method == "normal-form" else None
         is_requested = self.is_requested if self.at is not None or self.every > 1 else None
-        return Orbit(
-            map_at_eps, self.start, self.steps, normal_form=used_normal_form, is_requested=is_requested, **limits
-        )
+        return Orbit(map_at_eps, self.start, self.steps, normal_form=form_of_steps, is_requested=is_requested, **limits)
 
 
 class Trajectory(HtmlDisplay):
@@ -247,11 +247,11 @@ class Trajectory(HtmlDisplay):
     """
 
     def __init__(
-        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, chosen: Method, remark: str = ""
+        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, method: Method, remark: str = ""
     ) -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
-        self.method, self._why = chosen.name, chosen.text
+        self.method, self._why = method.name, method.text
         self.variables: tuple[str, ...] = request.map.variables
         self.integrals: Mapping[str, Any] = {}
         self._request, self._remark = request, remark
@@ -280,7 +280,7 @@ class Trajectory(HtmlDisplay):
     @cached_property
     def points(self) -> list[OrbitPoint]:
         """All requested points."""
-        return [point for point in self._computed() if self._request.is_requested(point.step)]
+        return [point for point in self._compute_points() if self._request.is_requested(point.step)]
 
     def preview(self, count: int) -> list[OrbitPoint]:
         """Return the first points if they are stored or need at most `count` steps, otherwise an empty list."""
@@ -423,33 +423,28 @@ class Trajectory(HtmlDisplay):
                 raise InputError("npy is for float orbits: use npz, or jsonl, which holds numbers of any length")
             if self._request.at is not None or self.integrals:
                 raise InputError("npy holds the points of steps= and every=: for at= or integrals use npz")
-            return self._ended(stream_orbit(self.orbit, to, progress=on_step))[0]
+            return self._end_with_float_data(stream_orbit(self.orbit, to, progress=on_step))[0]
         columns = (self.variables, list(self.integrals))
         with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
             writer.header(self.header(name))
             try:
-                for step in self._written_to(writer):
-                    on_step(step)
+                if self.arithmetic.kind == "float" and self._request.at is None and not self.integrals:
+                    count, every = 0, self._request.every
+                    for step, points in self.orbit.portions():
+                        writer.portion(count * every, every, points)
+                        count += len(points)
+                        on_step(step)
+                else:
+                    for point in self._all_points():
+                        on_step(point.step)
+                        if self._request.is_requested(point.step):
+                            writer.point(point.step, point.text, self.values(point))
                 end = self.end
-            except OutputFull as full:
-                end = OrbitEnd("budget", full.steps, str(full))
-            end, float_data = self._ended(end)
+            except OutputFull as error:
+                end = OrbitEnd("budget", error.steps, str(error))
+            end, float_data = self._end_with_float_data(end)
             writer.end(end, float_data)
         return end
-
-    def _written_to(self, writer: Writer) -> Iterator[int]:
-        """Write the points (of a float orbit in portions); yield the number of each step computed."""
-        if self.arithmetic.kind == "float" and self._request.at is None and not self.integrals:
-            count, every = 0, self._request.every
-            for step, points in self.orbit.portions():
-                writer.portion(count * every, every, points)
-                count += len(points)
-                yield step
-            return
-        for point in self._all_points():
-            yield point.step
-            if self._request.is_requested(point.step):
-                writer.point(point.step, point.text, self.values(point))
 
     def header(self, name: str = "") -> dict[str, Any]:
         """Return the data from which the orbit can be reproduced; `name` is the name of the system."""
@@ -469,7 +464,7 @@ class Trajectory(HtmlDisplay):
         }
         return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
 
-    def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
+    def _end_with_float_data(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
         """Return how the orbit ended, and for a float orbit the drift and the near-singular steps."""
         if self.arithmetic.kind != "float":
             return end, {}
@@ -479,8 +474,8 @@ class Trajectory(HtmlDisplay):
             largest = max(float(drift.largest) for drift in self.orbit.drift)
             message += f"; largest observed drift of the integrals h/(1 + eps^2 D): {largest:.3g}"
         if self.orbit.near_singular:
-            first = self.orbit.near_singular_at
-            message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"
+            first_step = self.orbit.near_singular_at
+            message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first_step}"
         return replace(end, message=message), float_data
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
@@ -501,19 +496,20 @@ class Trajectory(HtmlDisplay):
             raise InputError("found copy=False, expected copy=None: the array of an orbit is created on demand")
         prime = self.arithmetic.number if self.arithmetic.kind == "mod" else 0
         rows: list[list[Any]] = [[int(x) if prime else x for x in point.x] for point in self.points]
-        default = np.float64 if not prime else np.int64 if prime < 2**63 else object
-        kind = np.dtype(default if dtype is None else dtype)
-        if kind.kind == "O":
+        default_dtype = np.float64 if not prime else np.int64 if prime < 2**63 else object
+        array_dtype = np.dtype(default_dtype if dtype is None else dtype)
+        if array_dtype.kind == "O":
             table = np.empty((len(rows), len(self.variables)), dtype=object)
             for index in np.ndindex(table.shape):
                 table[index] = rows[index[0]][index[1]]
             return table
         if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
             raise InputError(
-                f'{self.arithmetic} arithmetic has no values of dtype {kind}: use arithmetic="float" or dtype=object'
+                f'{self.arithmetic} arithmetic has no values of dtype {array_dtype}: use arithmetic="float" or '
+                "dtype=object"
             )
-        if kind.kind in "iu":
-            limits = np.iinfo(kind)
+        if array_dtype.kind in "iu":
+            limits = np.iinfo(array_dtype)
             for row in rows:
                 for k, x in enumerate(row):
                     number = fmpq(*x.as_integer_ratio()) if isinstance(x, float) and math.isfinite(x) else x
@@ -522,17 +518,19 @@ class Trajectory(HtmlDisplay):
                         text = str(x)
                         raise InputError(
                             f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers "
-                            f"from {limits.min} to {limits.max} for {kind}: use dtype=object, which keeps all numbers "
-                            "unchanged, or dtype=float"
+                            f"from {limits.min} to {limits.max} for {array_dtype}: use dtype=object, which keeps all "
+                            "numbers unchanged, or dtype=float"
                         )
-            return np.array(rows, dtype=kind)
-        if kind.kind not in "fc":
-            raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
-        if prime > 2 ** (np.finfo(kind).nmant + 1):
-            raise InputError(f"found {kind}, which rounds residues modulo {prime}, expected dtype=int or dtype=object")
+            return np.array(rows, dtype=array_dtype)
+        if array_dtype.kind not in "fc":
+            raise InputError(f"found the dtype {array_dtype}, expected one of floats or integers, or object")
+        if prime > 2 ** (np.finfo(array_dtype).nmant + 1):
+            raise InputError(
+                f"found {array_dtype}, which rounds residues modulo {prime}, expected dtype=int or dtype=object"
+            )
         from kahanmaps.maps.floats.float_conversion import to_float
 
-        return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
+        return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=array_dtype)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # This is a generator, since `list` calls __len__, which computes the points, before it reads the first point.
@@ -540,9 +538,9 @@ class Trajectory(HtmlDisplay):
 
     def _all_points(self) -> Iterator[OrbitPoint]:
         """Yield the stored points; if none are stored, all points as they are computed, even if not requested."""
-        yield from self.points if "points" in self.__dict__ else self._computed()
+        yield from self.points if "points" in self.__dict__ else self._compute_points()
 
-    def _computed(self) -> Iterator[OrbitPoint]:
+    def _compute_points(self) -> Iterator[OrbitPoint]:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return
@@ -601,7 +599,7 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Calla
             on_progress(f"balls of {bits} bits")
         # Accuracy is relative to the largest coordinate, since others may be 0; one inaccurate point ends the trial.
         is_accurate = all(
-            entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(other.mid()) for other in point.x)
+            entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(coordinate.mid()) for coordinate in point.x)
             for point in orbit
             for entry in point.x
         )
@@ -613,17 +611,17 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Calla
 
 def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
     """Return the orbit of a map at a fixed eps over its own field; `numbers` is that field or "exact"."""
-    phi, exact = request.map, Arithmetic("exact")
-    if request.eps is not None or request.at is not None or numbers not in ("exact", exact, phi.field):
+    phi, exact_arithmetic = request.map, Arithmetic("exact")
+    if request.eps is not None or request.at is not None or numbers not in ("exact", exact_arithmetic, phi.field):
         raise InputError(f"{phi!r} has a fixed eps and field: give only an initial point and steps=")
     p, bits = phi.field.characteristic, getattr(phi.field, "bits", 0)
-    kind = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact
+    arithmetic = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact_arithmetic
     points = Orbit(phi, request.start, request.steps, backward=request.backward, max_digits=request.max_digits)
     request = request._replace(start=points.start, eps=phi.eps)
-    return Trajectory(points, request, kind, Method("generic", "it is a map at one eps"))
+    return Trajectory(points, request, arithmetic, Method("generic", "it is a map at one eps"))
 
 
-def _normal_form(
+def _find_normal_form(
     request: OrbitRequest,
     method: str | None,
     arithmetic: Arithmetic,
@@ -637,7 +635,7 @@ def _normal_form(
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
     if method is None:  # do not search for a normal form if the search takes longer than the orbit
-        max_steps = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _MIN_STEPS
+        max_steps = _MAX_STEPS_WITHOUT_SEARCH[arithmetic.kind]
         numbers = [eps, *(rational(entry) for entry in request.start)]
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
             max_steps = max(max_steps, 24)

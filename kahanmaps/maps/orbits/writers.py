@@ -12,13 +12,11 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import csv_line, spreadsheet_safe
@@ -31,7 +29,7 @@ from kahanmaps.version import __version__
 
 # An npz file pads exact numbers to the length of the longest; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
-_CHUNK = 1 << 18  # numbers copied in one operation
+_CHUNK_SIZE = 1 << 18  # numbers copied in one operation
 _MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file: from here on pyarrow is loaded; rows in one call
 _FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
@@ -149,8 +147,18 @@ class Csv(Writer):
     def portion(self, first: int, every: int, x: Any) -> None:
         steps = range(first, first + len(x) * every, every)
         if len(x) >= _MIN_ARROW_ROWS and find_spec("pyarrow"):
+            from concurrent.futures import ThreadPoolExecutor
+
+            import pyarrow as arrow
+            from pyarrow import compute
+
             for k in range(0, len(x), _ARROW_ROWS):
-                self.stream.write(_arrow_lines(steps[k : k + _ARROW_ROWS], x[k : k + _ARROW_ROWS]))
+                with ThreadPoolExecutor(min(2, processors())) as pool:
+                    columns = list(pool.map(_arrow_texts, x[k : k + _ARROW_ROWS].T.copy()))
+                step_column = arrow.array(steps[k : k + _ARROW_ROWS], arrow.int64()).cast(arrow.string())
+                last_column = compute.binary_join_element_wise(columns.pop(), "", "\n")
+                lines = compute.binary_join_element_wise(step_column, *columns, last_column, ",")
+                self.stream.write(str(lines.buffers()[2], "ascii"))  # the lines, one after the other
             return
         # json writes the same digits as repr, and is several times as fast.
         table = json.dumps(list(zip(steps, *x.T.tolist(), strict=True)), separators=(",", ":"))
@@ -167,27 +175,18 @@ class Csv(Writer):
             write_atomically(self.metadata_path, (json.dumps(record, indent=1) + "\n").encode())
 
 
-def _arrow_lines(steps: Sequence[int], x: Any) -> str:
-    """Return the lines of a table, with the same characters as `repr`; pyarrow formats two columns at a time."""
+def _arrow_texts(column: Any) -> Any:
+    """Return a column of floats as an array of pyarrow with the same characters as `repr`."""
     import numpy as np
     import pyarrow as arrow
     from pyarrow import compute
 
-    def texts(column: Any) -> Any:
-        result = arrow.array(column).cast(arrow.string())
-        size = np.abs(column)
-        # Numbers for which pyarrow writes 2, 0.00001, 1e-9, 1e+10 instead of 2.0, 1e-05, 1e-09, 10000000000.0.
-        odd = (column == np.rint(column)) | ((size > 9e-11) & (size < 1e-4)) | ((size >= 1e10) & (size < 1e16))
-        if odd.any():
-            result = compute.replace_with_mask(result, odd, arrow.array(list(map(repr, column[odd].tolist()))))
-        return result
-
-    with ThreadPoolExecutor(min(2, processors())) as pool:
-        columns = list(pool.map(texts, x.T.copy()))
-    numbers = arrow.array(steps, arrow.int64()).cast(arrow.string())
-    last = compute.binary_join_element_wise(columns.pop(), "", "\n")
-    lines = compute.binary_join_element_wise(numbers, *columns, last, ",")
-    return str(lines.buffers()[2], "ascii")  # the lines, one after the other
+    texts, size = arrow.array(column).cast(arrow.string()), np.abs(column)
+    # Numbers for which pyarrow writes 2, 0.00001, 1e-9, 1e+10 instead of 2.0, 1e-05, 1e-09, 10000000000.0.
+    mask = (column == np.rint(column)) | ((size > 9e-11) & (size < 1e-4)) | ((size >= 1e10) & (size < 1e16))
+    if mask.any():
+        texts = compute.replace_with_mask(texts, mask, arrow.array(list(map(repr, column[mask].tolist()))))
+    return texts
 
 
 class Npz(Writer):
@@ -207,10 +206,10 @@ class Npz(Writer):
         self._steps: list[int] = []
         self._x: list[list[Any]] = []
         self._values: list[list[Any]] = []
-        self._longest = 1
+        self._max_length = 1
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        max_length = max(self._longest, *map(len, x), *(len(value or "") for value in values))
+        max_length = max(self._max_length, *map(len, x), *(len(value or "") for value in values))
         size = max_length * (len(x) + len(values)) * (len(self._x) + 1)
         if self._convert is str.encode and size > MAX_PADDED_BYTES:
             raise OutputFull(
@@ -218,16 +217,18 @@ class Npz(Writer):
                 "use --format jsonl, fewer steps or --every",
                 self._steps[-1] if self._steps else 0,
             )
-        self._longest = max_length
-        undefined = float("nan") if self._convert is float else None
+        self._max_length = max_length
+        pole_value = float("nan") if self._convert is float else None
         self._steps.append(step)
         self._x.append(list(map(self._convert, x)))
-        self._values.append([undefined if value is None else self._convert(value) for value in values])
+        self._values.append([pole_value if value is None else self._convert(value) for value in values])
 
     def portion(self, first: int, every: int, x: Any) -> None:
         if self._rows is None:
             name = getattr(self.stream, "name", "")  # the temporary file is next to this file, on the same disk
             folder = os.path.dirname(name) if isinstance(name, str) and name.startswith(os.sep) else None
+            from tempfile import TemporaryFile
+
             self._rows = TemporaryFile(dir=folder)  # noqa: SIM115 (closed by `end`)
         self._rows.write(x.astype("<f8").tobytes())
         self._count, self._every = self._count + len(x), every
@@ -241,31 +242,33 @@ class Npz(Writer):
         meta = {"header": self._header, "columns": self.variables, "integrals": self.integrals, "end": end_record}
         if self._rows is not None:
             self._rows.seek(0)
-            n, read = self._count, partial(self._rows.read, 8 * _CHUNK)
-            numbers = (np.arange(k, min(k + _CHUNK, n), dtype="<i8") * self._every for k in range(0, n, _CHUNK))
+            n, read_chunk = self._count, partial(self._rows.read, 8 * _CHUNK_SIZE)
+            step_chunks = (
+                np.arange(k, min(k + _CHUNK_SIZE, n), dtype="<i8") * self._every for k in range(0, n, _CHUNK_SIZE)
+            )
             with ZipFile(self.stream, "w") as members:
                 with members.open("meta.npy", "w") as member:
                     np.lib.format.write_array(member, np.array(json.dumps(meta)))
                 columns = (
-                    ("step", "<i8", (n,), map(bytes, numbers)),
-                    ("x", "<f8", (n, len(self.variables)), iter(read, b"")),
+                    ("step", "<i8", (n,), map(bytes, step_chunks)),
+                    ("x", "<f8", (n, len(self.variables)), iter(read_chunk, b"")),
                 )
                 for name, kind, shape, chunks in columns:
                     with members.open(f"{name}.npy", "w", force_zip64=True) as member:
-                        what = {"descr": kind, "fortran_order": False, "shape": shape}
-                        np.lib.format.write_array_header_1_0(member, what)
+                        header_fields = {"descr": kind, "fortran_order": False, "shape": shape}
+                        np.lib.format.write_array_header_1_0(member, header_fields)
                         member.writelines(chunks)
             self._rows.close()
             return
         # The numbers of iterates computed directly may exceed 64 bits.
-        are_short = max(self._steps, default=0) < 2**63
-        steps: list[Any] = self._steps if are_short else [str(step).encode() for step in self._steps]
+        fits_int64 = max(self._steps, default=0) < 2**63
+        steps: list[Any] = self._steps if fits_int64 else [str(step).encode() for step in self._steps]
         n = len(self._x)
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
             if any(None in row for row in self._values):  # poles become empty text, since these types have no NaN
-                filled = [["" if x is None else x for x in row] for row in self._values]
-                self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled]
+                filled_rows = [["" if x is None else x for x in row] for row in self._values]
+                self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled_rows]
             arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
         save: Any = np.savez_compressed
         archive = io.BytesIO()  # zip archives need a seekable stream
@@ -362,8 +365,8 @@ def form_of(path: str | Path) -> str:
     if suffix in _TEXT_SUFFIXES:
         return "text"
     if suffix[1:] not in FORMATS:
-        endings = ", ".join(f".{form}" for form in FORMATS[1:])
-        raise InputError(f"found the ending {suffix} of {path}, expected .txt, {endings}, or --format")
+        suffixes_text = ", ".join(f".{form}" for form in FORMATS[1:])
+        raise InputError(f"found the ending {suffix} of {path}, expected .txt, {suffixes_text}, or --format")
     return suffix[1:]
 
 

@@ -25,10 +25,10 @@ def _compiled() -> Any:
 
     from kahanmaps.maps.numba_cache import compiled
 
-    module, inner = globals(), numba.njit(nogil=True)
-    names = "reduce add_product clear copy stripped subtract inverse_of_last gcd divide entries minors "
-    for name in f"{names} without_common_factor".split():
-        module[f"_{name}"] = inner(module[f"_{name}"])
+    module, jit = globals(), numba.njit(nogil=True)
+    names = "reduce add_product clear copy trimmed_length subtract inverse_of_last gcd divide entries minors "
+    for name in f"{names} divide_by_common_factor".split():
+        module[f"_{name}"] = jit(module[f"_{name}"])
     return compiled(walk, nogil=True)
 
 
@@ -47,9 +47,9 @@ def _reduce(x: Any, length: int, p: float) -> None:
             row[i] -= p * np.floor((row[i] + 0.5) * r)
 
 
-def _add_product(total: Any, a: Any, length_a: int, b: Any, length_b: int, sign: float, nu: float) -> None:
-    """Add sign a b to `total`, without reduction modulo p."""
-    x, y, b0, b1 = total[0], total[1], b[0], b[1]
+def _add_product(result: Any, a: Any, length_a: int, b: Any, length_b: int, sign: float, nu: float) -> None:
+    """Add sign a b to `result`, without reduction modulo p."""
+    x, y, b0, b1 = result[0], result[1], b[0], b[1]
     for i in range(length_a):
         c0, c1 = sign * a[0, i], sign * a[1, i]
         if c0 != 0 or c1 != 0:
@@ -71,7 +71,7 @@ def _copy(a: Any, b: Any, length: int) -> None:
         b[0, i], b[1, i] = a[0, i], a[1, i]
 
 
-def _stripped(a: Any, length: int) -> int:
+def _trimmed_length(a: Any, length: int) -> int:
     """Return the length of a polynomial without zeros at the end."""
     while length > 0 and a[0, length - 1] == 0 and a[1, length - 1] == 0:
         length -= 1
@@ -109,43 +109,43 @@ def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inve
         inverse = _inverse_of_last(b, length_b, p, nu, inverses)
         while length_a >= length_b:
             _subtract(a, length_a, b, length_b, inverse, p, nu)
-            length_a = _stripped(a, length_a - 1)
+            length_a = _trimmed_length(a, length_a - 1)
         a, b = b, a
         length_a, length_b = length_b, length_a
     return (a, length_a) if length_b == 0 else (b, length_b)
 
 
-def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any, into: Any) -> int:
-    """Divide a by b: write the quotient to `into`, leave the remainder in a, and return its length."""
+def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any, quotient: Any) -> int:
+    """Divide a by b: write the quotient to `quotient`, leave the remainder in a, and return its length."""
     inverse = _inverse_of_last(b, length_b, p, nu, inverses)
-    _clear(into, max(length_a, 1))
+    _clear(quotient, max(length_a, 1))
     while length_a >= length_b:
         shift = length_a - length_b
-        into[0, shift], into[1, shift] = _subtract(a, length_a, b, length_b, inverse, p, nu)
-        length_a = _stripped(a, length_a - 1)
+        quotient[0, shift], quotient[1, shift] = _subtract(a, length_a, b, length_b, inverse, p, nu)
+        length_a = _trimmed_length(a, length_a - 1)
     return length_a
 
 
 def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: float, nu: float, M: Any) -> int:
     """Write (M | -r) at the curve X, whose polynomials have this length, to M; return the length of its entries.
 
-    Each row of `terms` is (i, j, k, place): entry (i, j) has monomial k with the coefficient values[place].
+    Each row of `terms` is (i, j, k, l): entry (i, j) has monomial k with the coefficient values[l].
     """
     power = exponents[0].sum()
     entry_length = power * (length - 1) + 1
     for i in range(M.shape[0]):
         for j in range(M.shape[1]):
             _clear(M[i, j], entry_length)
-    product, other = np.empty((2, entry_length)), np.empty((2, entry_length))
+    product, next_product = np.empty((2, entry_length)), np.empty((2, entry_length))
     for k in range(len(exponents)):
         product[0, 0], product[1, 0], size = 1.0, 0.0, 1
         for variable in range(exponents.shape[1]):
             for _ in range(exponents[k, variable]):
-                _clear(other, size + length - 1)
-                _add_product(other, X[variable], length, product, size, 1.0, nu)
+                _clear(next_product, size + length - 1)
+                _add_product(next_product, X[variable], length, product, size, 1.0, nu)
                 size += length - 1
-                _reduce(other, size, p)
-                product, other = other, product
+                _reduce(next_product, size, p)
+                product, next_product = next_product, product
         for t in range(len(terms)):
             if terms[t, 2] == k:
                 _add_product(M[terms[t, 0], terms[t, 1]], values[:, terms[t, 3] : terms[t, 3] + 1], 1, product, size,
@@ -161,30 +161,32 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
     n = M.shape[0]
     for j in range(n + 1):
         _copy(M[0, j], minors[1 << j], length)
-    size = length
+    minor_length = length
     for k in range(1, n):
         for mask in range(1 << (n + 1)):
-            columns = 0
+            column_count = 0
             for j in range(n + 1):
-                columns += mask >> j & 1
-            if columns != k + 1:
+                column_count += mask >> j & 1
+            if column_count != k + 1:
                 continue
-            _clear(minors[mask], size + length - 1)
+            _clear(minors[mask], minor_length + length - 1)
             column = 0
             for j in range(n + 1):
                 if mask >> j & 1:
                     sign = 1.0 if (k + column) % 2 == 0 else -1.0
-                    _add_product(minors[mask], M[k, j], _stripped(M[k, j], length), minors[mask ^ 1 << j], size, sign,
-                                 nu)  # fmt: skip
+                    entry_length = _trimmed_length(M[k, j], length)
+                    _add_product(minors[mask], M[k, j], entry_length, minors[mask ^ 1 << j], minor_length, sign, nu)
                     column += 1
-            _reduce(minors[mask], size + length - 1, p)
-        size += length - 1
-    return size
+            _reduce(minors[mask], minor_length + length - 1, p)
+        minor_length += length - 1
+    return minor_length
 
 
-def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
+def _divide_by_common_factor(
+    X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, buffers: Any
+) -> int:
     """Divide the polynomials of the curve by their gcd, in place; return their length, 0 if all are zero."""
-    a, b, c, common = work[0], work[1], work[2], work[3]
+    a, b, c, common_factor = buffers[0], buffers[1], buffers[2], buffers[3]
     count = X.shape[0]
     _clear(a, length)
     _clear(b, length)
@@ -193,24 +195,24 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
         _add_product(b, weights[1, :, j : j + 1], 1, X[j], length, 1.0, nu)
     _reduce(a, length, p)
     _reduce(b, length, p)
-    divisor, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
-    _copy(divisor, common, size)
+    divisor, size = _gcd(a, _trimmed_length(a, length), b, _trimmed_length(b, length), p, nu, inverses)
+    _copy(divisor, common_factor, size)
     if size != 1:  # two mixtures may have a common factor that not all polynomials have
         for j in range(count):
             _copy(X[j], c, length)
-            quotient = _stripped(c, length)
+            c_length = _trimmed_length(c, length)
             if size:
-                quotient = _divide(c, quotient, common, size, p, nu, inverses, a)
-            if quotient:
-                divisor, size = _gcd(common, size, c, quotient, p, nu, inverses)
-                _copy(divisor, common, size)
-    longest = 0
+                c_length = _divide(c, c_length, common_factor, size, p, nu, inverses, a)
+            if c_length:
+                divisor, size = _gcd(common_factor, size, c, c_length, p, nu, inverses)
+                _copy(divisor, common_factor, size)
+    max_length = 0
     for j in range(count):
         if size > 1:
             _copy(X[j], c, length)
-            _divide(c, _stripped(c, length), common, size, p, nu, inverses, X[j])
-        longest = max(longest, _stripped(X[j], length))
-    return longest
+            _divide(c, _trimmed_length(c, length), common_factor, size, p, nu, inverses, X[j])
+        max_length = max(max_length, _trimmed_length(X[j], length))
+    return max_length
 
 
 def walk(
@@ -228,7 +230,7 @@ def walk(
     X = np.zeros((n + 1, 2, max_length))
     M = np.zeros((n, n + 1, 2, max_length))
     minors = np.zeros((1 << (n + 1), 2, max_length))
-    work = np.zeros((4, 2, max_length))
+    buffers = np.zeros((4, 2, max_length))
     all_columns = (1 << (n + 1)) - 1
     one = np.zeros((2, 1))
     one[0, 0] = 1.0
@@ -245,7 +247,7 @@ def walk(
                 _clear(X[j], minor_length)
                 _add_product(X[j], one, 1, minors[all_columns ^ 1 << j], minor_length, 1.0 - 2.0 * (j % 2), nu)
                 _reduce(X[j], minor_length, p)
-            length = _without_common_factor(X, minor_length, weights[step], p, nu, inverses, work)
+            length = _divide_by_common_factor(X, minor_length, weights[step], p, nu, inverses, buffers)
             degrees[m, step] = length - 1
             if length == 0:
                 degrees[m, step:] = -1

@@ -27,7 +27,7 @@ from kahanmaps.maps.kernels import choose_kernel
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
 MAX_DIMENSION = 6
 NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
-_CHUNK = 128
+_CHUNK_SIZE = 128
 LONG = 200  # number of members from which on compiling saves time
 
 Members = NDArray[np.int64]
@@ -84,13 +84,13 @@ class Family:
         number of coefficients of a polynomial before common factors are removed; beyond it degrees are -2 (TOO_LARGE).
         They are -1 (NOWHERE) if the iterate is defined nowhere. `kernel`: "numpy" or "numba"; `jobs`: threads.
         """
-        generator = np.random.default_rng(rng.getrandbits(64))
+        numpy_rng = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
-        values = self.coefficients(members, eps, generator)
-        start = generator.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
+        values = self.coefficients(members, eps, numpy_rng)
+        start = numpy_rng.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
         start[:, -1] = 0.0
         start[:, -1, 0, 0] = 1.0
-        weights = generator.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
+        weights = numpy_rng.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
         degrees = np.full((count, terms), TOO_LARGE, dtype=np.int64)
         walk = _walk_in_flint
         if choose_kernel(kernel, is_long=count >= LONG) == "numba":
@@ -98,16 +98,16 @@ class Family:
 
             walk = curve_kernel.kernel()
         exponents = np.array(self.exponents, dtype=np.int64)
-        layout = np.array(self.terms, dtype=np.int64)
+        term_table = np.array(self.terms, dtype=np.int64)
 
         def measure_chunk(low: int) -> None:
-            chunk = slice(low, low + _CHUNK)
-            walk(start[chunk], exponents, layout, values[chunk], weights, self._inverses, float(p), float(self._nu),
+            chunk = slice(low, low + _CHUNK_SIZE)
+            walk(start[chunk], exponents, term_table, values[chunk], weights, self._inverses, float(p), float(self._nu),
                  max_length, degrees[chunk])  # fmt: skip
 
         measure_chunk(count)  # without members: compile in this thread, which Ctrl-C can end, not in the pool
         with ThreadPoolExecutor(jobs) as pool:
-            for _ in pool.map(measure_chunk, range(0, count, _CHUNK)):
+            for _ in pool.map(measure_chunk, range(0, count, _CHUNK_SIZE)):
                 pass
         return degrees
 
@@ -119,13 +119,13 @@ class Family:
         lengths = (self.dim * self.degree * d + 1 for d in degrees[:-1])
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
-    def coefficients(self, members: Members, eps: fmpq | None, generator: np.random.Generator) -> NDArray[np.float64]:
+    def coefficients(self, members: Members, eps: fmpq | None, numpy_rng: np.random.Generator) -> NDArray[np.float64]:
         """Return the coefficients of the equation, an array (members, 2, places)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):
             eps_values = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
         elif eps is None:
-            eps_values = generator.integers(0, p, (2, count))
+            eps_values = numpy_rng.integers(0, p, (2, count))
             eps_values[0, ~eps_values.any(axis=0)] = 1  # replace eps = 0, for which the map would be the identity
         else:
             eps_values = np.zeros((2, count), dtype=np.int64)
@@ -148,7 +148,7 @@ class Family:
 
 
 def _walk_in_flint(
-    start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
+    start: Any, exponents: Any, term_table: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
     max_length: int, degrees: Any,
 ) -> None:  # fmt: skip
     """Measure degrees like `walk` of curve_kernel.py, without numba."""
@@ -168,13 +168,13 @@ def _walk_in_flint(
                 break
             rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
             monomials = [prod((x**e for x, e in zip(X, row, strict=True)), start=one) for row in exponents.tolist()]
-            for i, j, k, position in layout:
+            for i, j, k, position in term_table:
                 term = monomials[k] * polynomial(values[m][:, position : position + 1])
                 rows[i][j] = term if rows[i][j] is None else rows[i][j] + term
             image = [zero if minor is None else minor for minor in kernel_minors(rows)]
-            common = reduce(lambda a, b: a.gcd(b), image)
-            if common.is_zero():
+            common_factor = reduce(lambda a, b: a.gcd(b), image)
+            if common_factor.is_zero():
                 degrees[m, step:] = NOWHERE
                 break
-            X = [entry // common for entry in image]
+            X = [entry // common_factor for entry in image]
             degrees[m, step] = max(entry.degree() for entry in X)

@@ -39,9 +39,9 @@ def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
         slope = o.slope(lambda o, x: o.Kf(o.B_signs(signs), x), o.x, o.J.transpose() * v)
         yield o.dot(v, o.value(o.g(B), o.x)), slope
         # B_s = I + the sum of B_i - I over the i with s_i = -1, as a polynomial in A.
-        minus = [o.lagrange(i) for i in o.each if signs[i] < 0]
-        coefficients = [o.sum([c[k] for c in minus]) for k in range(o.m)]
-        coefficients[0] = coefficients[0] + o.number(1 - len(minus))
+        lagrange_polynomials = [o.lagrange(i) for i in o.each if signs[i] < 0]
+        coefficients = [o.sum([c[k] for c in lagrange_polynomials]) for k in range(o.m)]
+        coefficients[0] = coefficients[0] + o.number(1 - len(lagrange_polynomials))
         yield B, o.polynomial_in_A(coefficients)
         combination = o.sum([coefficient * o.H(o.x, k) for k, coefficient in enumerate(coefficients)])
         yield o.Kf(B, o.x), combination
@@ -101,13 +101,13 @@ def traces_agree(o: PaperObjects) -> Pairs:
     for _ in range(2 * o.m - 1):
         powers.append(powers[-1] * o.df)
     for B in o.associates():
-        second = o.jac(o.g(B), o.x)
-        power = second
+        dg = o.jac(o.g(B), o.x)
+        power = dg
         for k in range(1, 2 * o.m + 1):
             yield o.trace(powers[k - 1]), o.trace(power)
             if k % 2:
                 yield o.trace(power), o.K.zero
-            power = power * second
+            power = power * dg
 
 
 @claim("Lemma 7, proof", "", "roots A")
@@ -136,7 +136,7 @@ def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
     """A is symplectically similar to diag(W, W^T), over the same field with W a companion matrix
     A = S diag(W, W^T) S^{-1}, S^T J S = J"""
     S, W = o.symplectic_normal_form()
-    yield o.A * S, S * o.doubled(W)
+    yield o.A * S, S * o.block_diagonal(W)
     yield S.transpose() * o.J * S, o.J
 
 
@@ -214,16 +214,16 @@ def sums_of_coefficients(o: PaperObjects) -> Pairs:
 def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
     """The coefficients of chi follow from traces of powers of A (Newton's identities with half the traces)
     a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c"""
-    half = o.number(1, 2)
-    sums = [o.trace(o.A_to(k)) * half for k in range(1, o.m + 1)]
-    elementary = [o.K.one]
+    one_half = o.number(1, 2)
+    sums = [o.trace(o.A_to(k)) * one_half for k in range(1, o.m + 1)]
+    symmetric_functions = [o.K.one]
     for k in range(1, o.m + 1):
         total = o.K.zero
         for j in range(1, k + 1):
-            total = total + elementary[k - j] * sums[j - 1] * o.number(1 if j % 2 else -1)
-        elementary.append(total * o.number(1, k))
+            total = total + symmetric_functions[k - j] * sums[j - 1] * o.number(1 if j % 2 else -1)
+        symmetric_functions.append(total * o.number(1, k))
     for k in range(o.m + 1):
-        yield o.chi_of_roots[o.m - k], elementary[k] * o.number(1 if k % 2 == 0 else -1)
+        yield o.chi_of_roots[o.m - k], symmetric_functions[k] * o.number(1 if k % 2 == 0 else -1)
 
 
 @claim("(40)", "B constr", "B")
@@ -332,10 +332,10 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
     t = o.scalar("t")
     for i in o.free:
         difference = o.df - o.jac(o.g_(i), o.x)
-        high = o.K.one
+        t_power = o.K.one
         for _ in range(2 * o.m - 2):
-            high = high * t
-        right = high * (t * t - o.trace(difference * difference) * o.number(1, 2))
+            t_power = t_power * t
+        right = t_power * (t * t - o.trace(difference * difference) * o.number(1, 2))
         yield o.det(o.I * t - difference), right
         yield difference, (o.I - o.B(i).transpose()) * o.df
 
@@ -347,8 +347,8 @@ def cayley_hamilton(o: PaperObjects) -> Pairs:
     for i in o.free:
         difference = o.df - o.jac(o.g_(i), o.x)
         square = difference * difference
-        low = o.power(square, o.m - 1)
-        yield low * square, low * (o.trace(square) * o.number(1, 2))
+        power = o.power(square, o.m - 1)
+        yield power * square, power * (o.trace(square) * o.number(1, 2))
 
 
 @claim("Lemma 8, proof", "", "H B", only_m=3)
@@ -356,11 +356,11 @@ def sixth_powers(o: PaperObjects) -> Pairs:
     """(50) implies this equation and, after division by f'^4, the next one
     32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0"""
     square = o.df * o.df
-    fourth = square * square
+    fourth_power = square * square
     for i in o.free:
         difference = o.I - o.B(i).transpose()
         traces = o.trace(square) - o.trace(o.B(i).transpose() * square)
-        yield difference * (fourth * square) * o.number(32), difference * fourth * (o.number(8) * traces)
+        yield difference * (fourth_power * square) * o.number(32), difference * fourth_power * (o.number(8) * traces)
         yield difference * square * o.number(32), difference * (o.number(8) * traces)
 
 

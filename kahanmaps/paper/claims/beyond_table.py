@@ -24,7 +24,7 @@ from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
 _MAX_ONES = 7
-_KEY = "not "
+_NEGATION = "not "
 
 Slot = tuple[str, tuple[int, ...]]  # a number that may be 1: "H", exponents; "J", index pair; "x", one index
 
@@ -40,14 +40,14 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     'fails for m = 1, H = u1^3 + v1'
     """
     report = verify(None, settings, VerifyOptions(beyond=True), m=m)
-    by_key = {claim.key: claim for claim in claims()}
+    claim_by_key = {claim.key: claim for claim in claims()}
     functions = {formula: function for function, formula, *_ in STATEMENTS}
     cells = []
     for finding in report.findings:
-        claim = by_key[finding.place["key"]]
-        fails = finding.formula.startswith(_KEY)
+        claim = claim_by_key[finding.place["key"]]
+        is_negated = finding.formula.startswith(_NEGATION)
         verdict, evidence, witness = finding.verdict, finding.evidence, finding.witness
-        if fails and verdict is Certainty.PROVED:
+        if is_negated and verdict is Certainty.PROVED:
             verdict = Certainty.REFUTED
             counterexample = smallest_counterexample(functions[claim.statement], claim.variation)
             if counterexample is not None:
@@ -55,7 +55,7 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
                 evidence = Evidence("exact rational point", f"fails for {text}")
         title = f"{claim.statement}: {VARIATIONS[claim.variation].title}"
         place = {**finding.place, "statement": claim.statement, "variation": claim.variation}
-        cells.append(Finding(title, verdict, evidence, (), witness, claim.statement, control=fails, place=place))
+        cells.append(Finding(title, verdict, evidence, (), witness, claim.statement, control=is_negated, place=place))
     return Report("verify", tuple(cells), {**report.context, "beyond": True}, report.notes)
 
 
@@ -72,21 +72,21 @@ def table(report: Report) -> str:
         if finding.witness is not None:
             left, right = finding.witness.left[0], finding.witness.right[0]
             point = ", ".join(finding.witness.point)
-            data = finding.evidence.summary.removeprefix("fails for ")
+            summary = finding.evidence.summary.removeprefix("fails for ")
             variation = VARIATIONS[finding.place["variation"]].title
             # Formulas are code: * and _ of plain text would become emphasis in Markdown.
-            case = f"`{data}` at `x = ({point})`, `eps = 1`"
+            data_text = f"`{summary}` at `x = ({point})`, `eps = 1`"
             statement = finding.place["statement"]
-            lines.append(f"* `{statement}`, {variation}: fails for {case}; the sides are `{left}` and `{right}`")
+            lines.append(f"* `{statement}`, {variation}: fails for {data_text}; the sides are `{left}` and `{right}`")
     return "\n".join(lines)
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
     """Return data that refute a statement as text and as witness; None if none with at most seven ones refute it."""
-    m, roots, slots, extras = _SMALL[variation]
+    m, roots, slots, further_objects = _SEARCH_SPACES[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
-            o = _objects(m, roots, ones, **extras)
+            o = _objects(m, roots, ones, **further_objects)
             try:
                 failure = next((pair for pair in function(o) if not same(QQ, *pair)), None)
             except UNDEFINED:
@@ -95,19 +95,19 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
                 continue
             names = [f"{letter}{i + 1}" for letter in "uv" for i in range(m)]
             terms = [
-                "*".join(names[i] + f"^{e}" * (e > 1) for i, e in enumerate(place) if e)
-                for kind, place in ones
+                "*".join(names[i] + f"^{e}" * (e > 1) for i, e in enumerate(indices) if e)
+                for kind, indices in ones
                 if kind == "H"
             ]
             text = f"m = {m}, H = {' + '.join(terms)}"
-            brackets = [f"{{{names[place[0]]}, {names[place[1]]}}} = " for kind, place in ones if kind == "J"]
+            brackets = [f"{{{names[indices[0]]}, {names[indices[1]]}}} = " for kind, indices in ones if kind == "J"]
             text += f", {''.join(brackets)}1 the only brackets" if brackets else ""
             witness = witness_of(ClaimOutcome(o, 1, failure))
             return (text, witness) if witness is not None else None
     return None
 
 
-def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
+def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_objects: Any) -> PaperObjects:
     """Return objects in normal form: A = diag(roots, roots), H the sum of the monomials, x of the unit vectors.
 
     If `ones` contain index pairs of J, J has the entry 1 at these pairs {x_i, x_j}, -1 at {x_j, x_i}, and 0 elsewhere.
@@ -115,47 +115,47 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
     n = 2 * m
     cubic, hessian, linear, J = ([0] * n**k for k in (3, 2, 1, 2))
     vectors = {"x": [0] * n, "v": [1] * n}
-    for kind, place in ones:
+    for kind, indices in ones:
         if kind == "x":
-            vectors["x"][place[0]] = 1
+            vectors["x"][indices[0]] = 1
         elif kind == "J":
-            J[place[0] * n + place[1]], J[place[1] * n + place[0]] = 1, -1
+            J[indices[0] * n + indices[1]], J[indices[1] * n + indices[0]] = 1, -1
         else:
             # Add 1 to the third (second, first) derivative along the coordinates, in each order.
-            where = [i for i, e in enumerate(place) for _ in range(e)]
-            entries = {3: cubic, 2: hessian, 1: linear}[len(where)]
-            for order in itertools.permutations(where):
-                entries[functools.reduce(lambda at, i: at * n + i, order)] += 1
+            coordinates = [i for i, e in enumerate(indices) for _ in range(e)]
+            entries = {3: cubic, 2: hessian, 1: linear}[len(coordinates)]
+            for permutation in itertools.permutations(coordinates):
+                entries[functools.reduce(lambda position, i: position * n + i, permutation)] += 1
     if any(J):
-        more["J"] = QQ.matrix(n, n, list(map(fmpq, J)))
+        further_objects["J"] = QQ.matrix(n, n, list(map(fmpq, J)))
     return PaperObjects(
         K=QQ,
         A=QQ.matrix(n, n, [fmpq(roots[i % m] * (i == j)) for i in range(n) for j in range(n)]),
-        third=QQ.matrix(n * n, n, list(map(fmpq, cubic))),
+        d3H=QQ.matrix(n * n, n, list(map(fmpq, cubic))),
         hessian_of_quadratic_part=QQ.matrix(n, n, list(map(fmpq, hessian))),
         gradient_of_linear_part=QQ.column(list(map(fmpq, linear))),
         eps=fmpq(1),
         roots=tuple(map(fmpq, roots)),
         draw=lambda name: QQ.column(list(map(fmpq, vectors[name]))),
-        **more,
+        **further_objects,
     )
 
 
-def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
-    """Return slots for monomials of these degrees (in the variables of one plane if `planar`) and coordinates of x."""
+def _slots(m: int, degrees: Sequence[int], is_planar: bool = True) -> list[Slot]:
+    """Return slots for monomials of these degrees (of one plane if `is_planar`) and for coordinates of x."""
     slots: list[Slot] = []
     for degree in degrees:
         for exponent in monomials(2 * m, degree):
             planes = {i % m for i, e in enumerate(exponent) if e}
-            if not planar or len(planes) == 1:
+            if not is_planar or len(planes) == 1:
                 slots.append(("H", tuple(exponent)))
     return slots + [("x", (i,)) for i in range(2 * m)]
 
 
 # Where a variation is tried: m, the roots of chi, the slots that may be 1, and the matrices B.
-_SMALL: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]]] = {
+_SEARCH_SPACES: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]]] = {
     "inhomogeneous": (1, (1,), _slots(1, (3, 2, 1)), {}),
     "steps": (1, (1,), _slots(1, (3,)), {"associate_matrices": (QQ.identity(2) * fmpq(-2),)}),
     "any-structure": (2, (1, 2), [("J", pair) for pair in itertools.combinations(range(4), 2)] + _slots(2, (3,)), {}),
-    "derogatory": (2, (1, 1), _slots(2, (3,), planar=False), {"associate_matrices": (QQ.identity(4),)}),
+    "derogatory": (2, (1, 1), _slots(2, (3,), is_planar=False), {"associate_matrices": (QQ.identity(4),)}),
 }

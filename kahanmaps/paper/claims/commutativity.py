@@ -34,10 +34,10 @@ def commutativity(o: PaperObjects) -> Pairs:
     Phi_f o Phi_g = Phi_g o Phi_f"""
     fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
     if len(fields) > 8:  # (f_s, f_t) is (f, f_{st}) of another member: test f with all, and neighbours
-        chosen = [(0, k) for k in range(1, len(fields))] + [(k, k + 1) for k in range(1, len(fields) - 1)]
+        index_pairs = [(0, k) for k in range(1, len(fields))] + [(k, k + 1) for k in range(1, len(fields) - 1)]
     else:
-        chosen = [(j, k) for k in range(len(fields)) for j in range(k)]
-    for j, k in chosen:
+        index_pairs = [(j, k) for k in range(len(fields)) for j in range(k)]
+    for j, k in index_pairs:
         (f, x_tilde), (g, x_hat) = fields[j], fields[k]
         yield o.step(f, x_hat), o.step(g, x_tilde)
 
@@ -47,10 +47,10 @@ def compositions(o: PaperObjects) -> Pairs:
     """The two compositions are products of these matrices
     Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x"""
     for _, g, x_hat in associated_pairs(o):
-        first = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
-        second = o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat) * o.x)
-        yield o.step(g, o.x_tilde), first
-        yield o.step(o.f, x_hat), second
+        tilde_hat = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
+        hat_tilde = o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat) * o.x)
+        yield o.step(g, o.x_tilde), tilde_hat
+        yield o.step(o.f, x_hat), hat_tilde
 
 
 @claim("(55)", "det", "B H", blockwise=True)
@@ -75,10 +75,10 @@ def matrix_equation_sorted(o: PaperObjects) -> Pairs:
 def inverses(o: PaperObjects) -> Pairs:
     """(I - eps^2 f'^2)^{-1} gives the inverses for g' and for f'
     (I - eps g'(x~))^{-1} = (I + eps g'(x~)) (I - eps^2 f'(x~)^2)^{-1}"""
-    common = o.inverse(o.one_minus_square(o.f, o.x_tilde))
-    yield o.inverse(o.plus_eps_jac(o.f, o.x_tilde)), o.minus_eps_jac(o.f, o.x_tilde) * common
+    square_inverse = o.inverse(o.one_minus_square(o.f, o.x_tilde))
+    yield o.inverse(o.plus_eps_jac(o.f, o.x_tilde)), o.minus_eps_jac(o.f, o.x_tilde) * square_inverse
     for _, g, _ in associated_pairs(o):
-        yield o.inverse(o.minus_eps_jac(g, o.x_tilde)), o.plus_eps_jac(g, o.x_tilde) * common
+        yield o.inverse(o.minus_eps_jac(g, o.x_tilde)), o.plus_eps_jac(g, o.x_tilde) * square_inverse
 
 
 @claim("Theorem 9, proof", "", "B H", blockwise=True)
@@ -95,12 +95,12 @@ def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
     """The terms quadratic in eps cancel
     f'(x^) g'(x~) = f'(x^) B^T f'(x~) = B^T f'(x^) f'(x~) = g'(x^) f'(x~)"""
     for B, g, x_hat in associated_pairs(o):
-        at_hat, at_tilde, BT = o.jac(o.f, x_hat), o.jac(o.f, o.x_tilde), B.transpose()
+        df_hat, df_tilde, BT = o.jac(o.f, x_hat), o.jac(o.f, o.x_tilde), B.transpose()
         steps = [
-            at_hat * o.jac(g, o.x_tilde),
-            at_hat * BT * at_tilde,
-            BT * at_hat * at_tilde,
-            o.jac(g, x_hat) * at_tilde,
+            df_hat * o.jac(g, o.x_tilde),
+            df_hat * BT * df_tilde,
+            BT * df_hat * df_tilde,
+            o.jac(g, x_hat) * df_tilde,
         ]
         yield from pairwise(steps)
 
@@ -133,9 +133,9 @@ def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
     f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f"""
     for B in o.associates():
         g = o.g(B)
-        by_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
-        by_f = o.solve(o.minus_eps_jac(o.f, o.x), o.fx)
-        yield o.second(o.f, by_g) + o.second(g, by_g), o.second(o.f, by_f) + o.second(g, by_f)
+        step_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
+        step_f = o.solve(o.minus_eps_jac(o.f, o.x), o.fx)
+        yield o.second(o.f, step_g) + o.second(g, step_g), o.second(o.f, step_f) + o.second(g, step_f)
 
 
 @claim("Lemma 10 (59)", "g''", "H B", blockwise=True)
@@ -162,15 +162,15 @@ def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
 def last_displays(o: PaperObjects) -> Pairs:
     """The matrices on both sides of (58) are those that Lemma 10 gives
     f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more"""
-    common = o.one_minus_square(o.f, o.x)
+    square = o.one_minus_square(o.f, o.x)
     f, fx, df = o.f, o.fx, o.df
     for B in o.associates():
         g, BT = o.g(B), B.transpose()
         gx, dg = o.value(g, o.x), o.jac(g, o.x)
-        by_g, by_f = o.solve(o.minus_eps_jac(g, o.x), gx), o.solve(o.minus_eps_jac(f, o.x), fx)
-        yield o.second(f, by_g), o.second(f, o.solve(common, gx + dg * gx * o.eps))
-        yield o.second(g, by_g), o.second(f, o.solve(common, BT * (gx + dg * gx * o.eps)))
-        yield o.second(g, by_g), o.second(f, o.solve(common, fx + df * gx * o.eps))
-        yield o.second(f, by_f), o.second(f, o.solve(common, fx + df * fx * o.eps))
-        yield o.second(g, by_f), o.second(f, o.solve(common, BT * (fx + df * fx * o.eps)))
-        yield o.second(g, by_f), o.second(f, o.solve(common, gx + dg * fx * o.eps))
+        step_g, step_f = o.solve(o.minus_eps_jac(g, o.x), gx), o.solve(o.minus_eps_jac(f, o.x), fx)
+        yield o.second(f, step_g), o.second(f, o.solve(square, gx + dg * gx * o.eps))
+        yield o.second(g, step_g), o.second(f, o.solve(square, BT * (gx + dg * gx * o.eps)))
+        yield o.second(g, step_g), o.second(f, o.solve(square, fx + df * gx * o.eps))
+        yield o.second(f, step_f), o.second(f, o.solve(square, fx + df * fx * o.eps))
+        yield o.second(g, step_f), o.second(f, o.solve(square, BT * (fx + df * fx * o.eps)))
+        yield o.second(g, step_f), o.second(f, o.solve(square, gx + dg * fx * o.eps))

@@ -49,9 +49,9 @@ def linear_flows(o: PaperObjects) -> Pairs:
     E_i^T f_k(x) = lambda_i^k f(E_i^T x)"""
     for i in o.each:
         E = o.projector(i).transpose()
-        in_the_plane = o.value(o.f, E * o.x)
+        f_in_plane = o.value(o.f, E * o.x)
         for k in range(o.m):
-            yield E * o.value(o.f_(k), o.x), in_the_plane * o.lam[i] ** k
+            yield E * o.value(o.f_(k), o.x), f_in_plane * o.lam[i] ** k
 
 
 @claim("Level varieties of the flow", "", "inhomogeneous", blockwise=True)
@@ -59,8 +59,8 @@ def fermat_cubics(o: PaperObjects) -> Pairs:
     """The curves close to Fermat cubics, whose points at infinity are flexes: j = 0
     S = 0, T = -disc(h) b^2/27, Hess(u, v, 0) = 0 for h(u, v) = b w^3"""
     for i in o.free:
-        x, other, disc = _plane(o, i)
-        cubic = _restriction(o, (x, other))
+        x, e_prime, disc = _plane(o, i)
+        cubic = _restriction(o, (x, e_prime))
         b = o.H(x)
         cubic[_W, _W, _W] = -b
         S, T = aronhold_invariants(o.K, cubic)
@@ -86,21 +86,21 @@ def hesse_cubics(o: PaperObjects) -> Pairs:
     """The curves are conserved and close to Hesse cubics X^3 + Y^3 + Z^3 = 3 k X Y Z, singular for k^3 = 1 only
     k^3 = 64 eps^6 disc(h) c^2, j = 27 k^3 (k^3 + 8)^3/(k^3 - 1)^3"""
     for i in o.free:
-        x, other, disc = _plane(o, i)
+        x, e_prime, disc = _plane(o, i)
         c, square = _level(o, i, x), o.eps * o.eps
         yield _level(o, i, o.step(o.f, x)), c
-        D = [o.block_determinant(i, y) for y in (x, other, x + other)]
-        along = (D[2] - D[0] - D[1]) * o.number(1, 2)
-        cubic = _restriction(o, (x, other))
-        for j, k, value in ((0, 0, D[0]), (0, 1, along), (1, 1, D[1])):
+        D = [o.block_determinant(i, y) for y in (x, e_prime, x + e_prime)]
+        D_mixed = (D[2] - D[0] - D[1]) * o.number(1, 2)
+        cubic = _restriction(o, (x, e_prime))
+        for j, k, value in ((0, 0, D[0]), (0, 1, D_mixed), (1, 1, D[1])):
             cubic[j, k, _W] = -c * square * value * o.number(1, 3)
         S, T = aronhold_invariants(o.K, {**cubic, (_W, _W, _W): -c})
-        cube, unit = disc * c * c * square**3 * o.number(64), disc * c * c
-        yield S, -unit * square * (o.number(8) + cube) * o.number(1, 36)
-        yield T, -unit * (o.number(8) + cube * o.number(20) - cube * cube) * o.number(1, 216)
+        k_cubed, disc_c2 = disc * c * c * square**3 * o.number(64), disc * c * c
+        yield S, -disc_c2 * square * (o.number(8) + k_cubed) * o.number(1, 36)
+        yield T, -disc_c2 * (o.number(8) + k_cubed * o.number(20) - k_cubed * k_cubed) * o.number(1, 216)
         discriminant = T * T + S**3 * o.number(64)
-        yield discriminant, unit * unit * (o.K.one - cube) ** 3 * o.number(1, 729)
-        yield S**3 * o.number(4096) * (cube - o.K.one) ** 3, cube * (cube + o.number(8)) ** 3 * discriminant
+        yield discriminant, disc_c2 * disc_c2 * (o.K.one - k_cubed) ** 3 * o.number(1, 729)
+        yield S**3 * o.number(4096) * (k_cubed - o.K.one) ** 3, k_cubed * (k_cubed + o.number(8)) ** 3 * discriminant
 
 
 @claim("Level varieties of the maps", "", "eps map H", blockwise=True)
@@ -116,13 +116,13 @@ def translations(o: PaperObjects) -> Pairs:
             points = [E * point for point in orbit]
 
             def area(*indices: int, points: list[Any] = points) -> Any:
-                sides = zip(indices, indices[1:] + indices[:1], strict=True)
-                return o.sum([o.dot(points[a], o.J * points[b]) for a, b in sides])
+                index_pairs = zip(indices, indices[1:] + indices[:1], strict=True)
+                return o.sum([o.dot(points[a], o.J * points[b]) for a, b in index_pairs])
 
-            first, second = area(1, 0, 3), area(2, 0, 3)
-            meeting, w = points[2] * first - points[1] * second, first - second
-            square = w * w + o.eps * o.eps * o.block_determinant(i, meeting)
-            yield o.H(meeting), _level(o, i, points[1]) * w * square
+            area_1, area_2 = area(1, 0, 3), area(2, 0, 3)
+            chord_point, w = points[2] * area_1 - points[1] * area_2, area_1 - area_2
+            square = w * w + o.eps * o.eps * o.block_determinant(i, chord_point)
+            yield o.H(chord_point), _level(o, i, points[1]) * w * square
 
 
 def _level(o: PaperObjects, i: int, x: Any) -> Any:
@@ -134,13 +134,13 @@ def _plane(o: PaperObjects, i: int) -> tuple[Any, Any, Any]:
     """Return the point x in plane i, which is a vector of a symplectic basis, the other vector, and disc(h)."""
     E = o.projector(i).transpose()
     x, v = E * o.x, E * o.vector("v")
-    other = v * (o.K.one / o.dot(x, o.J * v))
-    cubic = _restriction(o, (x, other))
+    e_prime = v * (o.K.one / o.dot(x, o.J * v))
+    cubic = _restriction(o, (x, e_prime))
     a, d = cubic[0, 0, 0], cubic[1, 1, 1]
     b, c = cubic[0, 0, 1], cubic[0, 1, 1]  # h = a u^3 + 3 b u^2 v + 3 c u v^2 + d v^3
-    product, cubes = a * d, a * c**3 + b**3 * d
-    disc = (b * c) ** 2 * o.number(81) + product * b * c * o.number(162) - product * product * o.number(27)
-    return x, other, disc - cubes * o.number(108)
+    ad, cubic_terms = a * d, a * c**3 + b**3 * d
+    disc = (b * c) ** 2 * o.number(81) + ad * b * c * o.number(162) - ad * ad * o.number(27)
+    return x, e_prime, disc - cubic_terms * o.number(108)
 
 
 def _restriction(o: PaperObjects, basis: tuple[Any, Any]) -> Cubic:

@@ -59,10 +59,10 @@ def functions_P_and_Q(o: PaperObjects) -> Pairs:
     """P_0 and Q_i are as printed for m = 3, with s_0 = 1 and the s_i the eigenvalues of I - eps^2 f'^2
     P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ..."""
     one, eps_squared = o.K.one, o.eps * o.eps
-    reciprocal = [one / (one - eps_squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
-    yield o.P0(o.x) * o.number(4), one + o.sum(reciprocal)
+    reciprocals = [one / (one - eps_squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
+    yield o.P0(o.x) * o.number(4), one + o.sum(reciprocals)
     for i in o.each:
-        right = o.sum(reciprocal) - reciprocal[i] - reciprocal[i] - one
+        right = o.sum(reciprocals) - reciprocals[i] - reciprocals[i] - one
         yield o.Q(i, o.x) * (o.number(4) * eps_squared), right
 
 
@@ -110,27 +110,27 @@ def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
     H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i"""
     eps_squared = o.eps * o.eps
     P0, Q = o.P0(o.x), [o.Q(i, o.x) for i in o.each]
-    first = P0 * o.dot(o.x, o.J * o.fx) * o.number(2)
-    second = P0 * o.dot(o.x, o.grad(o.x)) * o.number(-2)
-    third = P0 * o.H(o.x) * o.number(-6)
+    form_1 = P0 * o.dot(o.x, o.J * o.fx) * o.number(2)
+    form_2 = P0 * o.dot(o.x, o.grad(o.x)) * o.number(-2)
+    form_3 = P0 * o.H(o.x) * o.number(-6)
     for i in o.each:
-        first = first + eps_squared * Q[i] * o.dot(o.x, o.B(i) * (o.J * o.fx)) * o.number(2)
-        second = second - eps_squared * Q[i] * o.dot(o.x, o.B(i) * o.grad(o.x)) * o.number(2)
-        third = third - eps_squared * Q[i] * o.Kf(o.B(i), o.x) * o.number(6)
-    for line in (first, second, third):
-        yield o.H_tilde(o.x), line
+        form_1 = form_1 + eps_squared * Q[i] * o.dot(o.x, o.B(i) * (o.J * o.fx)) * o.number(2)
+        form_2 = form_2 - eps_squared * Q[i] * o.dot(o.x, o.B(i) * o.grad(o.x)) * o.number(2)
+        form_3 = form_3 - eps_squared * Q[i] * o.Kf(o.B(i), o.x) * o.number(6)
+    for form in (form_1, form_2, form_3):
+        yield o.H_tilde(o.x), form
 
 
 @claim("(107)", "tK thru H K", "B", only_m=3)
 def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
     """H and the K_i give K~_i for m = 3
     K~_1 = -6 P_0 K_1 - 6 eps^2 Q_1 H + 6 eps^2 Q_2 K_3 + 6 eps^2 Q_3 K_2"""
-    six = o.number(6) * o.eps * o.eps
+    factor = o.number(6) * o.eps * o.eps
     K = [o.Kf(o.B(i), o.x) for i in o.each]
     Q = [o.Q(i, o.x) for i in o.each]
     for i in o.free:
         j, k = (other for other in o.each if other != i)
-        right = P_times(o, K[i]) - six * Q[i] * o.H(o.x) + six * Q[j] * K[k] + six * Q[k] * K[j]
+        right = P_times(o, K[i]) - factor * Q[i] * o.H(o.x) + factor * Q[j] * K[k] + factor * Q[k] * K[j]
         yield o.integral(o.g_(i), o.x), right
 
 
@@ -138,11 +138,11 @@ def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
 def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
     """K~_i has this form for every m
     K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H"""
-    six = o.number(6) * o.eps * o.eps
+    factor = o.number(6) * o.eps * o.eps
     for i in o.free:
         right = P_times(o, o.Kf(o.B(i), o.x))
         for j in o.each:
-            right = right - six * o.Q(j, o.x) * o.Kf(o.B(i) * o.B(j), o.x)
+            right = right - factor * o.Q(j, o.x) * o.Kf(o.B(i) * o.B(j), o.x)
         yield o.integral(o.g_(i), o.x), right
 
 
@@ -182,15 +182,15 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
     dH = o.dot(v, o.grad(o.x))
     for i in o.free:
         j, k = (other for other in o.each if other != i)
-        along = o.B(i).transpose() * v
-        before = o.slope(lambda o, x: o.H_tilde(x), o.x, along) * o.number(-1, 6)
-        yield before, _product_rule(o, along)
-        lines = o.P0(o.x) * dK[i] + eps_squared * o.H(o.x) * dQ[i]
-        lines = lines + eps_squared * Q[i] * dH + K[i] * dP
-        lines = lines - eps_squared * (Q[j] * dK[k] + K[j] * dQ[k])
-        lines = lines - eps_squared * (Q[k] * dK[j] + K[k] * dQ[j])
-        yield before, lines
-        yield lines, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
+        direction = o.B(i).transpose() * v
+        left = o.slope(lambda o, x: o.H_tilde(x), o.x, direction) * o.number(-1, 6)
+        yield left, _product_rule(o, direction)
+        right = o.P0(o.x) * dK[i] + eps_squared * o.H(o.x) * dQ[i]
+        right = right + eps_squared * Q[i] * dH + K[i] * dP
+        right = right - eps_squared * (Q[j] * dK[k] + K[j] * dQ[k])
+        right = right - eps_squared * (Q[k] * dK[j] + K[k] * dQ[j])
+        yield left, right
+        yield right, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
 
 
 @claim("Theorem 15, proof", "", "B", only_m=3)
@@ -233,8 +233,8 @@ def linear_system(o: PaperObjects) -> Pairs:
     """P_0 and Q_i are the unique solution of the linear system as corrected
     4 x 4 system with entry (2,3) = eps^2 q_3"""
     yield from _linear_system(o, o.eps * o.eps)
-    matrix, unknown, right = _system_matrix(o, o.eps * o.eps)
-    yield o.K.column(o.solve(matrix, right).entries()), unknown
+    matrix, unknowns, right = _system_matrix(o, o.eps * o.eps)
+    yield o.K.column(o.solve(matrix, right).entries()), unknowns
 
 
 @claim("Lemma 16, proof", "", "B H", only_m=3)
@@ -285,14 +285,14 @@ def gradients_through_s(o: PaperObjects) -> Pairs:
     """The gradients of the eigenvalues s_i determine those of P_0 and Q_i
     nabla P_0 = -(4-m)/4 sum nabla s_i/s_i^2, nabla Q_1 = (nabla s_1/s_1^2 - nabla s_2/s_2^2 - ...)/(4 eps^2)"""
     v = o.vector("v")
-    weighted = []
+    scaled_slopes = []
     for i in o.each:
         slope = o.slope(lambda o, x: o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, x), o.x, v)
-        weighted.append(slope / (o.s(i, o.x) * o.s(i, o.x)))
-    total = o.sum(weighted)
+        scaled_slopes.append(slope / (o.s(i, o.x) * o.s(i, o.x)))
+    total = o.sum(scaled_slopes)
     yield o.slope(lambda o, x: o.P0(x), o.x, v), total * o.number(o.m - 4, 4)
     for i in o.free:
-        right = (weighted[i] + weighted[i] - total) / (o.number(4) * o.eps * o.eps)
+        right = (scaled_slopes[i] + scaled_slopes[i] - total) / (o.number(4) * o.eps * o.eps)
         yield o.slope(lambda o, x: o.Q(i, x), o.x, v), right
 
 
@@ -302,9 +302,9 @@ def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
     B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ..."""
     v = o.vector("v")
     for i in o.free:
-        along = o.B(i).transpose() * v
+        direction = o.B(i).transpose() * v
         for j in o.each:
-            left = o.slope(lambda o, x: o.s(j, x), o.x, along)
+            left = o.slope(lambda o, x: o.s(j, x), o.x, direction)
             right = o.slope(lambda o, x: o.s(j, x), o.x, v)
             yield left, right * o.number(-1 if i == j else 1)
 
@@ -318,28 +318,28 @@ def _product_rule(o: PaperObjects, v: Any) -> Any:
     """Return the derivative of P_0 H + eps^2 sum Q_i K_i along v, by the product rule."""
     value = o.P0(o.x) * o.dot(v, o.grad(o.x)) + o.H(o.x) * o.slope(lambda o, x: o.P0(x), o.x, v)
     for i in o.each:
-        inner = o.Q(i, o.x) * o.dot(v, o.B(i) * o.grad(o.x))
-        inner = inner + o.Kf(o.B(i), o.x) * o.slope(lambda o, x: o.Q(i, x), o.x, v)
-        value = value + o.eps * o.eps * inner
+        term = o.Q(i, o.x) * o.dot(v, o.B(i) * o.grad(o.x))
+        term = term + o.Kf(o.B(i), o.x) * o.slope(lambda o, x: o.Q(i, x), o.x, v)
+        value = value + o.eps * o.eps * term
     return value
 
 
-def _system_matrix(o: PaperObjects, entry: Any) -> tuple[Any, Any, Any]:
-    """Return the matrix of the 4 x 4 system with entry (2,3) = `entry` q_3, the unknowns, and the right-hand side."""
-    e = o.eps * o.eps
+def _system_matrix(o: PaperObjects, factor_23: Any) -> tuple[Any, Any, Any]:
+    """Return the 4 x 4 matrix with entry (2,3) = `factor_23` q_3, the unknowns, and the right-hand side."""
+    eps_squared = o.eps * o.eps
     q1, q2, q3 = (o.q(i, o.x) for i in o.each)
-    d = o.K.one - e * o.p0(o.x)
+    d = o.K.one - eps_squared * o.p0(o.x)
     rows = [
-        [d, e * q1, e * q2, e * q3],
-        [e * q1, d, entry * q3, e * q2],
-        [e * q2, e * q3, d, e * q1],
-        [e * q3, e * q2, e * q1, d],
+        [d, eps_squared * q1, eps_squared * q2, eps_squared * q3],
+        [eps_squared * q1, d, factor_23 * q3, eps_squared * q2],
+        [eps_squared * q2, eps_squared * q3, d, eps_squared * q1],
+        [eps_squared * q3, eps_squared * q2, eps_squared * q1, d],
     ]
-    unknown = o.K.column([-o.P0(o.x), *(e * o.Q(i, o.x) for i in o.each)])
+    unknowns = o.K.column([-o.P0(o.x), *(eps_squared * o.Q(i, o.x) for i in o.each)])
     right = o.K.column([-o.K.one, o.K.zero, o.K.zero, o.K.zero])
-    return o.K.matrix(4, 4, [value for row in rows for value in row]), unknown, right
+    return o.K.matrix(4, 4, [value for row in rows for value in row]), unknowns, right
 
 
-def _linear_system(o: PaperObjects, entry: Any) -> Pairs:
-    matrix, unknown, right = _system_matrix(o, entry)
-    yield matrix * unknown, right
+def _linear_system(o: PaperObjects, factor_23: Any) -> Pairs:
+    matrix, unknowns, right = _system_matrix(o, factor_23)
+    yield matrix * unknowns, right

@@ -12,7 +12,7 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, jordan_block, varied
 
-_ITERATES = 4  # iterates tested: Phi^4 is the first whose degree distinguishes planar Hamiltonian maps from others
+_MAX_ITERATE = 4  # iterates tested: Phi^4 is the first whose degree distinguishes planar Hamiltonian maps from others
 
 
 @claim("Structure", "", "H eps")
@@ -32,12 +32,12 @@ def product_of_planar_maps(o: PaperObjects) -> Pairs:
 def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
     """The map of an associated field is the map of f on some blocks and its inverse on the others
     Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1"""
-    backwards = o.step(o.f, o.x, times=-1)
+    preimage = o.step(o.f, o.x, times=-1)
     for signs in o.all_signs():
         x_hat = o.step(o.g(o.B_signs(signs)), o.x)
         for i in o.each:
             E = o.projector(i).transpose()
-            yield E * x_hat, E * (o.x_tilde if signs[i] > 0 else backwards)
+            yield E * x_hat, E * (o.x_tilde if signs[i] > 0 else preimage)
 
 
 @claim("Structure", "", "map", blockwise=True)
@@ -60,7 +60,7 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
     """The degrees of the first four iterates are those of the theorem for all n
     deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4"""
     direction, form = o.vector("direction"), o.vector("form")
-    degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _ITERATES + 1)]
+    degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _MAX_ITERATE + 1)]
     size = degrees[-1] + 1  # one more than for the expected degree, so that a larger degree is recognized
     points = [o.x + direction * o.number(t) for t in range(2 * size)]
     for degree in degrees:
@@ -142,14 +142,14 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
         values = []
         for l in (2, 3, 4):
             denominator = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
-            moved = x + fx * (o.eps * o.number(2 * l))
-            first = o.K.one + square * o.number(l * l) * o.block_determinant(i, x_tilde)
-            second = denominator * denominator + square * o.block_determinant(i, moved)
+            euler_image = x + fx * (o.eps * o.number(2 * l))
+            factor_1 = o.K.one + square * o.number(l * l) * o.block_determinant(i, x_tilde)
+            factor_2 = denominator * denominator + square * o.block_determinant(i, euler_image)
             difference = o.step(o.f, x_tilde, times=l) - o.step(o.f, o.step(o.f, x, times=l))
-            values.append(difference * (first * second * o.number(1, l**3 - l)))
-        low, middle, high = values
-        slope, curve = (high - low) * o.number(1, 2), (high + low) * o.number(1, 2) - middle
-        (a, b, c), (p, q, r) = ([o.dot(o.vector(form), v) for v in (curve, slope, middle)] for form in ("v", "w"))
+            values.append(difference * (factor_1 * factor_2 * o.number(1, l**3 - l)))
+        N_2, N_3, N_4 = values
+        slope, curvature = (N_4 - N_2) * o.number(1, 2), (N_4 + N_2) * o.number(1, 2) - N_3
+        (a, b, c), (p, q, r) = ([o.dot(o.vector(form), v) for v in (curvature, slope, N_3)] for form in ("v", "w"))
         yield (a * r - c * p) * (a * r - c * p) - (a * q - b * p) * (b * r - c * q), o.K.zero
 
 
@@ -163,16 +163,17 @@ def division_polynomials(o: PaperObjects) -> Pairs:
         for _ in range(6):
             points.append(o.step(o.f, points[-1]))
 
-        def det(*which: int, points: list[Any] = points) -> Any:
-            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in zip(which, which[1:] + which[:1], strict=True)])
+        def det(*indices: int, points: list[Any] = points) -> Any:
+            index_pairs = zip(indices, indices[1:] + indices[:1], strict=True)
+            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in index_pairs])
 
         x, fx = points[0], o.value(o.f, points[0])
         D, D_f = o.block_determinant(i, x), o.block_determinant(i, fx)
-        along, s = o.block_determinant(i, x + fx) - D - D_f, o.K.one + o.eps * o.eps * D
-        g = s * s * o.number(27) + (along * along + D * D * D) * o.eps**6 * o.number(4)  # 27 g s^2
-        five, six = s * s * o.number(32) - g, s * s * o.number(28) - g
-        yield s * s * o.number(32) * det(0, 1, 5) * det(2, 3, 4), five * det(0, 2, 4) * det(1, 3, 5)
-        yield five * det(0, 1, 6) * det(2, 3, 5), six * det(0, 2, 5) * det(1, 3, 6)
+        D_mixed, s = o.block_determinant(i, x + fx) - D - D_f, o.K.one + o.eps * o.eps * D
+        g = s * s * o.number(27) + (D_mixed * D_mixed + D * D * D) * o.eps**6 * o.number(4)  # 27 g s^2
+        factor_5, factor_6 = s * s * o.number(32) - g, s * s * o.number(28) - g
+        yield s * s * o.number(32) * det(0, 1, 5) * det(2, 3, 4), factor_5 * det(0, 2, 4) * det(1, 3, 5)
+        yield factor_5 * det(0, 1, 6) * det(2, 3, 5), factor_6 * det(0, 2, 5) * det(1, 3, 6)
 
 
 def commuting(o: PaperObjects) -> Pairs:
@@ -204,7 +205,7 @@ def shared_modified(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians are shared by all maps of the class"""
     for B in o.associates():
         yield o.modified_H(o.step(o.g(B), o.x)), o.modified_H(o.x)
-        yield o.modified(B, o.x_tilde), o.modified(B, o.x)
+        yield o.modified_K(B, o.x_tilde), o.modified_K(B, o.x)
 
 
 def paper_integral(o: PaperObjects) -> Pairs:
@@ -213,16 +214,16 @@ def paper_integral(o: PaperObjects) -> Pairs:
     yield o.dot(o.x_tilde, images[0]), o.dot(o.x, images[1])
 
 
-def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
+def _modified_K_of(k: int) -> Callable[[PaperObjects, Any], Any]:
     """Return the modified Hamiltonian of the k-th associated field as a function of objects and point."""
-    return lambda o, x: o.modified(list(o.associates())[k], x)
+    return lambda o, x: o.modified_K(list(o.associates())[k], x)
 
 
 def gradients(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians satisfy the same differential equation as H and K"""
     v = o.vector("v")
     for k, B in enumerate(o.associates()):
-        left = o.slope(_modified_K(k), o.x, v)
+        left = o.slope(_modified_K_of(k), o.x, v)
         yield left, o.slope(lambda o, x: o.modified_H(x), o.x, B.transpose() * v)
 
 
@@ -230,8 +231,8 @@ def involution(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians are in involution for Pi"""
     gradient = o.gradient(lambda o, x: o.modified_H(x), o.x)
     for k, _ in enumerate(o.associates()):
-        other = o.gradient(_modified_K(k), o.x)
-        yield o.dot(gradient, o.Pi(o.x) * other), o.K.zero
+        modified_K_gradient = o.gradient(_modified_K_of(k), o.x)
+        yield o.dot(gradient, o.Pi(o.x) * modified_K_gradient), o.K.zero
 
 
 def formula(o: PaperObjects) -> Pairs:
@@ -245,36 +246,36 @@ def formula(o: PaperObjects) -> Pairs:
 # The statements that are tested for the variations: formula, controls for the variations for which the statement holds,
 # method of proof, and a sign for each of VARIATIONS: + holds, - fails, blank not tested, since the variation changes
 # only g and the statement is about f.
-_ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
+_ABOUT_F, _ABOUT_F_AND_G = {"blockwise": True}, {"blockwise": True, "needs_g": True}
 STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
-    (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),
-    (measure, "dx/det(I - eps f') is invariant for f", "map", _ALONE, "+++ ++"),
-    (shared_measure, "dx/det(I - eps f') is invariant for g", "B map", _BOTH, "++--++"),
-    (modified, "modified H is conserved by f", "map", _ALONE, "+++ ++"),
-    (shared_modified, "modified H is conserved by g, modified K by f", "B map", _BOTH, "++--++"),
-    (paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ALONE, "-++ ++"),
+    (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _ABOUT_F_AND_G, "++--++"),
+    (measure, "dx/det(I - eps f') is invariant for f", "map", _ABOUT_F, "+++ ++"),
+    (shared_measure, "dx/det(I - eps f') is invariant for g", "B map", _ABOUT_F_AND_G, "++--++"),
+    (modified, "modified H is conserved by f", "map", _ABOUT_F, "+++ ++"),
+    (shared_modified, "modified H is conserved by g, modified K by f", "B map", _ABOUT_F_AND_G, "++--++"),
+    (paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ABOUT_F, "-++ ++"),
     (
         perturbed_hamiltonians_are_conserved,
         "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m",
         "map",
-        _ALONE,
+        _ABOUT_F,
         "-   ++",
     ),
-    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", "map", _ALONE, "++- +-"),
-    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", "B map", _BOTH, "++--+-"),
+    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", "map", _ABOUT_F, "++- +-"),
+    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", "B map", _ABOUT_F_AND_G, "++--+-"),
     (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", "f''", {"pairwise": True, "least_m": 2}, "++- +-"),
-    (gradients, "nabla (modified K) = B nabla (modified H)", "B", _BOTH, "++--++"),
+    (gradients, "nabla (modified K) = B nabla (modified H)", "B", _ABOUT_F_AND_G, "++--++"),
     (involution, "{modified H, modified K} = 0 for Pi", "B", {"pairwise": True, "needs_g": True}, "++--++"),
     (formula, "modified H = P_0 H + eps^2 sum Q_i K_i", "B", {}, "-+-   "),
 ]
 
 
-def _cell(function: ClaimFunction, name: str, holds: bool) -> ClaimFunction:
+def _cell(function: ClaimFunction, name: str, is_true: bool) -> ClaimFunction:
     """Return the claim that the statement of `function` holds, or fails, for the objects of a variation."""
 
     def cell(o: PaperObjects) -> Pairs:
         pairs = list(function(varied(name, o)))
-        if holds or not pairs:
+        if is_true or not pairs:
             yield from pairs
         else:  # the sides of some pair have to differ
             yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
@@ -283,19 +284,19 @@ def _cell(function: ClaimFunction, name: str, holds: bool) -> ClaimFunction:
     return cell
 
 
-for _function, _statement, _breaks, _how, _answers in STATEMENTS:
-    for (_name, _variation), _answer in zip(VARIATIONS.items(), _answers, strict=True):
-        if _answer == " ":
+for _function, _statement, _breaks, _fields, _signs in STATEMENTS:
+    for (_name, _variation), _sign in zip(VARIATIONS.items(), _signs, strict=True):
+        if _sign == " ":
             continue
-        _made = _cell(_function, _name, _answer == "+")
+        _claim_function = _cell(_function, _name, _sign == "+")
         _title = f"{(_function.__doc__ or '').splitlines()[0].rstrip('.')}: {_variation.title}"
-        _more: dict[str, Any] = {"distinct_roots": True, "statement": _statement, "variation": _name, **_how}
-        _needs_g = _more.pop("needs_g", False) and _variation.least_m > 1 and _name != "any-structure"
-        _more["least_m"] = max(_variation.least_m, _how.get("least_m", 1), 3 if _needs_g else 1)
-        if _answer == "+":
-            _made.__doc__ = f"{_title}\n{_statement}"
-            _more |= {"breaks": _breaks, "symplectic": not _variation.theorem, "theorem": _variation.theorem}
+        _options: dict[str, Any] = {"distinct_roots": True, "statement": _statement, "variation": _name, **_fields}
+        _needs_g = _options.pop("needs_g", False) and _variation.least_m > 1 and _name != "any-structure"
+        _options["least_m"] = max(_variation.least_m, _fields.get("least_m", 1), 3 if _needs_g else 1)
+        if _sign == "+":
+            _claim_function.__doc__ = f"{_title}\n{_statement}"
+            _options |= {"breaks": _breaks, "symplectic": not _variation.theorem, "theorem": _variation.theorem}
         else:
-            _made.__doc__ = f"{_title}\nnot {_statement}"
-            _more |= {"breaks": "unvaried", "kind": ClaimKind.DIFFERENT, "in_general": True}
-        claim(_variation.title, "", **_more)(_made)
+            _claim_function.__doc__ = f"{_title}\nnot {_statement}"
+            _options |= {"breaks": "unvaried", "kind": ClaimKind.DIFFERENT, "in_general": True}
+        claim(_variation.title, "", **_options)(_claim_function)

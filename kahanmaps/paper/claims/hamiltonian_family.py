@@ -61,8 +61,8 @@ def skew_hamiltonian(o: PaperObjects) -> Pairs:
 def involution(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} are pairwise in involution
     {H_i, H_j} = 0"""
-    first, second = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
-    yield o.dot(first, o.J * second), o.dot(first, o.J * (o.A * first))
+    gradient_0, gradient_1 = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
+    yield o.dot(gradient_0, o.J * gradient_1), o.dot(gradient_0, o.J * (o.A * gradient_0))
     for i in range(o.m):
         for j in range(i):
             yield o.dot(o.gradient_of_chain(i, o.x), o.J * o.gradient_of_chain(j, o.x)), o.K.zero
@@ -125,7 +125,7 @@ def matrix_written_out(o: PaperObjects) -> Pairs:
     A, zero = o.A, o.K.zero
     a = [zero, *(A[i, j] for i in range(3) for j in range(3))]
     a += [-A[0, 4], -A[0, 5], -A[1, 5], A[3, 1], A[3, 2], A[4, 2]]
-    written = [
+    rows = [
         [a[1], a[2], a[3], zero, -a[10], -a[11]],
         [a[4], a[5], a[6], a[10], zero, -a[12]],
         [a[7], a[8], a[9], a[11], a[12], zero],
@@ -133,7 +133,7 @@ def matrix_written_out(o: PaperObjects) -> Pairs:
         [-a[13], zero, a[15], a[2], a[5], a[8]],
         [-a[14], -a[15], zero, a[3], a[6], a[9]],
     ]
-    yield A, o.K.matrix(6, 6, [entry for row in written for entry in row])
+    yield A, o.K.matrix(6, 6, [entry for row in rows for entry in row])
 
 
 @claim("(19)", "d2H", "H A", symplectic=False)
@@ -202,8 +202,8 @@ def independent_equations(o: PaperObjects) -> Pairs:
 def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
     """The cubics of A form a space of dimension 12, without a condition on the roots
     dim of the cubics = 4m for any skew-Hamiltonian A"""
-    repeated = o.changed(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
-    yield comb(o.n + 2, 3) - repeated.rank_of_cubic_equations(), 4 * o.m
+    derogatory_objects = o.replace(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
+    yield comb(o.n + 2, 3) - derogatory_objects.rank_of_cubic_equations(), 4 * o.m
 
 
 @claim("Prop. 2", "", "repeated A", at_most="the 4m cubics on the eigenspaces solve them", distinct_roots=True)

@@ -77,11 +77,11 @@ def series_of_the_integrals(o: PaperObjects) -> Pairs:
     for g in [o.f, *(o.g_(i) for i in o.each)]:
         jacobian = o.jac(g, o.x)
         square, squared_eps = jacobian * jacobian, o.eps * o.eps
-        vector, factor, total = jacobian * o.x, o.K.one, o.K.zero
+        vector, eps_power, total = jacobian * o.x, o.K.one, o.K.zero
         for _ in range(o.order):
-            total = total + o.dot(o.x, o.J * vector) * factor
-            vector, factor = square * vector, factor * squared_eps
-            remainder = o.dot(o.x, o.J * o.solve(o.one_minus_square(g, o.x), vector)) * factor
+            total = total + o.dot(o.x, o.J * vector) * eps_power
+            vector, eps_power = square * vector, eps_power * squared_eps
+            remainder = o.dot(o.x, o.J * o.solve(o.one_minus_square(g, o.x), vector)) * eps_power
             yield o.integral(g, o.x), total + remainder
 
 
@@ -91,9 +91,9 @@ def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
     H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f"""
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         square = o.one_minus_square(g, o.x)
-        middle = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
-        yield o.integral(g, o.x), middle
-        yield middle, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
+        middle_form = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
+        yield o.integral(g, o.x), middle_form
+        yield middle_form, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
 
 
 @claim("Sect. 7", "", "f inhomogeneous", blockwise=True)
@@ -103,22 +103,22 @@ def leading_terms(o: PaperObjects) -> Pairs:
     yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
     yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
     for B in o.associates():
-        middle = o.dot(o.x, B * o.grad(o.x)) * o.number(-2)
-        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), middle
-        yield middle, o.Kf(B, o.x) * o.number(-6)
+        middle_form = o.dot(o.x, B * o.grad(o.x)) * o.number(-2)
+        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), middle_form
+        yield middle_form, o.Kf(B, o.x) * o.number(-6)
 
 
 @claim("(65)", "", "f eps inhomogeneous", blockwise=True)
 def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
     """The equalities of the computation of H~(x~) hold
     H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x"""
-    start = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
-    after = o.solve(o.minus_eps_jac(o.f, o.x_tilde), start)
+    solution = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
+    second_solution = o.solve(o.minus_eps_jac(o.f, o.x_tilde), solution)
     steps = [
         o.H_tilde(o.x_tilde),
         o.dot(o.x_tilde, o.J * o.solve(o.minus_eps_jac(o.f, o.x_tilde), o.x_tilde)) / o.eps,
-        o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * after)) / o.eps,
-        o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * after)) / o.eps,
+        o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * second_solution)) / o.eps,
+        o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * second_solution)) / o.eps,
         o.H_tilde(o.x),
     ]
     yield from pairwise(steps)
@@ -130,12 +130,12 @@ def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
     K~(x~) = x^T J g'(x~) x"""
     for B in o.associates():
         g = o.g(B)
-        inner = o.solve(o.one_minus_square(g, o.x_tilde), o.jac(g, o.x_tilde) * o.x_tilde)
+        solution = o.solve(o.one_minus_square(g, o.x_tilde), o.jac(g, o.x_tilde) * o.x_tilde)
         steps = [
             o.integral(g, o.x_tilde),
-            o.dot(o.x_tilde, o.J * inner),
-            o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * inner)),
-            o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * inner)),
+            o.dot(o.x_tilde, o.J * solution),
+            o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * solution)),
+            o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * solution)),
             o.dot(o.x, o.J * (o.jac(g, o.x_tilde) * o.x)),
         ]
         yield from pairwise(steps)
@@ -157,21 +157,21 @@ def odd_terms_vanish(o: PaperObjects) -> Pairs:
     """The odd terms in eps vanish, since a skew-symmetric matrix stands between equal vectors
     x^T J (g'' (I - eps^2 f'^2)^{-1} f) x = 0, through -2 nabla H^T (B^T (..)^{-1} J) nabla H"""
     square = o.one_minus_square(o.f, o.x)
-    inner = o.solve(square, o.fx)
+    solution = o.solve(square, o.fx)
     gradient = o.grad(o.x)
     for B in o.associates():
         g = o.g(B)
-        skew = B.transpose() * o.solve(square, o.J)
+        skew_matrix = B.transpose() * o.solve(square, o.J)
         steps = [
-            o.dot(o.x, o.J * (o.second(g, inner) * o.x)),
-            o.dot(o.x, o.J * (o.jac(g, o.x) * inner)),
-            -o.dot(o.x, B * o.hess(o.x) * inner),
-            o.dot(B * gradient, inner) * o.number(-2),
-            o.dot(gradient, skew * gradient) * o.number(-2),
+            o.dot(o.x, o.J * (o.second(g, solution) * o.x)),
+            o.dot(o.x, o.J * (o.jac(g, o.x) * solution)),
+            -o.dot(o.x, B * o.hess(o.x) * solution),
+            o.dot(B * gradient, solution) * o.number(-2),
+            o.dot(gradient, skew_matrix * gradient) * o.number(-2),
             o.K.zero,
         ]
         yield from pairwise(steps)
-        yield skew.transpose(), -skew
+        yield skew_matrix.transpose(), -skew_matrix
 
 
 @claim("(69)", "aux7", "inhomogeneous", blockwise=True)
@@ -192,28 +192,28 @@ def second_derivative_along_x(o: PaperObjects) -> Pairs:
 def even_terms_as_printed(o: PaperObjects) -> Pairs:
     """The even terms of K~(x~) have this form, as printed
     K~(x~) = x^T J g' x + 2 eps^2 g'' (I - eps^2 f'^2)^{-1} f' f x"""
-    inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
+    solution = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     for B in o.associates():
         g = o.g(B)
-        second = (o.second(g, inner) * o.x)[0, 0] * (o.number(2) * o.eps * o.eps)
-        yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second
+        second_term = (o.second(g, solution) * o.x)[0, 0] * (o.number(2) * o.eps * o.eps)
+        yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second_term
 
 
 @claim("Theorem 11, proof", "", "B H eps", blockwise=True)
 def even_terms(o: PaperObjects) -> Pairs:
     """The even terms, as corrected, and the last four lines of the proof hold
     K~(x~) = x^T J g' x + 2 eps^2 x^T J g'' (I - eps^2 f'^2)^{-1} f' f x = ... = K~(x)"""
-    inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
-    twice = o.number(2) * o.eps * o.eps
+    solution = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
+    two_eps_squared = o.number(2) * o.eps * o.eps
     for B in o.associates():
         g = o.g(B)
         gx, dg, square = o.value(g, o.x), o.jac(g, o.x), o.one_minus_square(g, o.x)
-        inner_g = o.solve(square, dg * gx)
+        solution_g = o.solve(square, dg * gx)
         steps = [
             o.integral(g, o.x_tilde),
-            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, inner) * o.x)) * twice,
-            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, inner_g) * o.x)) * twice,
-            o.dot(o.x, o.J * gx) * o.number(2) + o.dot(o.x, o.J * (dg * inner_g)) * twice,
+            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, solution) * o.x)) * two_eps_squared,
+            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, solution_g) * o.x)) * two_eps_squared,
+            o.dot(o.x, o.J * gx) * o.number(2) + o.dot(o.x, o.J * (dg * solution_g)) * two_eps_squared,
             o.dot(o.x, o.J * o.solve(square, gx)) * o.number(2),
             o.integral(g, o.x),
         ]

@@ -124,11 +124,11 @@ def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
         yield B * B, o.I
         for i in o.each:
             # B(A) = B(lambda_i) on the eigenspace of lambda_i, which is the image of prod_{j != i} (A - lambda_j).
-            onto = o.I
+            projector_multiple = o.I
             for j in o.each:
                 if j != i:
-                    onto = onto * (o.A - o.I * o.lam[j])
-            yield B * onto, onto * o.number(signs[i])
+                    projector_multiple = projector_multiple * (o.A - o.I * o.lam[j])
+            yield B * projector_multiple, projector_multiple * o.number(signs[i])
 
 
 @claim("Sect. 1", "", "B=I", kind=ClaimKind.DIFFERENT, in_general=True, least_m=2)
@@ -162,8 +162,8 @@ def independent_associated_fields(o: PaperObjects) -> Pairs:
 def independent_maps(o: PaperObjects) -> Pairs:
     """If m > 2, the class contains m independent maps
     rank { Phi_{f_s}(x) - x } >= m"""
-    moved = [o.x_tilde - o.x, *(o.step(o.g(B), o.x) - o.x for B in o.associates())]
-    rank = o.rank(o.columns(moved))
+    displacements = [o.x_tilde - o.x, *(o.step(o.g(B), o.x) - o.x for B in o.associates())]
+    rank = o.rank(o.columns(displacements))
     yield min(rank, o.m), o.m
 
 
@@ -173,6 +173,6 @@ def integrals_are_in_involution(o: PaperObjects) -> Pairs:
     {K~_i, K~_j} = 0 for the bracket of Pi"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
     gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
-    for k, first in enumerate(gradients):
-        for second in gradients[:k]:
-            yield o.dot(first, o.Pi(o.x) * second), o.K.zero
+    for k, gradient_1 in enumerate(gradients):
+        for gradient_2 in gradients[:k]:
+            yield o.dot(gradient_1, o.Pi(o.x) * gradient_2), o.K.zero

@@ -41,7 +41,7 @@ def any_quadratic_system(o: PaperObjects) -> Pairs:
 def any_homogeneous_system(o: PaperObjects) -> Pairs:
     """The map of every homogeneous quadratic system has both homogeneous forms
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f"""
-    f = o.arbitrary_system(homogeneous=True)
+    f = o.arbitrary_system(is_homogeneous=True)
     x_tilde = o.step(f, o.x)
     yield x_tilde, o.solve(o.minus_eps_jac(f, o.x), o.x)
     yield x_tilde, o.plus_eps_jac(f, x_tilde) * o.x
@@ -53,11 +53,11 @@ def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
     dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f"""
     f, v = o.arbitrary_system(), o.vector("v")
     x_tilde = o.step(f, o.x)
-    moved = o.jacobian_of_step(f, o.x) * v
-    yield moved, o.solve(o.minus_eps_jac(f, o.x), o.plus_eps_jac(f, x_tilde) * v)
+    dx_tilde = o.jacobian_of_step(f, o.x) * v
+    yield dx_tilde, o.solve(o.minus_eps_jac(f, o.x), o.plus_eps_jac(f, x_tilde) * v)
     # The derivative of x~ along v solves the derivative of the defining equation at (x, x~) along v.
-    half_sum = (o.jac(f, x_tilde) * v + o.jac(f, o.x) * moved) * o.eps
-    yield moved - v, half_sum
+    right = (o.jac(f, x_tilde) * v + o.jac(f, o.x) * dx_tilde) * o.eps
+    yield dx_tilde - v, right
 
 
 @claim("(11)", "eq: CMOQ integral", "map eps", symplectic=False, formal=formal_proofs.integral_of_any_cubic)
@@ -74,8 +74,8 @@ def measure_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
     dx/det(I - eps f') is invariant, for any cubic H and any skew J"""
     p = o.arbitrary_hamiltonian()
     x_tilde = p.step(p.f, p.x)
-    before, after = p.det(p.minus_eps_jac(p.f, p.x)), p.det(p.minus_eps_jac(p.f, x_tilde))
-    yield p.det(p.jacobian_of_step(p.f, p.x)) * before, after
+    det_x, det_x_tilde = p.det(p.minus_eps_jac(p.f, p.x)), p.det(p.minus_eps_jac(p.f, x_tilde))
+    yield p.det(p.jacobian_of_step(p.f, p.x)) * det_x, det_x_tilde
 
 
 @claim("(5)", "eq: Kahan gen", "eps map", blockwise=True)
@@ -188,8 +188,8 @@ def invariant_measure(o: PaperObjects) -> Pairs:
     dx/det(I - eps f') is invariant"""
     for system in (o, o.inhomogeneous()):
         x_tilde = system.step(system.f, o.x)
-        before, after = o.minus_eps_jac(system.f, o.x), o.minus_eps_jac(system.f, x_tilde)
-        yield o.det(system.jacobian_of_step(system.f, o.x)) * o.det(before), o.det(after)
+        matrix_x, matrix_x_tilde = o.minus_eps_jac(system.f, o.x), o.minus_eps_jac(system.f, x_tilde)
+        yield o.det(system.jacobian_of_step(system.f, o.x)) * o.det(matrix_x), o.det(matrix_x_tilde)
 
 
 @claim("Sect. 2", "", "f map", only_m=1)

@@ -72,10 +72,10 @@ def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
     """(76) holds without inverses and after multiplication by J, for any two points, not only for x and x~
     (I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T"""
     plus, minus = o.plus_eps_jac(o.f, o.x_tilde), o.minus_eps_jac(o.f, o.x)
-    before, after = o.Pi(o.x), o.Pi(o.x_tilde)
-    yield plus * before * plus.transpose(), minus * after * minus.transpose()
-    left = plus * before * o.J * o.minus_eps_jac(o.f, o.x_tilde)
-    yield left, minus * after * o.J * o.plus_eps_jac(o.f, o.x)
+    Pi_x, Pi_x_tilde = o.Pi(o.x), o.Pi(o.x_tilde)
+    yield plus * Pi_x * plus.transpose(), minus * Pi_x_tilde * minus.transpose()
+    left = plus * Pi_x * o.J * o.minus_eps_jac(o.f, o.x_tilde)
+    yield left, minus * Pi_x_tilde * o.J * o.plus_eps_jac(o.f, o.x)
 
 
 @claim("Theorem 12, proof", "", "H f", distinct_roots=True, blockwise=True)
@@ -90,9 +90,9 @@ def tensor_commutes_with_jacobians(o: PaperObjects) -> Pairs:
 def last_display_as_printed(o: PaperObjects) -> Pairs:
     """The last display of the proof of (76) holds as printed
     (I - eps f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps f'(x)^2)"""
-    after, before = o.jac(o.f, o.x_tilde), o.df
-    left = (o.I - after * after * o.eps) * _long_form(o, o.x) * o.J
-    yield left, _long_form(o, o.x_tilde) * o.J * (o.I - before * before * o.eps)
+    df_x_tilde, df_x = o.jac(o.f, o.x_tilde), o.df
+    left = (o.I - df_x_tilde * df_x_tilde * o.eps) * _long_form(o, o.x) * o.J
+    yield left, _long_form(o, o.x_tilde) * o.J * (o.I - df_x * df_x * o.eps)
 
 
 @claim("Theorem 12, proof", "", "H B")
@@ -111,8 +111,8 @@ def gradient_conditions(o: PaperObjects) -> Pairs:
     for k in range(o.m - 1):
         left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
         # v . C_k(A) nabla r is the derivative of r along C_k(A)^T v.
-        along = o.horner(k).transpose() * v
-        yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, along)
+        direction = o.horner(k).transpose() * v
+        yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, direction)
 
 
 @claim("(79)-(81)", "C1", "A", only_m=3)
@@ -136,18 +136,18 @@ def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
     """Yield the Jacobi identity of `factor` Pi, where `factor` is a constant matrix."""
     Pi = factor * o.Pi(o.x)
     rows = [o.K.column([Pi[i, k] for k in range(o.n)]) for i in range(o.n)]
-    seconds = [o.second(o.f, row) for row in rows]
+    hessians = [o.second(o.f, row) for row in rows]
     # Pi = J - eps^2 f'^2 J, so that its derivative along v is - eps^2 (f''v f' + f' f''v) J.
-    along = [factor * ((f2 * o.df + o.df * f2) * o.J * -(o.eps * o.eps)) for f2 in seconds]
+    derivatives = [factor * ((f2 * o.df + o.df * f2) * o.J * -(o.eps * o.eps)) for f2 in hessians]
     for i, j, k in combinations(range(o.n), 3):
-        yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
+        yield derivatives[i][j, k] + derivatives[j][k, i] + derivatives[k][i, j], o.K.zero
 
 
 @claim("Lemma 13, proof", "", "J A", least_m=2)
 def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
     """The gradient conditions solve the equations of first order in eps^2
     coefficient of eps^2 in the Jacobi identities vanishes for nabla pi_k = C_k w, w any vector"""
-    equations, solutions = _first_order(o)
+    equations, solutions = _first_order_equations(o)
     yield equations * solutions, o.zeros(equations.nrows(), o.n)
 
 
@@ -162,7 +162,7 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
 def rank_of_the_first_order(o: PaperObjects) -> Pairs:
     """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3
     these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions"""
-    equations, solutions = _first_order(o)
+    equations, solutions = _first_order_equations(o)
     yield equations.nrows(), comb(2 * o.m, 3)
     yield o.rank(equations), 2 * o.m * (o.m - 1)
     yield o.rank(solutions), equations.ncols() - 2 * o.m * (o.m - 1)
@@ -178,9 +178,11 @@ def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
     gradients = [o.horner(k) * w for k in range(o.m)]
     # The derivative of P along row i of P is the sum over k of (P nabla pi_k)_i times the k-th power of A^T (times J).
     slopes = [P * gradient for gradient in gradients]
-    along = [o.sum([power * slope[i, 0] for power, slope in zip(powers, slopes, strict=True)]) for i in range(o.n)]
+    slopes_of_P = [
+        o.sum([power * slope[i, 0] for power, slope in zip(powers, slopes, strict=True)]) for i in range(o.n)
+    ]
     for i, j, k in combinations(range(o.n), 3):
-        yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
+        yield slopes_of_P[i][j, k] + slopes_of_P[j][k, i] + slopes_of_P[k][i, j], o.K.zero
 
 
 @claim("Lemma 14 (83)", "grads pq", "H B")
@@ -217,12 +219,12 @@ def gradients_through_p0(o: PaperObjects) -> Pairs:
 def sums_with_coefficients(o: PaperObjects) -> Pairs:
     """The matrix identities for the gradient conditions hold
     sum beta_i B_i = (A - aI) sum gamma_i B_i, I + sum alpha_i B_i = (A^2 - aA + bI) sum gamma_i B_i"""
-    last = o.sum([o.B(i) * o.lagrange(i)[o.m - 1] for i in o.each])
+    top_sum = o.sum([o.B(i) * o.lagrange(i)[o.m - 1] for i in o.each])
     for k in range(o.m - 1):
         left = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
         if k == 0:
             left = left + o.I * o.number(4 - o.m)
-        yield left, o.horner(k) * last
+        yield left, o.horner(k) * top_sum
 
 
 @claim("(86), (87)", "pois lemma cond 1", "B", only_m=3)
@@ -234,17 +236,17 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
         j, k = (other for other in o.each if other != i)
         (ai, bi, ci), (aj, bj, cj), (ak, bk, ck) = o.lagrange(i), o.lagrange(j), o.lagrange(k)
         root = o.lam[i]
-        quadratic = root * root - a * root + b
+        C_2 = root * root - a * root + b
         sums = []
         for c in range(3):  # sum over j of (alpha, beta or gamma)_j B_j(lambda_i)
             values = [o.lagrange(l)[0] + root * (o.lagrange(l)[1] + root * o.lagrange(l)[2]) for l in o.each]
             sums.append(o.sum([o.lagrange(l)[c] * values[l] for l in o.each]))
         yield sums[1], (root - a) * sums[2]
-        yield o.K.one + sums[0], quadratic * sums[2]
+        yield o.K.one + sums[0], C_2 * sums[2]
         yield bj + bk - bi, (root - a) * (cj + ck - ci)
         yield bi, (root - a) * ci
-        yield o.K.one + aj + ak - ai, quadratic * (cj + ck - ci)
-        yield ai - o.K.one, quadratic * ci
+        yield o.K.one + aj + ak - ai, C_2 * (cj + ck - ci)
+        yield ai - o.K.one, C_2 * ci
 
 
 @claim("(88), (89)", "Af' comp", "H A", least_m=2)
@@ -255,8 +257,8 @@ def components(o: PaperObjects) -> Pairs:
         B = o.B(i)
         yield B.transpose() * o.df, o.df * B.transpose()
         for l in range(o.n):
-            second = o.second(o.f, o.unit(l))
-            yield B.transpose() * second, second * B.transpose()
+            derivative = o.second(o.f, o.unit(l))
+            yield B.transpose() * derivative, derivative * B.transpose()
 
 
 @claim("(90)", "grad q comp", "f''")
@@ -266,8 +268,8 @@ def gradient_of_q(o: PaperObjects) -> Pairs:
     for i in o.free:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
         for l in range(o.n):
-            first, second = _two_sums(o, o.B(i), l)
-            yield gradient[l, 0], first + second
+            trace_1, trace_2 = _two_traces(o, o.B(i), l)
+            yield gradient[l, 0], trace_1 + trace_2
 
 
 @claim("(91)-(93)", "A grad q comp", "H B")
@@ -277,19 +279,19 @@ def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
     trace = o.gradient(lambda o, x: o.eighth_of_trace(x), o.x)
     for i in o.free:
         B = o.B(i)
-        sums = [_two_sums(o, B, l) for l in range(o.n)]
+        sums = [_two_traces(o, B, l) for l in range(o.n)]
         for k in range(o.n):
             derivative = o.second(o.f, o.unit(k))
             expected = o.trace(derivative * o.df) * o.number(1, 8)
-            for part in range(2):
-                yield o.sum([B[k, l] * sums[l][part] for l in range(o.n)]), expected
+            for index in range(2):
+                yield o.sum([B[k, l] * sums[l][index] for l in range(o.n)]), expected
             # The intermediate lines: (88) and (89) move B^T to the index of the derivative.
             BT = B.transpose()
-            moved = [o.second(o.f, BT * o.unit(l)) for l in range(o.n)]
+            second_along_BT = [o.second(o.f, BT * o.unit(l)) for l in range(o.n)]
             for l in range(o.n):
-                yield sums[l][0], o.trace(moved[l] * o.df) * o.number(1, 8)
+                yield sums[l][0], o.trace(second_along_BT[l] * o.df) * o.number(1, 8)
                 yield sums[l][1], o.trace(o.df * BT * o.second(o.f, o.unit(l))) * o.number(1, 8)
-                yield sums[l][1], o.trace(o.df * moved[l]) * o.number(1, 8)
+                yield sums[l][1], o.trace(o.df * second_along_BT[l]) * o.number(1, 8)
             yield expected * o.number(2), trace[k, 0]
 
 
@@ -300,7 +302,7 @@ def _long_form(o: PaperObjects, x: Any) -> Any:
     return right
 
 
-def _first_order(o: PaperObjects) -> tuple[Any, Any]:
+def _first_order_equations(o: PaperObjects) -> tuple[Any, Any]:
     """Return the equations of first order in eps^2 for the d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
     n, m = o.n, o.m
     powers = [o.A_to(k).transpose() * o.J for k in range(m)]
@@ -309,16 +311,16 @@ def _first_order(o: PaperObjects) -> tuple[Any, Any]:
         row = [o.K.zero] * (n * m)
         for a in range(3):
             i, j, k = triple[a], triple[(a + 1) % 3], triple[(a + 2) % 3]
-            for power in range(m):
+            for exponent in range(m):
                 for l in range(n):  # to this order the bracket of x_i with a function u is sum_l J_il d_l u
-                    row[power * n + l] = row[power * n + l] + o.J[i, l] * powers[power][j, k]
+                    row[exponent * n + l] = row[exponent * n + l] + o.J[i, l] * powers[exponent][j, k]
         rows.append(row)
     equations = o.K.matrix(len(rows), n * m, [entry for row in rows for entry in row])
-    stacked = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
-    return equations, o.K.matrix(n * m, n, stacked)
+    entries = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
+    return equations, o.K.matrix(n * m, n, entries)
 
 
-def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
+def _two_traces(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
     derivative = o.second(o.f, o.unit(l))
     eighth = o.number(1, 8)
     return (o.trace(B.transpose() * derivative * o.df) * eighth, o.trace(B.transpose() * o.df * derivative) * eighth)

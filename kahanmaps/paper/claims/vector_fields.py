@@ -95,5 +95,5 @@ def jacobians_commute(o: PaperObjects) -> Pairs:
     f_i' f_j' = f_j' f_i'"""
     for i in range(o.m):
         for j in range(i):
-            first, second = o.jac(o.f_(i), o.x), o.jac(o.f_(j), o.x)
-            yield first * second, second * first
+            dfi, dfj = o.jac(o.f_(i), o.x), o.jac(o.f_(j), o.x)
+            yield dfi * dfj, dfj * dfi

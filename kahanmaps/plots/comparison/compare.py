@@ -44,16 +44,16 @@ MAX_STEPS = 10**9
 MAX_FUNCTIONS = 12
 MAX_STARTS = 100_000
 _RANDOM_STARTS = 40
-_OF_ONE_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
+_STARTS_PER_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
 _PROBE_STEPS = 1000
 _REFERENCE_STARTS = 4  # maximal number of initial points for which errors are measured
-_SHORTER_TIMES = 6  # number of times tried for the reference solution, each half of the previous time
-_COARSEST, _FINEST = 1, 14  # base-2 logarithms of the smallest and largest number of steps
+_MAX_HALVINGS = 6  # number of times tried for the reference solution, each half of the previous time
+_MIN_LOG_STEPS, _MAX_LOG_STEPS = 1, 14  # base-2 logarithms of the smallest and largest number of steps
 _MIN_SIZES = 5  # step sizes needed before the order counts as converged
-_SETTLED = 0.004  # change of the slope between step sizes below which the order counts as converged
+_MAX_SLOPE_CHANGE = 0.004  # change of the slope between step sizes below which the order counts as converged
 _ROUNDING = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
 _MIN_COMPILED_STEPS = 20_000
-_LONG = 60  # maximal length of a printed number; JSON output has all characters
+_MAX_LETTERS = 60  # maximal length of a printed number; JSON output has all characters
 _COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
 
 
@@ -154,8 +154,9 @@ class Comparison(ResultPart):
             for step, value in zip(curve.steps.tolist(), curve.errors.tolist(), strict=True):
                 rows.append(("drift", curve.method, curve.function, format_number(self.eps), step, value, None))
         for run in self.runs:
-            for at in run.errors:
-                rows.append(("error", run.method, None, format_number(at.eps), at.steps, at.error, at.evaluations))
+            for sample in run.errors:
+                eps = format_number(sample.eps)
+                rows.append(("error", run.method, None, eps, sample.steps, sample.error, sample.evaluations))
         return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
 
     def to_pandas(self) -> Any:
@@ -185,7 +186,7 @@ class Comparison(ResultPart):
                 "newton_failures": run.failures,
                 "completed": len(run.ends) - len(run.early),
                 "ended": ended[:20],
-                "errors": [all_fields(at) for at in run.errors],
+                "errors": [all_fields(sample) for sample in run.errors],
                 "drift": {name: {key: json_float(x) for key, x in sizes.items()} for name, sizes in drift.items()},
             }
             methods.append(record | ({} if run.seconds is None else {"seconds": run.seconds}))
@@ -203,11 +204,11 @@ class Comparison(ResultPart):
     def tables(self) -> Iterator[list[list[str]]]:
         """Yield tables as rows of cells: one table of the methods, and one of the drift of each function."""
         head = ["# method", "order", "measured", "error", "f per step", "systems per step", "orbits"]
-        timed = any(run.seconds is not None for run in self.runs)
-        rows = [head + ["seconds"] * timed]
+        has_seconds = any(run.seconds is not None for run in self.runs)
+        rows = [head + ["seconds"] * has_seconds]
         for run in self.runs:
             steps = max(1, sum(end.steps for end in run.ends))
-            error = next((entry.error for entry in run.errors if entry.eps == self.eps), None)
+            error = next((sample.error for sample in run.errors if sample.eps == self.eps), None)
             cells = [METHODS[run.method].title, str(METHODS[run.method].order)]
             cells += ["-" if run.order is None else f"{run.order:.2f}", "-" if error is None else f"{error:.2g}"]
             cells += [f"{run.evaluations / steps:.4g}", f"{run.systems / steps:.4g}"]
@@ -224,7 +225,7 @@ class Comparison(ResultPart):
     @property
     def text(self) -> str:
         """The tables and notes, as `print` shows them."""
-        eps = eps_record_suffix({"eps": _shown(self.eps), "time_step": _shown(2 * self.eps)})
+        eps = eps_record_suffix({"eps": _short_number(self.eps), "time_step": _short_number(2 * self.eps)})
         lines = [f"# {self.file.name}{eps}, {counted(self.steps, 'step')}, measured in floating point"]
         for rows in self.tables():
             lines += ["\t".join(cells) for cells in rows]
@@ -237,7 +238,7 @@ class Comparison(ResultPart):
         """Return sentences that explain the numbers and list missing measurements."""
         sentences = []
         if self.time is not None:
-            sentences.append(f"error: at time {_shown(self.time)}, against Taylor solutions in balls")
+            sentences.append(f"error: at time {_short_number(self.time)}, against Taylor solutions in balls")
         if absolute := [name for name in self.labels if not self.relative[name]]:
             sentences.append(f"absolute drift: {', '.join(absolute)}, for it is 0 at an initial point")
         for run in (run for run in self.runs if run.failures):
@@ -298,66 +299,66 @@ def compare(
     rk4 (-F1 + 1)/eps^2 False
     """
     file = as_file(system).real_approximation
-    field, value = file.system, resolve_eps(eps, time_step, h, floats=True)
-    if value is None:
+    field, eps = file.system, resolve_eps(eps, time_step, h, floats=True)
+    if eps is None:
         raise InputError("found no eps, expected eps= or h=, e.g. h=0.1")
-    value, count = rational(value), either(steps=steps, n=n)
-    count = 10_000 if count is None else count
-    if value == 0:
+    eps, steps = rational(eps), either(steps=steps, n=n)
+    steps = 10_000 if steps is None else steps
+    if eps == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 no method moves a point")
-    if not isinstance(count, int) or not 1 <= count <= MAX_STEPS:
-        raise InputError(f"found {count} steps, expected 1 to {MAX_STEPS}")
-    starts = _starts(field, either(start=start, x0=x0), value, seed)
-    names, skipped, ensemble_of = _methods(file, value, starts, methods, kernel)
+    if not isinstance(steps, int) or not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    starts = _exact_starts(field, either(start=start, x0=x0), eps, seed)
+    method_names, skipped, ensemble_of = _choose_methods(file, eps, starts, methods, kernel)
     notes: list[str] = []
     if integrals is None:
-        functions, origins = watched_functions(file, value, progress)
+        functions, origins = watched_functions(file, eps, progress)
         if not functions:
             notes.append(
                 "no drift: no integral of the map is known, and a quick search found none (--integral gives one)"
             )
     else:
         integrals = [integrals] if isinstance(integrals, str) else integrals
-        requests = [("", one) if isinstance(one, str) else one for one in integrals]
-        functions = requested_functions(file, value, requests)
+        requests = [("", request) if isinstance(request, str) else request for request in integrals]
+        functions = requested_functions(file, eps, requests)
         origins = {function.name: "requested" for function in functions}
     if len(functions) > MAX_FUNCTIONS:
         notes.append(f"shown: {MAX_FUNCTIONS} of {len(functions)} functions")
         functions = functions[:MAX_FUNCTIONS]
-    initial, relative = _initial(functions, starts)
-    time, references = _references(field, starts[:_REFERENCE_STARTS], value, progress) if orders else (None, None)
+    initial, relative = _initial_values(functions, starts)
+    time, references = _references(field, starts[:_REFERENCE_STARTS], eps, progress) if orders else (None, None)
     if orders and time is None:
         notes.append("no errors: no reference, for the solution moves not at all, or reaches a pole at once")
     runs, curves = [], []
-    edges = _edges(count, linear_bins)
-    for name in names:
-        watched = [_Bins(edges) for _ in functions]
-        began = None if clock is None else clock()
-        ensemble = ensemble_of(name, value, len(starts), count)
-        for k, points in enumerate(ensemble.records(count, 1 if functions else count)):
+    edges = _bin_edges(steps, linear_bins)
+    for name in method_names:
+        function_bins = [_Bins(edges) for _ in functions]
+        begin = None if clock is None else clock()
+        ensemble = ensemble_of(name, eps, len(starts), steps)
+        for k, points in enumerate(ensemble.records(steps, 1 if functions else steps)):
             with np.errstate(all="ignore"):
-                for function, bins, (origin, scale) in zip(functions, watched, initial, strict=True):
+                for function, bins, (initial_value, scale) in zip(functions, function_bins, initial, strict=True):
                     if k:  # at step 0 errors are 0 by definition
-                        bins.add(ensemble.step - len(points) + 1, np.abs(function(points) - origin) / scale)
-            progress(f"{METHODS[name].title}: step {ensemble.step} of {count}")
+                        bins.add(ensemble.step - len(points) + 1, np.abs(function(points) - initial_value) / scale)
+            progress(f"{METHODS[name].title}: step {ensemble.step} of {steps}")
             if (ensemble.failed_at >= 0).all():
                 break
-        seconds = None if clock is None or began is None else clock() - began
+        seconds = None if clock is None or begin is None else clock() - begin
         ends = tuple(ensemble.end(k) for k in range(len(starts)))
-        for function, bins in zip(functions, watched, strict=True):
+        for function, bins in zip(functions, function_bins, strict=True):
             curves.append(bins.curve(name, function.name))
         errors: tuple[StepError, ...] = ()
         order = None
         if time is not None and references is not None:
-            errors, order = _errors(name, ensemble_of, time, value, references, progress)
+            errors, order = _measure_errors(name, ensemble_of, time, eps, references, progress)
         repeated = int(ensemble.near_singular.sum()) if name in IMPLICIT else 0
         evaluations, systems = work(name, sum(end.steps for end in ends), repeated)
         failures = sum(end.status == "singular" for end in ends) if name in IMPLICIT else 0
         runs.append(MethodRun(name, ends, evaluations, systems, repeated, failures, errors, order, seconds))
     labels = {function.name: function.label for function in functions}
-    kept = {name: origins[name] for name in labels}
+    origins = {name: origins[name] for name in labels}
     return Comparison(
-        file, value, starts, count, labels, kept, relative, tuple(runs), tuple(curves), time, skipped, tuple(notes)
+        file, eps, starts, steps, labels, origins, relative, tuple(runs), tuple(curves), time, skipped, tuple(notes)
     )
 
 
@@ -374,28 +375,28 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
     starts = []
     for k in range(_RANDOM_STARTS):
         sizes = ((rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16)) for _ in range(system.dim))
-        starts.append(tuple(fmpq(p, q << k // _OF_ONE_SIZE) for p, q in sizes))
+        starts.append(tuple(fmpq(p, q << k // _STARTS_PER_SIZE) for p, q in sizes))
     ensemble = MethodEnsemble(system, eps, starts, "rk4", kernel="numpy")
     ensemble.advance(_PROBE_STEPS)
     complete = np.flatnonzero(ensemble.failed_at < 0)
     return starts[complete[0] if len(complete) else 0]
 
 
-def _shown(number: fmpq) -> str:
+def _short_number(number: fmpq) -> str:
     text = format_number(number)
-    return text if len(text) <= _LONG else f"about {to_float(number):.6g}"
+    return text if len(text) <= _MAX_LETTERS else f"about {to_float(number):.6g}"
 
 
-def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
-    if given is None:
+def _exact_starts(system: QuadraticSystem, points: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
+    if points is None:
         return (small_start(system, eps, seed),)
-    if isinstance(given, str):
-        given = starts_on(given, system.variables) if ":" in given else parse_point(given)
-    if isinstance(given, Mapping):
-        given = as_point(given, system.variables)
-    if not hasattr(given, "__len__"):
-        raise InputError(f"found the initial point {given!r}, expected a sequence of numbers, or several")
-    rows = given.tolist() if isinstance(given, np.ndarray) else given
+    if isinstance(points, str):
+        points = starts_on(points, system.variables) if ":" in points else parse_point(points)
+    if isinstance(points, Mapping):
+        points = as_point(points, system.variables)
+    if not hasattr(points, "__len__"):
+        raise InputError(f"found the initial point {points!r}, expected a sequence of numbers, or several")
+    rows = points.tolist() if isinstance(points, np.ndarray) else points
     rows = rows if len(rows) and isinstance(rows[0], list | tuple | np.ndarray) else [rows]
     if len(rows) > MAX_STARTS:
         raise InputError(f"found {len(rows)} initial points, expected at most {MAX_STARTS}")
@@ -407,7 +408,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
     return tuple(starts)
 
 
-def _methods(
+def _choose_methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
     """Return the admitted methods, the reasons for omitted methods, and a function that returns orbits of a method."""
@@ -421,39 +422,39 @@ def _methods(
     halves = separated(file.system, file.hamiltonian)
     if isinstance(halves, str):
         skipped = {name: halves for name in names if name in SEPARABLE}
-    found = float_normal_form(file, None if "normal-form" in names else "generic")
-    form = None if isinstance(found, NoNormalForm) else found.form
-    if isinstance(found, NoNormalForm) and "normal-form" in names:
-        skipped["normal-form"] = found.reason
+    normal_form = float_normal_form(file, None if "normal-form" in names else "generic")
+    form = None if isinstance(normal_form, NoNormalForm) else normal_form.form
+    if isinstance(normal_form, NoNormalForm) and "normal-form" in names:
+        skipped["normal-form"] = normal_form.reason
     if len(skipped) == len(names):
-        problems = [f"the method {name} is not available: {why}" for name, why in skipped.items()]
+        problems = [f"the method {name} is not available: {reason}" for name, reason in skipped.items()]
         raise InputError("; ".join(problems) or f"found no method, expected some of {', '.join(METHODS)}")
     points = np.array([to_floats(start) for start in starts])
 
-    def ensemble_of(name: str, at: fmpq, count: int, steps: int) -> FloatEnsemble:
-        chosen = kernel or (None if steps * count > _MIN_COMPILED_STEPS else "numpy")
+    def ensemble_of(name: str, method_eps: fmpq, count: int, steps: int) -> FloatEnsemble:
+        chosen_kernel = kernel or (None if steps * count > _MIN_COMPILED_STEPS else "numpy")
         if name in ("kahan", "normal-form"):
-            normal = form if name == "normal-form" else None
-            return FloatEnsemble(file.system, at, points[:count], form=normal, kernel=chosen)
-        of_system = None if isinstance(halves, str) else halves
-        return MethodEnsemble(file.system, at, points[:count], name, halves=of_system, kernel=chosen)
+            kahan_form = form if name == "normal-form" else None
+            return FloatEnsemble(file.system, method_eps, points[:count], form=kahan_form, kernel=chosen_kernel)
+        system_halves = None if isinstance(halves, str) else halves
+        return MethodEnsemble(file.system, method_eps, points[:count], name, halves=system_halves, kernel=chosen_kernel)
 
     return [name for name in names if name not in skipped], skipped, ensemble_of
 
 
-def _initial(
+def _initial_values(
     functions: Sequence[WatchedFunction], starts: Sequence[Sequence[fmpq]]
 ) -> tuple[list[tuple[FloatArray, FloatArray]], dict[str, bool]]:
     """Return the initial values of each function and the divisors of its errors, and whether errors are relative."""
     points = np.array([to_floats(start) for start in starts])
     initial, relative = [], {}
     for function in functions:
-        values, numbers = function(points), [function.at(start) for start in starts]
-        if None in numbers or not np.isfinite(values).all():
-            where = "is not defined in floating point at the initial point: choose another one"
-            raise InputError(f"{function.name} {where}")
+        values, exact_values = function(points), [function.at(start) for start in starts]
+        if None in exact_values or not np.isfinite(values).all():
+            problem = "is not defined in floating point at the initial point: choose another one"
+            raise InputError(f"{function.name} {problem}")
         # Decide exactly whether I(x_0) = 0: its value in doubles may be a rounding error instead of 0.
-        relative[function.name] = all(number != 0 for number in numbers) and bool((values != 0.0).all())
+        relative[function.name] = all(value != 0 for value in exact_values) and bool((values != 0.0).all())
         initial.append((values, np.abs(values) if relative[function.name] else np.ones_like(values)))
     return initial, relative
 
@@ -469,18 +470,18 @@ def _references(
     times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]
     if not times:
         return None, None
-    ratio = min(times) / abs(2 * eps)
-    time = 2 * eps * (1 << max(0, (int(ratio.p) // int(ratio.q)).bit_length() - 1))
-    for _ in range(_SHORTER_TIMES):
+    step_ratio = min(times) / abs(2 * eps)
+    time = 2 * eps * (1 << max(0, (int(step_ratio.p) // int(step_ratio.q)).bit_length() - 1))
+    for _ in range(_MAX_HALVINGS):
         progress(f"the solution at time {format_number(time)}")
-        ends = [solution(system, start, time) for start in starts]
-        if all(end is not None for end in ends):
-            return time, np.array([[float(ball.mid()) for ball in end or ()] for end in ends])
+        end_points = [solution(system, start, time) for start in starts]
+        if all(point is not None for point in end_points):
+            return time, np.array([[float(ball.mid()) for ball in point or ()] for point in end_points])
         time /= 2
     return None, None
 
 
-def _errors(
+def _measure_errors(
     name: str,
     ensemble_of: Callable[[str, fmpq, int, int], FloatEnsemble],
     time: fmpq,
@@ -489,42 +490,42 @@ def _errors(
     progress: Callable[[str], None],
 ) -> tuple[tuple[StepError, ...], float | None]:
     """Return the errors at `time` for decreasing step sizes, and the slope of the last two errors above rounding."""
-    found: dict[int, StepError] = {}
-    size = float(np.abs(references).max())
+    errors: dict[int, StepError] = {}
+    reference_size = float(np.abs(references).max())
 
     def measure(steps: int) -> StepError:
-        at = time / (2 * steps)
-        ensemble = ensemble_of(name, at, len(references), steps)
+        half_step = time / (2 * steps)
+        ensemble = ensemble_of(name, half_step, len(references), steps)
         ensemble.advance(steps)
         repeated = int(ensemble.near_singular.sum()) if name in IMPLICIT else 0
         evaluations = work(name, steps * len(references), repeated)[0] / len(references)
         error = float(np.abs(ensemble.x - references).max())  # NaN if an orbit has ended
-        return StepError(at, steps, error, evaluations)
+        return StepError(half_step, steps, error, evaluations)
 
     slopes: list[float] = []
-    for k in range(_COARSEST, _FINEST + 1):
+    for k in range(_MIN_LOG_STEPS, _MAX_LOG_STEPS + 1):
         steps = 1 << k
-        found[steps] = measure(steps)
+        errors[steps] = measure(steps)
         progress(f"{METHODS[name].title}: error with {steps} steps")
-        error, before = found[steps].error, found.get(steps // 2)
+        error, previous = errors[steps].error, errors.get(steps // 2)
         if not np.isfinite(error):
             continue
-        if error <= _ROUNDING * size * sqrt(steps):
+        if error <= _ROUNDING * reference_size * sqrt(steps):
             break
-        if before is not None and np.isfinite(before.error):
-            slopes.append(log2(before.error / error))
-        is_settled = len(slopes) >= 3 and max(abs(slopes[-1] - slope) for slope in slopes[-3:-1]) < _SETTLED
-        if len(found) >= _MIN_SIZES and is_settled and error < 0.01 * size:
+        if previous is not None and np.isfinite(previous.error):
+            slopes.append(log2(previous.error / error))
+        is_settled = len(slopes) >= 3 and max(abs(slopes[-1] - slope) for slope in slopes[-3:-1]) < _MAX_SLOPE_CHANGE
+        if len(errors) >= _MIN_SIZES and is_settled and error < 0.01 * reference_size:
             break
-    requested = time / (2 * eps)
-    steps = int(requested.p)
-    if requested.q == 1 and steps not in found and steps <= MAX_STEPS:
-        found[steps] = measure(steps)
-    ordered = [found[steps] for steps in sorted(found) if np.isfinite(found[steps].error)]
-    return tuple(ordered), slopes[-1] if slopes else None
+    requested_steps = time / (2 * eps)
+    steps = int(requested_steps.p)
+    if requested_steps.q == 1 and steps not in errors and steps <= MAX_STEPS:
+        errors[steps] = measure(steps)
+    sorted_errors = [errors[steps] for steps in sorted(errors) if np.isfinite(errors[steps].error)]
+    return tuple(sorted_errors), slopes[-1] if slopes else None
 
 
-def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
+def _bin_edges(steps: int, linear: bool) -> NDArray[np.int64]:
     """Return the ends 0 = e_0 < e_1 < ... = steps of the bins; bin k contains the steps e_(k-1) < n <= e_k."""
     if steps <= BINS:
         return np.arange(steps + 1)
@@ -536,25 +537,25 @@ class _Bins:
     """The largest error in each bin among the steps that were added."""
 
     def __init__(self, edges: NDArray[np.int64]) -> None:
-        self._edges = edges
+        self._bin_edges = edges
         self._largest = np.full(len(edges) - 1, -1.0)
-        self._where = np.zeros(len(edges) - 1, dtype=np.int64)
+        self._steps = np.zeros(len(edges) - 1, dtype=np.int64)
         self._undefined = 0
         self._last = float("nan")
 
     def add(self, first: int, errors: FloatArray) -> None:
         """Add errors (steps, orbits) at the steps first, first + 1, ...; NaN if undefined."""
-        missing = ~np.isfinite(errors)
-        self._undefined += int(missing.sum())
-        errors = np.where(missing, -1.0, errors).max(axis=1)
+        is_missing = ~np.isfinite(errors)
+        self._undefined += int(is_missing.sum())
+        errors = np.where(is_missing, -1.0, errors).max(axis=1)
         self._last = float(errors[-1]) if errors[-1] >= 0 else float("nan")
-        bins = np.searchsorted(self._edges, np.arange(first, first + len(errors))) - 1
-        for part in np.split(np.arange(len(errors)), np.flatnonzero(np.diff(bins)) + 1):
-            best = part[errors[part].argmax()]
-            if errors[best] > self._largest[bins[best]]:
-                self._largest[bins[best]], self._where[bins[best]] = errors[best], first + best
+        bins = np.searchsorted(self._bin_edges, np.arange(first, first + len(errors))) - 1
+        for rows in np.split(np.arange(len(errors)), np.flatnonzero(np.diff(bins)) + 1):
+            row = rows[errors[rows].argmax()]
+            if errors[row] > self._largest[bins[row]]:
+                self._largest[bins[row]], self._steps[bins[row]] = errors[row], first + row
 
     def curve(self, method: str, function: str) -> DriftCurve:
         """Return the curve of the largest errors, without empty bins."""
-        kept = self._largest >= 0
-        return DriftCurve(method, function, self._where[kept], self._largest[kept], self._undefined, self._last)
+        is_used = self._largest >= 0
+        return DriftCurve(method, function, self._steps[is_used], self._largest[is_used], self._undefined, self._last)

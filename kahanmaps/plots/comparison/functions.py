@@ -29,7 +29,7 @@ _MAX_NAME = 30  # maximal number of characters
 _EFFORT = -2  # effort of the search for integrals, which then takes at most a few seconds
 
 
-class OfTheImage:
+class TwoPointFunction:
     """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
 
     of_arrays = True  # ensembles evaluate it at arrays of points
@@ -43,7 +43,7 @@ class OfTheImage:
             polynomials = (hamiltonian.H, *hamiltonian.gradient)
             H, *gradient = (PointFunction("", _as_function(hamiltonian, polynomial)) for polynomial in polynomials)
             self._values = lambda x, image: (
-                H(x) + ((image - x) * np.stack([slope(x) for slope in gradient], axis=1)).sum(axis=1) / 3.0
+                H(x) + ((image - x) * np.stack([partial(x) for partial in gradient], axis=1)).sum(axis=1) / 3.0
             )
         else:
             matrix = to_floats((hamiltonian.J * function.matrix).entries()).reshape(hamiltonian.dim, hamiltonian.dim)
@@ -59,13 +59,13 @@ class OfTheImage:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the values at points (..., dim), computed with one step of the Kahan map for all points at once."""
-        rows = points.reshape(-1, points.shape[-1])
+        flat_points = points.reshape(-1, points.shape[-1])
         with np.errstate(all="ignore"):
-            computed = self._values(rows, images_of(self._function.map.at(self._eps), rows))
-        return np.where(np.isfinite(computed), computed, np.nan).reshape(points.shape[:-1])
+            values = self._values(flat_points, images_of(self._function.map.at(self._eps), flat_points))
+        return np.where(np.isfinite(values), values, np.nan).reshape(points.shape[:-1])
 
 
-WatchedFunction = PointFunction | OfTheImage
+WatchedFunction = PointFunction | TwoPointFunction
 
 
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
@@ -84,12 +84,12 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     }
     hamiltonian = file.hamiltonian
     if hamiltonian is not None and eps != 0:
-        functions["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
+        functions["modified H"] = TwoPointFunction(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
         if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
             letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # as in check-integrals
             for power in range(1, hamiltonian.dim // 2):
                 integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
-                functions[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
+                functions[integral.name] = TwoPointFunction(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
     if hamiltonian is not None and "H" not in functions:
         functions["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
     return functions
@@ -108,28 +108,31 @@ def watched_functions(
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
     {'(-F1 + 1)/eps^2': 'declared', 'x2^2 + 2*x3^2': 'flow', '(-F2/2 + 1/2)/eps^2': 'declared', 'x1^2 - x3^2': 'flow'}
     """
-    known: list[WatchedFunction]
+    map_functions: list[WatchedFunction]
     if file.hamiltonian is None and not measured_integrals(file):
         progress("searching for integrals")
         search = find_integrals(file, effort=_EFFORT)
-        known = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
+        map_functions = [
+            PointFunction(integral.name, normalized(integral.function, file.dim).function, eps)
+            for integral in search.integrals
+        ]
     else:
-        known = known_functions(file, eps)
+        map_functions = known_functions(file, eps)
     declared, hamiltonian = measured_integrals(file), file.hamiltonian
-    of_flow = [] if hamiltonian is None else [_as_function(hamiltonian, primitive_part(hamiltonian.H)[1])]
+    flow_integrals = [] if hamiltonian is None else [_as_function(hamiltonian, primitive_part(hamiltonian.H)[1])]
     functions: list[WatchedFunction] = []
     origins: dict[str, str] = {}
-    for function in known:
+    for function in map_functions:
         functions.append(function)
         name = function.name
-        of_theorem = "theorem" if hamiltonian else "found"
-        origins[name] = "declared" if name in declared else "flow" if name == "H" else of_theorem
+        default_origin = "theorem" if hamiltonian else "found"
+        origins[name] = "declared" if name in declared else "flow" if name == "H" else default_origin
         if isinstance(function, PointFunction) and name != "H":
-            leading = normalized(function.function, file.dim).leading
-            if leading is not None and leading != function.function and leading not in of_flow:
-                of_flow.append(leading)
-                text = format_rational_function(leading)
-                functions.append(PointFunction(text if len(text) <= _MAX_NAME else f"limit of {name}", leading, eps))
+            limit = normalized(function.function, file.dim).leading
+            if limit is not None and limit != function.function and limit not in flow_integrals:
+                flow_integrals.append(limit)
+                text = format_rational_function(limit)
+                functions.append(PointFunction(text if len(text) <= _MAX_NAME else f"limit of {name}", limit, eps))
                 origins[functions[-1].name] = "flow"
     return functions, origins
 
@@ -146,16 +149,16 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
         for name, integral in measured_integrals(file).items()
         if name not in functions
     }
-    chosen = list(measured_integrals(file)) or [name for name in functions if name != "H"]
+    chosen_names = list(measured_integrals(file)) or [name for name in functions if name != "H"]
     if "H" in functions:
-        chosen.append("H")
-    if not chosen:
+        chosen_names.append("H")
+    if not chosen_names:
         problem = f"found no known integral of {file.name}, expected one"
         if file.integrals_in_iterates:
             names = ", ".join(file.integrals_in_iterates)
             problem = f"found only known integrals of {file.name} that contain x~ ({names}), expected others"
         raise InputError(f"{problem}: give --integral NAME=EXPR, an expression in the variables and eps")
-    return [functions[name] for name in dict.fromkeys(chosen)]
+    return [functions[name] for name in dict.fromkeys(chosen_names)]
 
 
 def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
@@ -182,19 +185,17 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
     """Return a function of `functions_of` by its name, or an expression, without eps unless `eps` is given."""
-    known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
-    return requested_axis(file, eps, text) if known is None else known
+    function = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
+    return requested_axis(file, eps, text) if function is None else function
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
     """Return the same as `requested_function`. Raises InputError for integrals that depend on the image x~ of x."""
-    known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
-    named = {
-        name: known_function.function
-        for name, known_function in known.items()
-        if isinstance(known_function, PointFunction)
+    available = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
+    rational_functions = {
+        name: function.function for name, function in available.items() if isinstance(function, PointFunction)
     }
-    return point_function(text.strip(), file.variables, eps, file.real_approximation.parameters, named)
+    return point_function(text.strip(), file.variables, eps, file.real_approximation.parameters, rational_functions)
 
 
 def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:

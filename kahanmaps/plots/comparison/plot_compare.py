@@ -20,21 +20,20 @@ from kahanmaps.plots.figures import (
     letter_count,
     log_scale_with_zero,
     new_figure,
-    wrapped,
+    wrap_text,
     write_beside,
 )
 from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
 _PANEL = 5.5  # minimal width in centimetres of panels side by side
-_LOST = 1e3
+_MIN_CLIPPED = 1e3
 _MAX_PANELS = 6
-_NO_VALUES = (1e-17, 1e-15)  # limits of the axis if all errors are 0
+_DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the axis if all errors are 0
 
 
 def plot_comparison(
@@ -50,7 +49,7 @@ def plot_comparison(
         return plot_drift(result, style, scale=scale)
     if show not in KINDS:
         raise InputError(f"found the picture {show[:40]!r}, expected {', '.join(KINDS)}")
-    runs = [run for run in result.runs if any(entry.error > 0 for entry in run.errors)]
+    runs = [run for run in result.runs if any(sample.error > 0 for sample in run.errors)]
     if result.time is None or not runs:
         raise InputError("found no error above 0, expected one: there is no reference solution, or all errors are 0")
     labels = [METHODS[run.method].title for run in runs]
@@ -62,37 +61,35 @@ def plot_comparison(
         axes.set_xscale("log")
         axes.set_yscale("log")
         handles = []
-        ends: dict[int, tuple[float, float]] = {}  # order -> step and least error, where its dotted line starts
+        line_starts: dict[int, tuple[float, float]] = {}  # order -> step and least error, where its dotted line starts
         for k, run in enumerate(runs):
-            entries = [entry for entry in run.errors if entry.error > 0]
-            x = [abs(to_float(2 * entry.eps)) if show == "error" else entry.evaluations for entry in entries]
-            look = {**_look(k), "marker": MARKS[k % len(MARKS)], "markersize": 3.5, "linewidth": 0.9}
-            axes.plot(x, [entry.error for entry in entries], **look)
-            handles.append(Line2D([], [], **look))
+            samples = [sample for sample in run.errors if sample.error > 0]
+            x = [abs(to_float(2 * sample.eps)) if show == "error" else sample.evaluations for sample in samples]
+            line_style = {**_line_style(k), "marker": MARKS[k % len(MARKS)], "markersize": 3.5, "linewidth": 0.9}
+            axes.plot(x, [sample.error for sample in samples], **line_style)
+            handles.append(Line2D([], [], **line_style))
             order = METHODS[run.method].order
-            if order not in ends or entries[0].error < ends[order][1]:
-                ends[order] = x[0], entries[0].error
+            if order not in line_starts or samples[0].error < line_starts[order][1]:
+                line_starts[order] = x[0], samples[0].error
         if show == "error":
-            _order_lines(axes, ends, abs(to_float(time_step(result.eps))))
+            # A dotted line for each order, a little below the best method of this order; a mark at the requested step.
+            low, high = axes.get_ylim()
+            for order, (step, error) in sorted(line_starts.items()):
+                y = error / 3
+                end = max(axes.get_xlim()[0], step * (low / y) ** (1 / order))
+                axes.plot(
+                    [step, end], [y, y * (end / step) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1
+                )
+                # Label the lines at small steps, where lines of different orders are far apart.
+                write_beside(axes, str(order), (end, y * (end / step) ** order), (13, 0), color="0.4", fontsize="small")
+            axes.set_ylim(low, high)
+            axes.axvline(abs(to_float(time_step(result.eps))), color="0.85", linewidth=0.8, zorder=0)
             axes.set_xlabel("time step $h$")
         else:
             axes.set_xlabel("evaluations of $f$ for one initial point")
         axes.set_ylabel(f"error at time {label_number(result.time)}")
         legend_above(figure, handles, labels, style, None, max_columns=2)
     return figure
-
-
-def _order_lines(axes: Axes, ends: dict[int, tuple[float, float]], step: float) -> None:
-    """Draw a dotted line for each order, a little below the best method of this order, and mark the requested step."""
-    low, high = axes.get_ylim()
-    for order, (x, error) in sorted(ends.items()):
-        y = error / 3
-        end = max(axes.get_xlim()[0], x * (low / y) ** (1 / order))
-        axes.plot([x, end], [y, y * (end / x) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1)
-        # Label the lines at small steps, where lines of different orders are far apart.
-        write_beside(axes, str(order), (end, y * (end / x) ** order), (13, 0), color="0.4", fontsize="small")
-    axes.set_ylim(low, high)
-    axes.axvline(step, color="0.85", linewidth=0.8, zorder=0)
 
 
 def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "loglog") -> Figure:
@@ -117,13 +114,13 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
         from matplotlib.lines import Line2D
 
         methods = [run.method for run in result.runs]
-        ended = {run.method: max(end.steps for end in run.early) for run in result.runs if run.early}
+        ended = {run.method: max(mark_style.steps for mark_style in run.early) for run in result.runs if run.early}
         labels = [
             METHODS[method].title + (f" (ended at step {ended[method]})" if method in ended else "")
             for method in methods
         ]
-        panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
-        aspect = panel * rows + legend_height(labels, style, title=True, max_columns=3)
+        panel_aspect = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
+        aspect = panel_aspect * rows + legend_height(labels, style, title=True, max_columns=3)
         figure = new_figure(style, aspect)
         height = 0.75 / rows * 72 * style.inches(aspect)[1]  # height of a panel in points
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
@@ -132,7 +129,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
             errors = np.concatenate([curve.errors for curve in curves]) if curves else np.array([])
             limit = clipped_from(result, name)
             positive = np.minimum(errors[errors > 0], limit)
-            least, largest = (positive.min(), positive.max()) if len(positive) else _NO_VALUES
+            least, largest = (positive.min(), positive.max()) if len(positive) else _DEFAULT_LIMITS
             zero = log_scale_with_zero(axes, float(least), float(largest), len(positive) < len(errors))
             if scale == "loglog":
                 axes.set_xscale("log")
@@ -140,15 +137,15 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
             else:
                 axes.set_xlim(0, result.steps)
             for curve in curves:
-                look = _look(methods.index(curve.method))
+                line_style = _line_style(methods.index(curve.method))
                 heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
-                axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **look)
-                end = {"color": look["color"], "markersize": 5, "clip_on": False}
-                beyond = np.flatnonzero(heights > limit)
-                if len(beyond):
-                    axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
+                axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **line_style)
+                mark_style = {"color": line_style["color"], "markersize": 5, "clip_on": False}
+                clipped_indices = np.flatnonzero(heights > limit)
+                if len(clipped_indices):
+                    axes.plot(curve.steps[clipped_indices[:1]], [limit], marker="^", **mark_style)
                 elif len(heights) and curve.method in ended:
-                    axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
+                    axes.plot(curve.steps[-1:], heights[-1:], marker="x", **mark_style)
             # Break the line before the name only: the name may be a formula that contains spaces.
             function, kind = result.labels[name], "relative" if result.relative[name] else "absolute"
             if "$" in function:
@@ -156,7 +153,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
                 label = f"{kind} error of{chr(10) if is_long else ' '}{function}"
             else:
                 label = f"{kind} error of " + function.replace(" ", "\N{NO-BREAK SPACE}")
-                label = wrapped(label, height, style.font_size, max_lines=2)
+                label = wrap_text(label, height, style.font_size, max_lines=2)
             axes.set_ylabel(label)
         for k, axes in enumerate(panels):
             if k >= count:
@@ -165,7 +162,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
                 axes.set_xlabel("step $n$")
                 axes.tick_params(labelbottom=True)
         title = rf"time step $2\varepsilon = {label_number(time_step(result.eps))}$"
-        handles = [Line2D([], [], linewidth=0.9, **_look(k)) for k in range(len(methods))]
+        handles = [Line2D([], [], linewidth=0.9, **_line_style(k)) for k in range(len(methods))]
         legend_above(figure, handles, labels, style, title, max_columns=3)
     return figure
 
@@ -176,11 +173,11 @@ def clipped_from(result: Comparison, name: str) -> float:
     The bound is 1000, or ten times the largest error of completed orbits if this is larger. Without a bound a diverging
     orbit would flatten all other curves.
     """
-    whole = {run.method for run in result.runs if not run.early}
-    completed = [curve.errors for curve in result.curves if curve.function == name and curve.method in whole]
-    return max([_LOST, *(10 * float(errors.max()) for errors in completed if len(errors))])
+    methods = {run.method for run in result.runs if not run.early}
+    curves = [curve for curve in result.curves if curve.function == name and curve.method in methods]
+    return max([_MIN_CLIPPED, *(10 * curve.largest for curve in curves if len(curve.errors))])
 
 
-def _look(k: int) -> dict[str, Any]:
+def _line_style(k: int) -> dict[str, Any]:
     """Return color and line style of the k-th method; after seven methods colors repeat with other line styles."""
     return {"color": COLORS[k % len(COLORS)], "linestyle": LINES[(k + k // len(COLORS)) % len(LINES)]}

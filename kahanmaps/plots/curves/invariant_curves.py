@@ -27,7 +27,7 @@ from kahanmaps.errors import HypothesisError, InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transformed
+from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transform_cubic
 
 MAX_POINTS = 1_000_000
 MAX_STARTS = 7  # the number of colors
@@ -132,8 +132,8 @@ def find_invariant_curves(
     field = RR(BITS)
     splitting = Splitting(normal_form.form, field, epsilon, normal_form.T)
     with field.working():
-        frames = _frames(splitting)
-        runs, originals, poles = [], [], []
+        frames = _planes_without_orbits(splitting)
+        orbits_by_start, originals, poles = [], [], []
         for number, start in enumerate(starts, 1):
             triples = splitting.triples([arb(rational(entry)) for entry in start])
             orbits: list[tuple[Numbers, Numbers]] = []
@@ -142,47 +142,48 @@ def find_invariant_curves(
             for k, frame in enumerate(frames, 1):
                 f, g, m, n = frame.matrix.entries()
                 U, V, W = triples[frame.index]
-                first = f * U + g * V, m * U + n * V, W
-                name = f"start {number} of {len(starts)}" if len(starts) > 1 else "orbit"
-                name = f"{name}: plane {k} of {len(frames)}"
-                orbits.append(_orbit(frame.block, first, epsilon, length, name, progress))
+                initial_triple = f * U + g * V, m * U + n * V, W
+                label = f"start {number} of {len(starts)}" if len(starts) > 1 else "orbit"
+                label = f"{label}: plane {k} of {len(frames)}"
+                orbits.append(_compute_orbit(frame.block, initial_triple, epsilon, length, label, progress))
                 if len(orbits[-1][0]) < length:
                     length = pole = len(orbits[-1][0])
-                curves.append(_cubic(frame, first, epsilon) if frame.is_real else None)
+                curves.append(_cubic_through(frame, initial_triple, epsilon) if frame.is_real else None)
             orbits = [(u[:length], v[:length]) for u, v in orbits]
-            runs.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
+            orbits_by_start.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
             # The orbit in the variables of the system, with a row for each step.
-            original = np.zeros((length, splitting.dim))
+            points = np.zeros((length, splitting.dim))
             for frame, (u, v) in zip(frames, orbits, strict=True):
                 a, b, c, d = (complex(_to_floating_point(entry)) for entry in frame.matrix.inv().entries())
-                old = [a * u + b * v, c * u + d * v]
+                # In a complex plane the splitting has columns for real and imaginary parts.
+                zs = [a * u + b * v, c * u + d * v]
                 columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
-                parts = [part for z in old for part in ((z.real, z.imag) if frame.root.imag else (z.real,))]
-                original += np.stack(parts, axis=1) @ columns.T
-            originals.append(original)
+                real_parts = [x for z in zs for x in ((z.real, z.imag) if frame.root.imag else (z.real,))]
+                points += np.stack(real_parts, axis=1) @ columns.T
+            originals.append(points)
             poles.append(pole)
     planes = tuple(
-        replace(frame, orbits=of_frame) for frame, of_frame in zip(frames, zip(*runs, strict=True), strict=True)
+        replace(frame, orbits=orbits) for frame, orbits in zip(frames, zip(*orbits_by_start, strict=True), strict=True)
     )
     return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), normal_form.text)
 
 
-def _frames(splitting: Splitting) -> list[InvariantPlane]:
+def _planes_without_orbits(splitting: Splitting) -> list[InvariantPlane]:
     """Return the planes, still without orbits: first the real planes, by increasing root."""
     rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
     frames = []
     for index, plane in enumerate(splitting.planes):
         root = plane.residue([arb(0), arb(1)])
         if isinstance(root, arb):
-            exact = [number for number in rational_roots if root.contains(arb(number))]
-            text = format_number(exact[0]) if exact else f"{float(root.mid()):.5g}"
+            exact_roots = [number for number in rational_roots if root.contains(arb(number))]
+            text = format_number(exact_roots[0]) if exact_roots else f"{float(root.mid()):.5g}"
             shape, matrix = symmetric_coordinates(plane.block)
         else:
             # If the ball of the real part contains 0, the real part is taken as 0.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
-        coefficients = [entry.mid() for entry in transformed(plane.block, matrix)]
+        coefficients = [entry.mid() for entry in transform_cubic(plane.block, matrix)]
         h = tuple(map(_to_floating_point, coefficients))
         if not np.isfinite(h).all():
             raise InputError(
@@ -194,39 +195,39 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
     return sorted(frames, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
 
 
-def _orbit(
-    block: PlanarBlock, first: Triple, eps: fmpq, length: int, name: str, progress: Callable[[str], None]
+def _compute_orbit(
+    block: PlanarBlock, initial_triple: Triple, eps: fmpq, length: int, label: str, progress: Callable[[str], None]
 ) -> tuple[Numbers, Numbers]:
     """Return u and v of `length` points of an orbit, fewer if it reaches a pole."""
-    P = first
+    P = initial_triple
     us, vs = [], []
-    step = 2 * arb(eps)
-    closest = max(abs(entry) for entry in (block.a, block.b, block.c, block.d)) * arb(2) ** -_POLE_BITS
+    time_step = 2 * arb(eps)
+    pole_bound = max(abs(entry) for entry in (block.a, block.b, block.c, block.d)) * arb(2) ** -_POLE_BITS
     for k in range(length):
         U, V, W = P
-        if k and abs(W) <= closest * max(abs(U), abs(V)):
+        if k and abs(W) <= pole_bound * max(abs(U), abs(V)):
             break
-        us.append(_to_floating_point(U / W / step))
-        vs.append(_to_floating_point(V / W / step))
+        us.append(_to_floating_point(U / W / time_step))
+        vs.append(_to_floating_point(V / W / time_step))
         P = block.image(P)
-        size = max(abs(entry) for entry in P)
+        norm = max(abs(entry) for entry in P)
         # An indeterminacy point ends the orbit at the next step, as a pole does.
-        P = (U, V, W * 0) if size == 0 else tuple((entry / size).mid() for entry in P)
+        P = (U, V, W * 0) if norm == 0 else tuple((entry / norm).mid() for entry in P)
         if k % _PROGRESS_EVERY == 0:
-            progress(f"{name}, step {k}")
+            progress(f"{label}, step {k}")
     return np.array(us), np.array(vs)
 
 
-def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
+def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> PlaneCubic:
     """Return the curve through the initial point, with numerator and denominator scaled to moderate size."""
-    U, V, W = first
-    step = 2 * arb(eps)
-    u, v = U / W / step, V / W / step
+    U, V, W = initial_triple
+    time_step = 2 * arb(eps)
+    u, v = U / W / time_step, V / W / time_step
     p, q, r = frame.block.D
-    level = frame.block.h(u, v), 1 + (p * U * U + q * U * V + r * V * V) / (W * W)
-    parts = [arb(0) if part.contains(arb(0)) else part for part in level]
-    size = max(abs(part) for part in parts)
-    numerator, denominator = (float(part / size) if size > 0 else 0.0 for part in parts)
+    fraction_balls = frame.block.h(u, v), 1 + (p * U * U + q * U * V + r * V * V) / (W * W)
+    fraction = [arb(0) if value.contains(arb(0)) else value for value in fraction_balls]
+    scale = max(abs(value) for value in fraction)
+    numerator, denominator = (float(value / scale) if scale > 0 else 0.0 for value in fraction)
     a, b, c, d = (entry.real for entry in frame.h)
     cubic = PlaneCubic((a, b, c, d), float(arb(eps)), numerator, denominator)
     distances = float(abs(u)), float(abs(v))

@@ -18,7 +18,7 @@ from kahanmaps.plots.portraits.windows import Window
 
 MAX_LEVELS = 200
 GRID = 301  # grid lines in each direction
-_NEWTON = 8
+_NEWTON_STEPS = 8
 
 
 Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices
@@ -27,11 +27,11 @@ Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
     """Return the finite values of `function` at initial points (n, dim), increasing and distinct up to rounding."""
     values = np.sort(function(starts))
-    kept: list[float] = []
+    levels: list[float] = []
     for value in values[np.isfinite(values)].tolist():
-        if not kept or abs(value - kept[-1]) > 1e-10 * max(abs(value), abs(kept[-1])):
-            kept.append(value)
-    return tuple(kept)
+        if not levels or abs(value - levels[-1]) > 1e-10 * max(abs(value), abs(levels[-1])):
+            levels.append(value)
+    return tuple(levels)
 
 
 def level_curves(
@@ -48,32 +48,32 @@ def level_curves(
     """
     if len(plane) != 2 or len(window) != 2:
         raise InputError("level curves are for pictures of two variables")
-    sides = (function.function.numerator.degrees(), function.function.denominator.degrees())
-    further = [k for k in range(dim) if k not in plane and any(int(degrees[k]) > 0 for degrees in sides)]
-    if further:
+    degrees_of_parts = (function.function.numerator.degrees(), function.function.denominator.degrees())
+    outside = [k for k in range(dim) if k not in plane and any(int(degrees[k]) > 0 for degrees in degrees_of_parts)]
+    if outside:
         names = function.function.names
         raise InputError(
-            f"{function.name}: found {', '.join(names[k] for k in further)} in it, expected a function of "
+            f"{function.name}: found {', '.join(names[k] for k in outside)} in it, expected a function of "
             f"{names[plane[0]]} and {names[plane[1]]} alone: the level curves of others are not curves in this plane"
         )
     if len(levels) > MAX_LEVELS:
         raise InputError(f"found {len(levels)} levels, expected at most {MAX_LEVELS}: choose some of them")
 
-    def parts(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        full = np.zeros((*points.shape[:-1], dim))
-        full[..., list(plane)] = points
-        return function.parts(full)
+    def fraction_at(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        full_points = np.zeros((*points.shape[:-1], dim))
+        full_points[..., list(plane)] = points
+        return function.parts(full_points)
 
-    on_grid = parts(_grid(window)[-1])
+    fraction_on_grid = fraction_at(_grid(window)[-1])
     curves = []
     for level in levels:
 
         def value(points: FloatArray, level: float = level) -> FloatArray:
-            numerator, denominator = parts(points)
+            numerator, denominator = fraction_at(points)
             return numerator - level * denominator
 
         with np.errstate(all="ignore"):
-            curves.append(zero_curves(value, window, on_grid[0] - level * on_grid[1]))
+            curves.append(zero_curves(value, window, fraction_on_grid[0] - level * fraction_on_grid[1]))
     return tuple(curves)
 
 
@@ -99,24 +99,21 @@ def zero_curves(
         values = value(points) if on_grid is None else on_grid
         if not np.isfinite(values).all():
             values = np.ma.masked_invalid(values)
-        lines = [np.asarray(line) for line in contour_generator(xs, ys, values).lines(0.0)]
+        contours = [np.asarray(vertices) for vertices in contour_generator(xs, ys, values).lines(0.0)]
         # Newton's method moves each vertex along the gradient, by less than the mesh size of the grid.
-        for line in lines:
-            moved = line.copy()
-            for _ in range(_NEWTON):
+        for vertices in contours:
+            x = vertices.copy()
+            for _ in range(_NEWTON_STEPS):
                 gradient = np.stack(
-                    [
-                        (value(moved + e * step) - value(moved - e * step)) / (2 * step[k])
-                        for k, e in enumerate(np.eye(2))
-                    ],
+                    [(value(x + e * step) - value(x - e * step)) / (2 * step[k]) for k, e in enumerate(np.eye(2))],
                     axis=-1,
                 )
-                scaled = gradient * mesh  # in units of the mesh, so that both axes have equal weight
-                moved = moved - (value(moved) / (scaled**2).sum(axis=-1))[:, None] * scaled * mesh
-            good = np.isfinite(moved).all(axis=-1) & (np.abs(moved - line) <= mesh).all(axis=-1)
-            good &= np.abs(value(moved)) <= np.abs(value(line))
-            line[good] = moved[good]
-    return tuple(lines)
+                slope = gradient * mesh  # in units of the mesh, so that both axes have equal weight
+                x = x - (value(x) / (slope**2).sum(axis=-1))[:, None] * slope * mesh
+            is_closer = np.isfinite(x).all(axis=-1) & (np.abs(x - vertices) <= mesh).all(axis=-1)
+            is_closer &= np.abs(value(x)) <= np.abs(value(vertices))
+            vertices[is_closer] = x[is_closer]
+    return tuple(contours)
 
 
 def _grid(window: Window) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -60,8 +60,8 @@ class PlaneCubic:
     def length(self) -> float:
         """The smallest distance from the origin to the conic 1 + eps^2 D = 0; 1 if the conic is empty."""
         t = np.linspace(0, np.pi, 721)
-        largest = self.eps * self.eps * float(np.abs(self.D_at(np.cos(t), np.sin(t))).max())
-        return float(1 / np.sqrt(largest)) if largest > 0 else 1.0
+        max_value = self.eps * self.eps * float(np.abs(self.D_at(np.cos(t), np.sin(t))).max())
+        return float(1 / np.sqrt(max_value)) if max_value > 0 else 1.0
 
     def value(self, points: Floats) -> Floats:
         """Return the values of denominator h - numerator (1 + eps^2 D) at points (..., 2)."""
@@ -111,7 +111,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 
     >>> block = PlanarBlock(arb(0), arb(1), arb(1), arb(0))
     >>> shape, matrix = symmetric_coordinates(block)
-    >>> shape, [round(float(entry), 3) + 0 for entry in transformed(block, matrix)]
+    >>> shape, [round(float(entry), 3) + 0 for entry in transform_cubic(block, matrix)]
     ('kappa (u^3 - 3 u v^2)', [0.31, 0.0, -0.931, 0.0])
     """
     identity = arb_mat([[1, 0], [0, 1]])
@@ -124,13 +124,13 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
         p, q, r = (-entry for entry in block.D)
         size = (p * r - q * q / 4).sqrt()
         stretch = (p / size).sqrt()
-        upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
+        to_circle = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
         # Now h is the real part of (a - i b/3) (u + i v)^3.
-        a, b, _, _ = transformed(block, upright)
+        a, b, _, _ = transform_cubic(block, to_circle)
         # atan2 of a ball that meets the branch cut would be the interval [-pi, pi], so the ball is rotated away from
         # the cut.
         angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
-        return THREE_LINES, arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
+        return THREE_LINES, arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * to_circle
     # D is a product of two real forms L and M, and h = s L^3 + t M^3; scale L and M so that s = t, then rotate.
     p, q, r = block.D
     root = (q * q - 4 * p * r).sqrt()
@@ -144,12 +144,12 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
     scale = 1 / (det * ratio).sqrt()
     if s < 0:
         scale = -scale
-    half = arb(1) / arb(2).sqrt()
+    sqrt_half = arb(1) / arb(2).sqrt()
     forms = arb_mat([[entry * scale for entry in L], [entry * scale * ratio for entry in M]])
-    return ONE_LINE, arb_mat([[half, half], [-half, half]]) * forms
+    return ONE_LINE, arb_mat([[sqrt_half, sqrt_half], [-sqrt_half, sqrt_half]]) * forms
 
 
-def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
+def transform_cubic(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
     """Return the coefficients of the cubic in the coordinates `matrix` (of determinant 1) times the old coordinates."""
     f, g, k, l = matrix.entries()
     # u = l u' - g v', v = -k u' + f v'

@@ -18,17 +18,17 @@ from kahanmaps.errors import InputError
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPlane
 from kahanmaps.plots.curves.level_sets import zero_curves
 from kahanmaps.plots.curves.plane_cubics import THREE_LINES, Floats, PlaneCubic
-from kahanmaps.plots.figures import MAX_VECTOR_POINTS, drawing, label_of, new_figure, plain, write_beside
-from kahanmaps.plots.portraits.windows import Window, outside, window_of
+from kahanmaps.plots.figures import MAX_VECTOR_POINTS, drawing, escape_dollars, label_of, new_figure, write_beside
+from kahanmaps.plots.portraits.windows import Window, count_outside, window_of
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_CURVE, _FLOW = "#9a9a9a", "#444444"
-_CROWDED = 0.06  # fraction of the panel width: a number closer to the previous one would cover it
-_NUMBERED = 4  # number of steps whose dots are numbered
+_CURVE_COLOR, _FLOW_COLOR = "#9a9a9a", "#444444"
+_MIN_DISTANCE = 0.06  # fraction of the panel width: a number closer to the previous one would cover it
+_NUMBERED_STEPS = 4  # number of steps whose dots are numbered
 
 
 def plot_invariant_curves(
@@ -51,12 +51,12 @@ def plot_invariant_curves(
     panels = panels_of(curves)
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
-    letter = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
-    columns = min(columns, max(1, int(style.width / (12 * letter))))  # a panel is at least 12 letters wide
+    letter_size = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
+    columns = min(columns, max(1, int(style.width / (12 * letter_size))))  # a panel is at least 12 letters wide
     rows = ceil(count / columns)
     # The panels are squares, with space for letters and a color bar.
-    side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
-    height = rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter
+    panel_width = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter_size)
+    height = rows * (panel_width + (4.0 if projective else 5.2) * letter_size) + 4.6 * letter_size
     with drawing(style):
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
@@ -71,8 +71,8 @@ def plot_invariant_curves(
         if original is not None:
             axes = next(grid)
             clouds = [(x[:, original[0]], x[:, original[1]]) for x in curves.originals]
-            x, y = (label_of(curves.variables[k]) for k in original)
-            Rectangle.around(clouds).prepare(axes, (x, y))
+            axis_labels = label_of(curves.variables[original[0]]), label_of(curves.variables[original[1]])
+            Rectangle.around(clouds).prepare(axes, axis_labels)
             axes.set_title("orbit")
             for number, cloud in enumerate(clouds):
                 pen.orbit(axes, *cloud, number, None)
@@ -84,18 +84,18 @@ def plot_invariant_curves(
             names = [labels[k] if k < len(labels) else f"start {k + 1}" for k in range(len(curves.poles))]
             ends = ["" if pole is None else f" (a pole at step {pole})" for pole in curves.poles]
             handles = [
-                Line2D([], [], linestyle="none", marker=MARKS[k], color=COLORS[k], label=plain(name) + end)
+                Line2D([], [], linestyle="none", marker=MARKS[k], color=COLORS[k], label=escape_dollars(name) + end)
                 for k, (name, end) in enumerate(zip(names, ends, strict=True))
             ]
             figure.legend(handles=handles, loc="outside lower center", ncols=2)
         elif steps:
-            how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
-            bar = figure.colorbar(ScalarMappable(pen.scale, COLOR_MAP), ax=figure.axes, **how)
+            options: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
+            colorbar = figure.colorbar(ScalarMappable(pen.scale, COLOR_MAP), ax=figure.axes, **options)
             pole = curves.poles[0]
             ending = "" if pole is None else f"; a pole at step {pole} ends the orbit"
-            bar.set_label(f"step $n$ (rings mark steps 0 to {min(_NUMBERED - 1, steps)}{ending})")
-            bar.outline.set_linewidth(0.4)
-            bar.locator = MaxNLocator(nbins=6, integer=True)
+            colorbar.set_label(f"step $n$ (rings mark steps 0 to {min(_NUMBERED_STEPS - 1, steps)}{ending})")
+            colorbar.outline.set_linewidth(0.4)
+            colorbar.locator = MaxNLocator(nbins=6, integer=True)
     return figure
 
 
@@ -121,24 +121,24 @@ class _Pen:
     def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
         count = len(x)
         size = 11.0 if count <= 120 else 6.0 if count <= 500 else 2.0 if count <= 5_000 else 0.6
-        how: dict[str, Any] = {"color": COLORS[number], "marker": MARKS[number]}
+        options: dict[str, Any] = {"color": COLORS[number], "marker": MARKS[number]}
         if self.scale is not None:
-            how = {"c": np.arange(count), "norm": self.scale, "cmap": COLOR_MAP}
-        axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > MAX_VECTOR_POINTS, **how)
+            options = {"c": np.arange(count), "norm": self.scale, "cmap": COLOR_MAP}
+        axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > MAX_VECTOR_POINTS, **options)
         if self.scale is None:
             return
-        for k in range(min(_NUMBERED, count)):
+        for k in range(min(_NUMBERED_STEPS, count)):
             axes.plot(x[k], y[k], "o", markersize=4.2, fillstyle="none", color="black", markeredgewidth=0.5, zorder=3)
             limits = np.array([axes.get_xlim(), axes.get_ylim()])
             low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
-            places = (np.stack([x[: k + 1], y[: k + 1]], axis=1) - low) / length
-            if np.any(np.hypot(*(places[:k] - places[k]).T) < _CROWDED):
+            positions = (np.stack([x[: k + 1], y[: k + 1]], axis=1) - low) / length
+            if np.any(np.hypot(*(positions[:k] - positions[k]).T) < _MIN_DISTANCE):
                 continue
-            aside = np.array([0.7, 0.7]) if normals is None else normals[k]
-            if np.any(np.abs(places[k] + 2 * _CROWDED * aside - 0.5) > 0.5):  # outside the panel
-                aside = -aside
-            how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
-            write_beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
+            shift = np.array([0.7, 0.7]) if normals is None else normals[k]
+            if np.any(np.abs(positions[k] + 2 * _MIN_DISTANCE * shift - 0.5) > 0.5):  # outside the panel
+                shift = -shift
+            options = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
+            write_beside(axes, str(k), (x[k], y[k]), tuple(8 * shift), 1.5, zorder=4, **options)
 
 
 def _draw_plane(
@@ -157,24 +157,24 @@ def _draw_plane(
     for orbit in plane.orbits:
         if orbit.cubic is None:
             continue
-        for rows in view.curves(orbit.cubic):
-            axes.plot(*rows.T, color=_CURVE, linewidth=0.9, zorder=1)
+        for vertices in view.curves(orbit.cubic):
+            axes.plot(*vertices.T, color=_CURVE_COLOR, linewidth=0.9, zorder=1)
         if flow:
-            for rows in view.curves(orbit.cubic.flow_through(float(orbit.u[0]), float(orbit.v[0]))):
-                axes.plot(*rows.T, color=_FLOW, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
+            for vertices in view.curves(orbit.cubic.flow_through(float(orbit.u[0]), float(orbit.v[0]))):
+                axes.plot(*vertices.T, color=_FLOW_COLOR, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
         normals = None
         if orbit.cubic is not None:  # unit normals of the drawn curve, along which the numbers are placed
-            across, along = orbit.cubic.gradient(x[:_NUMBERED], y[:_NUMBERED])
-            rows = np.stack([across, along * view.stretch], axis=1)
-            length = np.linalg.norm(rows, axis=1, keepdims=True)
-            normals = np.where(length > 0, rows / np.where(length > 0, length, 1), np.sqrt(0.5))
+            along_u, along_v = orbit.cubic.gradient(x[:_NUMBERED_STEPS], y[:_NUMBERED_STEPS])
+            gradients = np.stack([along_u, along_v * view.stretch], axis=1)
+            length = np.linalg.norm(gradients, axis=1, keepdims=True)
+            normals = np.where(length > 0, gradients / np.where(length > 0, length, 1), np.sqrt(0.5))
         pen.orbit(axes, *view.place(x, y), number, normals)
 
 
 Cloud = tuple[Floats, Floats]
 
-_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
+_SHOWN_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
 _CUT = 0.7390851  # a direction in which no form with simple coefficients vanishes
 _MARGIN = 0.08  # fraction of the width added on either side for the numbers beside the dots
 
@@ -189,7 +189,7 @@ class Rectangle:
     @classmethod
     def of(cls, clouds: Sequence[Cloud], window: Window) -> Rectangle:
         """Return a window with the number of these dots outside it."""
-        return cls(window, outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
+        return cls(window, count_outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
 
     @classmethod
     def around(cls, clouds: Sequence[Cloud]) -> Rectangle:
@@ -197,9 +197,11 @@ class Rectangle:
         points, starts = (
             np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
         )
-        sizes = np.hypot(*points.T)
-        most = np.quantile(sizes, _SHARE, method="higher")
-        return cls.of(clouds, window_of(points[sizes <= most] if sizes.max() > 2 * most else points, starts))
+        distances = np.hypot(*points.T)
+        max_distance = np.quantile(distances, _SHOWN_SHARE, method="higher")
+        if distances.max() > 2 * max_distance:
+            points = points[distances <= max_distance]
+        return cls.of(clouds, window_of(points, starts))
 
     @property
     def stretch(self) -> float:
@@ -235,8 +237,8 @@ class Disc:
         cubic = plane.orbits[0].cubic
         if cubic is not None and plane.shape != "0":
             return cls(cubic.length)
-        sizes = np.concatenate([np.hypot(x, y) for x, y in clouds_of(plane, column)])
-        return cls(float(np.median(sizes)) or 1.0)
+        distances = np.concatenate([np.hypot(x, y) for x, y in clouds_of(plane, column)])
+        return cls(float(np.median(distances)) or 1.0)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
         """Draw the rim, and hide the axes."""
@@ -255,11 +257,10 @@ class Disc:
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
         """Return the components (n, 2) of a curve in the panel; each is closed or joins two points of the rim."""
-        turn = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
-        pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), turn)
-        return tuple(
-            np.sin(rows[:, 1:]) * np.stack([np.cos(rows[:, 0]), np.sin(rows[:, 0])], axis=1) for rows in pieces
-        )
+        domain = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
+        pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), domain)
+        directions = [np.concatenate([np.cos(p[:, :1]), np.sin(p[:, :1])], axis=1) for p in pieces]
+        return tuple(np.sin(p[:, 1:]) * direction for p, direction in zip(pieces, directions, strict=True))
 
 
 def _rows(cloud: Cloud) -> Floats:
@@ -282,11 +283,13 @@ def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
     clouds = clouds_of(plane, column)
     ranges = []
     for low, high in Rectangle.around(clouds).window:
-        middle, half = (low + high) / 2, (high - low) / 2
-        ranges.append((min(low, -0.1 * half), max(high, 0.1 * half)) if abs(middle) <= 3 * half else (low, high))
+        if abs(low + high) <= 3 * (high - low):
+            margin = 0.1 * ((high - low) / 2)
+            low, high = min(low, -margin), max(high, margin)
+        ranges.append((low, high))
     if plane.shape == THREE_LINES and all(low <= 0 <= high for low, high in ranges):
-        reach = max(max(abs(low), abs(high)) for low, high in ranges)
-        ranges = [(-reach, reach), (-reach, reach)]
+        max_coordinate = max(max(abs(low), abs(high)) for low, high in ranges)
+        ranges = [(-max_coordinate, max_coordinate), (-max_coordinate, max_coordinate)]
     margins = [_MARGIN * (high - low) for low, high in ranges]
-    window = tuple((low - more, high + more) for (low, high), more in zip(ranges, margins, strict=True))
+    window = tuple((low - margin, high + margin) for (low, high), margin in zip(ranges, margins, strict=True))
     return Rectangle.of(clouds, window)

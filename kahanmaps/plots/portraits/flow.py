@@ -26,11 +26,11 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the origin and (1, ..., 1)
-_ZERO = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
+_ZERO_TOLERANCE = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
 _ARROWS = 21  # number of arrows along each side of the window
-_FINE = 400  # number of steps of a curve that crosses the window
+_STEPS_ACROSS = 400  # number of steps of a curve that crosses the window
 _MAX_STEPS = 6000  # length of a curve: fifteen times the window
-_SLOW = 1e-4  # fraction of the largest speed in the window: curves stop near an equilibrium
+_MIN_SPEED_RATIO = 1e-4  # fraction of the largest speed in the window: curves stop near an equilibrium
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,16 +50,16 @@ class Equilibrium:
     def kind(self) -> str:
         """The kind given by the eigenvalues; a center of the linear part need not be a center of the vector field."""
         values, real = self.values, self.values.real
-        least = _ZERO * max(float(np.abs(values).max()), _ZERO)
-        if (np.abs(values) <= least).any():
+        threshold = _ZERO_TOLERANCE * max(float(np.abs(values).max()), _ZERO_TOLERANCE)
+        if (np.abs(values) <= threshold).any():
             return DEGENERATE
-        if (real > least).any() and (real < -least).any():
+        if (real > threshold).any() and (real < -threshold).any():
             return SADDLE
-        if (np.abs(real) <= least).all():
+        if (np.abs(real) <= threshold).all():
             return CENTER
-        if (np.abs(real) <= least).any():
+        if (np.abs(real) <= threshold).any():
             return DEGENERATE
-        return FOCUS if (np.abs(values.imag) > least).any() else NODE
+        return FOCUS if (np.abs(values.imag) > threshold).any() else NODE
 
 
 def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
@@ -71,20 +71,20 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
     """
     n = system.dim
     f = VectorField(system)
-    drawn = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
+    random_points = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
     all_equilibria: list[Equilibrium] = []
-    for x in (np.zeros(n), np.ones(n), *drawn):
+    for x in (np.zeros(n), np.ones(n), *random_points):
         for _ in range(_NEWTON_STEPS):
-            value, bound = f(x), 1e-12 * (1 + float(np.abs(x).max()))
-            if np.abs(value).max() <= bound:
-                nearest = np.round(x, 9)
-                point = nearest if np.abs(f(nearest)).max() <= bound else x
+            velocity, tolerance = f(x), 1e-12 * (1 + float(np.abs(x).max()))
+            if np.abs(velocity).max() <= tolerance:
+                rounded_point = np.round(x, 9)
+                point = rounded_point if np.abs(f(rounded_point)).max() <= tolerance else x
                 # Near a degenerate equilibrium Newton's method ends at slightly different points: keep only one of
                 # these points.
-                if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
+                if not any(np.allclose(point, equilibrium.point, atol=1e-3) for equilibrium in all_equilibria):
                     all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # f' may be singular
+            x = x + np.linalg.lstsq(f.jacobian(x), -velocity, rcond=1e-10)[0]  # f' may be singular
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
     return all_equilibria
@@ -117,33 +117,33 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     """
     if system.dim != 2 or sorted(plane) != [0, 1]:
         return Flow(np.zeros((0, 2)), np.zeros((0, 2)))
-    order = list(plane)  # a permutation of (0, 1), hence its own inverse
+    permutation = list(plane)  # a permutation of (0, 1), hence its own inverse
     low, high = (np.array(side) for side in zip(*window, strict=True))
     f = VectorField(system)
-    middles = (np.arange(_ARROWS) + 0.5) / _ARROWS
-    places = low + (high - low) * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
-    arrows = f(places[:, order])[:, order] / (high - low)
-    length = np.linalg.norm(arrows, axis=1, keepdims=True)
+    cell_centers = (np.arange(_ARROWS) + 0.5) / _ARROWS
+    places = low + (high - low) * np.stack(np.meshgrid(cell_centers, cell_centers), axis=-1).reshape(-1, 2)
+    arrows = f(places[:, permutation])[:, permutation] / (high - low)
+    lengths = np.linalg.norm(arrows, axis=1, keepdims=True)
     with np.errstate(all="ignore"):
-        arrows = np.where(length > 0, arrows / length, 0)
+        arrows = np.where(lengths > 0, arrows / lengths, 0)
     all_equilibria = equilibria(system)
     if len(all_equilibria) > 2**system.dim:  # more than isolated equilibria can be (Bezout): they fill curves
         all_equilibria = []
-    shown = [
+    visible_equilibria = [
         equilibrium
         for equilibrium in all_equilibria
-        if np.all((equilibrium.point[order] >= low) & (equilibrium.point[order] <= high))
+        if np.all((equilibrium.point[permutation] >= low) & (equilibrium.point[permutation] <= high))
     ]
-    box = tuple(window[k] for k in order)
-    size = np.array([b - a for a, b in box])
-    branches = []
-    for saddle in (equilibrium for equilibrium in shown if equilibrium.kind == SADDLE):
+    box = tuple(window[k] for k in permutation)
+    widths = np.array([b - a for a, b in box])
+    separatrices = []
+    for saddle in (equilibrium for equilibrium in visible_equilibria if equilibrium.kind == SADDLE):
         for value, vector in zip(saddle.values.real, saddle.vectors.real.T, strict=True):
-            offset = vector / np.linalg.norm(vector / size) * 1e-3
+            offset = vector / np.linalg.norm(vector / widths) * 1e-3
             for start in (saddle.point + offset, saddle.point - offset):
-                branches.append(np.vstack([saddle.point, solution(f, start, box, np.copysign(np.inf, value))]))
-    kinds = tuple((equilibrium.kind, equilibrium.point[order]) for equilibrium in shown)
-    return Flow(places, arrows, kinds, tuple(curve[:, order] for curve in branches))
+                separatrices.append(np.vstack([saddle.point, solution(f, start, box, np.copysign(np.inf, value))]))
+    kinds_and_points = tuple((equilibrium.kind, equilibrium.point[permutation]) for equilibrium in visible_equilibria)
+    return Flow(places, arrows, kinds_and_points, tuple(curve[:, permutation] for curve in separatrices))
 
 
 def projected_solutions(
@@ -175,25 +175,25 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     (True, True)
     """
     low, high = (np.array(side, dtype=np.float64) for side in zip(*box, strict=True))
-    size, middle, step = high - low, (low + high) / 2, 1 / _FINE
+    size, center, step = high - low, (low + high) / 2, 1 / _STEPS_ACROSS
     sign = -1.0 if time is not None and time < 0 else 1.0
 
     def speed(x: FloatArray) -> float:
         return float(np.linalg.norm(f(x) / size))
 
     def direction(x: FloatArray) -> FloatArray:
-        value: FloatArray = sign * f(x)
-        norm = float(np.linalg.norm(value / size))
-        return value / norm if norm > 0 else value
+        velocity: FloatArray = sign * f(x)
+        norm = float(np.linalg.norm(velocity / size))
+        return velocity / norm if norm > 0 else velocity
 
-    stop = _SLOW * max(map(speed, (low, high, middle, start)))
-    points, x, spent = [start], start, 0.0
-    for count in range(_MAX_STEPS):
-        pace = speed(x)
-        spent += step / pace if pace > 0 else np.inf
+    min_speed = _MIN_SPEED_RATIO * max(map(speed, (low, high, center, start)))
+    points, x, elapsed = [start], start, 0.0
+    for step_number in range(_MAX_STEPS):
+        current_speed = speed(x)
+        elapsed += step / current_speed if current_speed > 0 else np.inf
         # A separatrix (no time limit) starts slowly at its saddle, so a small speed stops only long curves.
-        slow = pace <= stop and (count > 2 * _FINE or not np.isinf(time or 0.0))
-        if slow or (time is not None and spent > abs(time)) or np.abs((x - middle) / size).max() > 1.5:
+        is_slow = current_speed <= min_speed and (step_number > 2 * _STEPS_ACROSS or not np.isinf(time or 0.0))
+        if is_slow or (time is not None and elapsed > abs(time)) or np.abs((x - center) / size).max() > 1.5:
             break
         k1 = direction(x)
         k2 = direction(x + step / 2 * k1)
@@ -201,7 +201,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
         x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + direction(x + step * k3))
         if not np.isfinite(x).all():
             break
-        if count > 4 and np.linalg.norm((x - start) / size) < 0.6 * step:
+        if step_number > 4 and np.linalg.norm((x - start) / size) < 0.6 * step:
             points.append(start)
             break
         points.append(x)
@@ -210,11 +210,11 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
 COUNT = 16
 _CENTERS = 4  # maximal number of equilibria tried as centers of initial points
-_SIZES = 24
+_MAX_SIZES = 24
 _SHRINK = 0.8
-_STEPS = 300
+_TRIAL_STEPS = 300
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_FAR = 4.0  # an orbit stays if its distance from the center never exceeds this multiple of the largest initial one
+_MAX_GROWTH = 4.0  # an orbit stays nearby if its distance from the center never exceeds this multiple of the largest
 
 
 def automatic_starts(
@@ -233,37 +233,37 @@ def automatic_starts(
     """
     plane = [index for index in plane if index < system.dim][:2]
     # Equilibria by increasing expansion, in a tie those without negative coordinates first; then the origin.
-    order = sorted(
+    sorted_equilibria = sorted(
         equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
     )
-    centers = [equilibrium.point for equilibrium in order[:_CENTERS]]
+    centers = [equilibrium.point for equilibrium in sorted_equilibria[:_CENTERS]]
     if all(center.any() for center in centers):
         centers.append(np.zeros(system.dim))
-    others = [index for index in range(system.dim) if index not in plane]
+    other_indices = [index for index in range(system.dim) if index not in plane]
     candidates: list[tuple[int, FloatArray]] = []
     for center in centers:
         # For a homogeneous field, smaller initial points around the origin only move more slowly.
         is_scaled = system.is_homogeneous and not center.any()
-        for k in range(1 if is_scaled else _SIZES):
+        for k in range(1 if is_scaled else _MAX_SIZES):
             size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SHRINK**k
             starts = np.tile(center, (COUNT, 1))
             if is_scaled and len(plane) == 2:
                 angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one to another
                 starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-                starts[:, others] += size / 5
+                starts[:, other_indices] += size / 5
             else:
-                shares = np.arange(1, COUNT + 1) / COUNT * size
-                for index, part in zip(plane, (1.0, 0.25), strict=False):
-                    starts[:, index] += part * shares
-                for place, index in enumerate(others):
-                    starts[:, index] += shares / (4 + place)
-            ensemble = ensemble_for(system, eps, starts, _STEPS, backward=backward)
-            points = np.concatenate(list(ensemble.records(_STEPS, 1)))
+                offsets = np.arange(1, COUNT + 1) / COUNT * size
+                for index, weight in zip(plane, (1.0, 0.25), strict=False):
+                    starts[:, index] += weight * offsets
+                for position, index in enumerate(other_indices):
+                    starts[:, index] += offsets / (4 + position)
+            ensemble = ensemble_for(system, eps, starts, _TRIAL_STEPS, backward=backward)
+            points = np.concatenate(list(ensemble.records(_TRIAL_STEPS, 1)))
             with np.errstate(all="ignore"):
-                distance = np.abs(points - center).max(axis=2)
-                moves = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
-            stays = (distance <= _FAR * np.abs(starts - center).max()).all(axis=0)
-            if (stays & moves).all():
+                distances = np.abs(points - center).max(axis=2)
+                has_moved = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
+            has_stayed = (distances <= _MAX_GROWTH * np.abs(starts - center).max()).all(axis=0)
+            if (has_stayed & has_moved).all():
                 return starts
-            candidates.append((int((stays & moves).sum()), starts))
+            candidates.append((int((has_stayed & has_moved).sum()), starts))
     return max(candidates, key=lambda equilibrium: equilibrium[0])[1]

@@ -20,7 +20,7 @@ from kahanmaps.plots.figures import MAX_VECTOR_POINTS, dot_size, draw_points, dr
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.flow import CENTER, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.trajectories import Trajectories
-from kahanmaps.plots.portraits.windows import Window, inside, main_range, outside, window_of
+from kahanmaps.plots.portraits.windows import Window, count_outside, is_inside, main_range, window_of
 from kahanmaps.plots.style import COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 _MAX_NEIGHBOURS = 2000  # points: all pairs are compared; a curve with more points looks smooth without lines
 _MIN_NEIGHBOURS = 8
-_OF_DEGREE_2 = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
+_MIN_CURVE_SHARE = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
 # A longer line is a gap in an orbit that does not fill its curve: in units of the median line, and of the diameter of
 # the orbit. If the rotation number is nearly rational, points form bunches joined by long lines, but shorter than this.
-_LONG, _WIDE = 8.0, 0.2
+_MAX_LENGTH_RATIO, _MAX_WIDTH_RATIO = 8.0, 0.2
 STEP = "step"
 ORBIT = "orbit"
 
@@ -94,27 +94,27 @@ def portrait_of(
     points = _projected(trajectories, axes)
     values, label = None, ""
     if not isinstance(color, str):
-        flat = color(trajectories.points.reshape(-1, trajectories.points.shape[2]))
-        values, label = flat.reshape(trajectories.points.shape[:2]), color.label
+        *shape, dim = trajectories.points.shape
+        values, label = color(trajectories.points.reshape(-1, dim)).reshape(shape), color.label
     elif color == STEP:
-        values, label = _steps(trajectories), STEP
+        values, label = _step_numbers(trajectories), STEP
     elif color != ORBIT:
         raise InputError(f"found the color {quoted(color)}, expected orbit, step or a function")
-    there = ~np.isnan(trajectories.points).any(axis=2)
-    shown = ~np.isnan(points).any(axis=2)
+    is_defined = ~np.isnan(trajectories.points).any(axis=2)
+    is_shown = ~np.isnan(points).any(axis=2)
     if values is not None:
-        shown &= ~np.isnan(values)
-    points = np.where(np.asarray(shown)[..., None], points, np.nan)
+        is_shown &= ~np.isnan(values)
+    points = np.where(np.asarray(is_shown)[..., None], points, np.nan)
     flat = points.reshape(-1, len(axes))
-    chosen = window or window_of(flat, points[0])
+    shown_window = window or window_of(flat, points[0])
     return Portrait(
         points,
         tuple(axis if isinstance(axis, str) else axis.label for axis in axes),
-        chosen,
+        shown_window,
         values,
         label,
-        left_out=outside(flat, chosen),
-        undefined=int(there.sum() - shown.sum()),
+        left_out=count_outside(flat, shown_window),
+        undefined=int(is_defined.sum() - is_shown.sum()),
         euler=None if euler is None else _projected(euler, axes),
         joined=tuple(map(neighbours, trajectories.points.swapaxes(0, 1))) if join and STEP not in axes else (),
     )
@@ -122,11 +122,11 @@ def portrait_of(
 
 def _projected(trajectories: Trajectories, axes: Sequence[PointFunction | str]) -> FloatArray:
     return np.stack(
-        [_steps(trajectories) if isinstance(axis, str) else axis(trajectories.points) for axis in axes], axis=-1
+        [_step_numbers(trajectories) if isinstance(axis, str) else axis(trajectories.points) for axis in axes], axis=-1
     )
 
 
-def _steps(trajectories: Trajectories) -> FloatArray:
+def _step_numbers(trajectories: Trajectories) -> FloatArray:
     steps = np.broadcast_to(np.asarray(trajectories.steps, dtype=np.float64)[:, None], trajectories.points.shape[:2])
     return np.where(np.isnan(trajectories.points).any(axis=2), np.nan, steps)
 
@@ -144,53 +144,54 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     (12, [2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2])
     """
     rows = np.flatnonzero(~np.isnan(points).any(axis=1))[:_MAX_NEIGHBOURS]
-    held = points[rows]
-    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a periodic orbit repeats its points
-    rows, held = rows[np.sort(first)], held[np.sort(first)]
+    vertices = points[rows]
+    _, first_rows = np.unique(vertices.round(12), axis=0, return_index=True)  # a periodic orbit repeats its points
+    rows, vertices = rows[np.sort(first_rows)], vertices[np.sort(first_rows)]
     if len(rows) < _MIN_NEIGHBOURS:
         return None
-    squares = (held**2).sum(axis=1)
-    products = held @ held.T
+    squares = (vertices**2).sum(axis=1)
+    products = vertices @ vertices.T
     distances = squares[:, None] + squares - 2 * products
     np.fill_diagonal(distances, np.inf)
-    own = np.arange(len(rows))
+    indices = np.arange(len(rows))
     nearest = distances.argmin(axis=1)
     # (q - p).(r - p) < 0: r and the nearest neighbour q of p are on opposite sides of p
-    other = products[nearest] - products[own, nearest][:, None] - products + squares[:, None]
-    beyond = np.where(other < 0, distances, np.inf)
-    opposite = beyond.argmin(axis=1)
-    is_there = np.isfinite(beyond[own, opposite])
-    pairs = np.concatenate([np.stack([own, nearest], 1), np.stack([own, opposite], 1)[is_there]])
+    inner_products = products[nearest] - products[indices, nearest][:, None] - products + squares[:, None]
+    opposite_distances = np.where(inner_products < 0, distances, np.inf)
+    opposite = opposite_distances.argmin(axis=1)
+    has_opposite = np.isfinite(opposite_distances[indices, opposite])
+    pairs = np.concatenate([np.stack([indices, nearest], 1), np.stack([indices, opposite], 1)[has_opposite]])
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
-    degrees = np.bincount(pairs.ravel(), minlength=len(rows))
-    if (degrees == 2).mean() < _OF_DEGREE_2:
+    neighbour_counts = np.bincount(pairs.ravel(), minlength=len(rows))
+    if (neighbour_counts == 2).mean() < _MIN_CURVE_SHARE:
         return None
-    lengths = np.linalg.norm(held[pairs[:, 0]] - held[pairs[:, 1]], axis=1)
-    longest = max(_LONG * float(np.median(lengths)), _WIDE * float(np.linalg.norm(np.ptp(held, axis=0))))
-    return np.asarray(rows[pairs[lengths <= longest]], dtype=np.int64)
+    lengths = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    diameter = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    max_length = max(_MAX_LENGTH_RATIO * float(np.median(lengths)), _MAX_WIDTH_RATIO * diameter)
+    return np.asarray(rows[pairs[lengths <= max_length]], dtype=np.int64)
 
 
 _ASPECT = 0.75
-_EULER = "#BBBBBB"
-_LEVEL: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
+_EULER_COLOR = "#BBBBBB"
+_LEVEL_STYLE: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
 _MAX_JOINED = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
 _MAX_INITIAL = 40  # maximal number of orbits with marked initial points: more marks would cover the picture
 _MAX_MARKED = 60  # maximal number of points of an orbit that are all drawn as marks
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
-_ARROWS: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
-_SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 2))}
-_SOLUTION = {"color": "#888888", "linewidth": 0.5}
-_FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
-_OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
+_ARROW: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
+_SEPARATRIX_STYLE = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 2))}
+_SOLUTION_STYLE = {"color": "#888888", "linewidth": 0.5}
+_FILLED_MARK: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
+_OPEN_MARK: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
 # This mark is used for no equilibrium and for no orbit.
-_INITIAL: dict[str, Any] = {"marker": ">", "markersize": 3.5, "markeredgecolor": "black", "markeredgewidth": 0.5}
-_EQUILIBRIA: dict[str, dict[str, Any]] = {
+_START_MARK: dict[str, Any] = {"marker": ">", "markersize": 3.5, "markeredgecolor": "black", "markeredgewidth": 0.5}
+_EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
     SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
-    CENTER: {"marker": "o", "markersize": 5, **_OPEN},
-    FOCUS: {"marker": "D", "markersize": 4.5, **_OPEN},
-    NODE: {"marker": "s", "markersize": 5, **_FILLED},
-    DEGENERATE: {"marker": "*", "markersize": 7, **_FILLED},
+    CENTER: {"marker": "o", "markersize": 5, **_OPEN_MARK},
+    FOCUS: {"marker": "D", "markersize": 4.5, **_OPEN_MARK},
+    NODE: {"marker": "s", "markersize": 5, **_FILLED_MARK},
+    DEGENERATE: {"marker": "*", "markersize": 7, **_FILLED_MARK},
 }
 
 
@@ -225,95 +226,97 @@ def plot_portrait(
             # Arrows and curves of the differential equation are drawn under the orbits, equilibria on top of them.
             flow = portrait.flow
             if len(flow.places):
-                axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
-                arrow: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 9, "linestyle": "none"}
-                handles["vector field"] = Line2D([], [], color="#999999", markeredgewidth=0, **arrow)
-            looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("solution", flow.solutions, _SOLUTION))
-            for word, curve, look in ((word, curve, look) for word, curves, look in looks for curve in curves):
-                seen = _inside(curve[:, None], portrait.window)[:, 0] if in_space else curve
-                (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
+                axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROW)
+                arrow_style: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 9, "linestyle": "none"}
+                handles["vector field"] = Line2D([], [], color="#999999", markeredgewidth=0, **arrow_style)
+            curves = [("separatrix", curve, _SEPARATRIX_STYLE) for curve in flow.separatrices]
+            curves += [("solution", curve, _SOLUTION_STYLE) for curve in flow.solutions]
+            for name, curve, curve_style in curves:
+                vertices = _hide_outside(curve[:, None], portrait.window)[:, 0] if in_space else curve
+                (handles[name],) = axes.plot(*vertices.T, zorder=1.2, **curve_style)
             for kind, point in flow.equilibria:
-                mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
+                mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIUM_MARKS[kind]}
                 (handles[kind],) = axes.plot(*point[:, None], **mark)
         pieces = [piece for pieces in portrait.levels or () for piece in pieces]
         if pieces:
-            axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
-            handles["level curve"] = Line2D([], [], color=_LEVEL["colors"], linewidth=_LEVEL["linewidths"])
+            axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL_STYLE), autolim=False)
+            handles["level curve"] = Line2D([], [], color=_LEVEL_STYLE["colors"], linewidth=_LEVEL_STYLE["linewidths"])
         if portrait.euler is not None:
             # Lines continue beyond the edge of the window, but matplotlib cannot draw points too far outside.
-            around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
+            wide_window = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
             # Dashed, since colors are hard to distinguish in a gray copy.
-            dashes: dict[str, Any] = {
+            dash_style: dict[str, Any] = {
                 "linewidth": 0.6,
                 "linestyle": (0, (5, 2)),
                 "rasterized": count > MAX_VECTOR_POINTS,
             }
-            for orbit in _inside(portrait.euler, portrait.window if in_space else around).swapaxes(0, 1):
+            for orbit in _hide_outside(portrait.euler, portrait.window if in_space else wide_window).swapaxes(0, 1):
                 if lines:
-                    axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
+                    axes.plot(*orbit.T, color=_EULER_COLOR, zorder=1.5, **dash_style)
                 else:
-                    draw_points(axes, *orbit.T, color=_EULER, zorder=1.5, total=count)
-            dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
-            handles["explicit Euler"] = Line2D([], [], color=_EULER, **(dashes if lines else dot))
+                    draw_points(axes, *orbit.T, color=_EULER_COLOR, zorder=1.5, total=count)
+            dot_style: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
+            handles["explicit Euler"] = Line2D([], [], color=_EULER_COLOR, **(dash_style if lines else dot_style))
         # Axes in space do not clip points outside of them.
-        shown = _inside(portrait.points, portrait.window) if in_space else portrait.points
-        if portrait.values is None and shown.shape[1] <= len(COLORS):
-            _draw_few(axes, shown, lines, portrait)
+        points = _hide_outside(portrait.points, portrait.window) if in_space else portrait.points
+        if portrait.values is None and points.shape[1] <= len(COLORS):
+            _draw_few_orbits(axes, points, lines, portrait)
         elif portrait.values is None:
             # In the colors of the color map; the widest orbit is drawn first, so that the orbits inside stay visible.
             with np.errstate(all="ignore"):
-                extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
+                extent = np.nanmax(points, axis=0, initial=-np.inf) - np.nanmin(points, axis=0, initial=np.inf)
                 extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
                 scale = extent.max(axis=0, initial=0)
                 order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
-            numbers = np.broadcast_to(np.arange(shown.shape[1], dtype=np.float64), shown.shape[:2])
-            _draw_colored(axes, shown, numbers, order, (0.0, shown.shape[1] - 1.0), lines, portrait)
+            orbit_numbers = np.broadcast_to(np.arange(points.shape[1], dtype=np.float64), points.shape[:2])
+            _draw_colored(axes, points, orbit_numbers, order, (0.0, points.shape[1] - 1.0), lines, portrait)
         else:
-            seen = portrait.values[~np.isnan(_inside(shown, portrait.window)).any(axis=2)]
-            low, high = main_range(seen)
-            drawn = _draw_colored(axes, shown, portrait.values, range(shown.shape[1]), (low, high), lines, portrait)
-            beyond = bool((seen < low).any()), bool((seen > high).any())
-            how: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
-            figure.colorbar(drawn, ax=axes, **how).set_label(portrait.value_label)
-        if portrait.values is None and shown.shape[1] <= _MAX_INITIAL:
-            for k in range(shown.shape[1]):
-                fill = COLORS[k] if shown.shape[1] <= len(COLORS) else "white"
-                axes.plot(*shown[0, k][:, None], linestyle="none", markerfacecolor=fill, zorder=3, **_INITIAL)
-            if shown.shape[1]:
-                handles["initial point"] = Line2D([], [], linestyle="none", markerfacecolor="white", **_INITIAL)
+            visible_values = portrait.values[~np.isnan(_hide_outside(points, portrait.window)).any(axis=2)]
+            low, high = main_range(visible_values)
+            orbits = range(points.shape[1])
+            mappable = _draw_colored(axes, points, portrait.values, orbits, (low, high), lines, portrait)
+            is_beyond = bool((visible_values < low).any()), bool((visible_values > high).any())
+            options: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[is_beyond]}
+            figure.colorbar(mappable, ax=axes, **options).set_label(portrait.value_label)
+        if portrait.values is None and points.shape[1] <= _MAX_INITIAL:
+            for k in range(points.shape[1]):
+                color = COLORS[k] if points.shape[1] <= len(COLORS) else "white"
+                axes.plot(*points[0, k][:, None], linestyle="none", markerfacecolor=color, zorder=3, **_START_MARK)
+            if points.shape[1]:
+                handles["initial point"] = Line2D([], [], linestyle="none", markerfacecolor="white", **_START_MARK)
         if handles:
             legend_above(figure, list(handles.values()), list(handles), style)
-        for side, label, limits in zip("xyz", portrait.labels, portrait.window, strict=False):
-            axes.set(**{f"{side}label": label, f"{side}lim": limits})
+        for letter, label, limits in zip("xyz", portrait.labels, portrait.window, strict=False):
+            axes.set(**{f"{letter}label": label, f"{letter}lim": limits})
         if note:
             axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
         if in_space:
-            _make_room(axes, portrait.window if equal else None)
+            _format_axes_in_space(axes, portrait.window if equal else None)
         elif equal:
             axes.set_aspect("equal", adjustable="box")
     return figure
 
 
-def _draw_few(axes: Any, shown: FloatArray, lines: bool, portrait: Portrait) -> None:
+def _draw_few_orbits(axes: Any, points: FloatArray, lines: bool, portrait: Portrait) -> None:
     """Draw each orbit in its own color, and with its own mark if it has few points."""
-    count = shown.shape[0] * shown.shape[1]
-    for k, orbit in enumerate(shown.swapaxes(0, 1)):
-        how: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
+    count = points.shape[0] * points.shape[1]
+    for k, orbit in enumerate(points.swapaxes(0, 1)):
+        options: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
         if lines:
             pairs = portrait.pairs(k)
             path = orbit
             if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between lines, to draw all lines at once
                 ends = orbit[pairs]
                 path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
-            axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **how)
+            axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **options)
         else:
             mark = {"markersize": 3.0, "marker": MARKS[k]} if len(orbit) <= _MAX_MARKED else {}
-            draw_points(axes, *orbit.T, **how, **mark, total=count)
+            draw_points(axes, *orbit.T, **options, **mark, total=count)
 
 
 def _draw_colored(
     axes: Any,
-    shown: FloatArray,
+    points: FloatArray,
     values: FloatArray,
     order: Iterable[int],
     limits: tuple[float, float],
@@ -326,36 +329,38 @@ def _draw_colored(
     from matplotlib.colors import ListedColormap, Normalize
 
     # Without the lightest part of the color map: small dots would be invisible on white paper.
-    colors = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
-    is_image = shown.shape[0] * shown.shape[1] > MAX_VECTOR_POINTS
-    how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colors, "rasterized": is_image, "zorder": 2}
-    in_space = shown.shape[2] == 3
+    color_map = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
+    is_image = points.shape[0] * points.shape[1] > MAX_VECTOR_POINTS
+    options: dict[str, Any] = {"norm": Normalize(*limits), "cmap": color_map, "rasterized": is_image, "zorder": 2}
+    in_space = points.shape[2] == 3
     if not lines:
-        first = list(order)
-        ordered, heights = shown[:, first].swapaxes(0, 1), values[:, first].swapaxes(0, 1)
-        there = ~np.isnan(ordered).any(axis=2)
-        how |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
-        return axes.scatter(*ordered[there].T, c=heights[there], **how)
-    joined = [(portrait.pairs(int(k)), k) for k in order]
-    ends = np.concatenate([shown[pairs, k] for pairs, k in joined])
-    heights = np.concatenate([values[pairs[:, 0], k] for pairs, k in joined])
-    there = ~np.isnan(ends).any(axis=(1, 2))
+        orbit_indices = list(order)
+        ordered_points, levels = points[:, orbit_indices].swapaxes(0, 1), values[:, orbit_indices].swapaxes(0, 1)
+        is_defined = ~np.isnan(ordered_points).any(axis=2)
+        options |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
+        return axes.scatter(*ordered_points[is_defined].T, c=levels[is_defined], **options)
+    pairs_by_orbit = [(portrait.pairs(int(k)), k) for k in order]
+    ends = np.concatenate([points[pairs, k] for pairs, k in pairs_by_orbit])
+    levels = np.concatenate([values[pairs[:, 0], k] for pairs, k in pairs_by_orbit])
+    is_defined = ~np.isnan(ends).any(axis=(1, 2))
     if in_space:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-        del how["zorder"]
-        collection: Any = axes.add_collection3d(Line3DCollection(ends[there], linewidths=0.6, **how), autolim=False)
+        del options["zorder"]
+        collection: Any = Line3DCollection(ends[is_defined], linewidths=0.6, **options)
+        axes.add_collection3d(collection, autolim=False)
     else:
-        collection = axes.add_collection(LineCollection(list(ends[there]), linewidths=0.6, **how), autolim=False)
-    collection.set_array(heights[there])
+        collection = LineCollection(list(ends[is_defined]), linewidths=0.6, **options)
+        axes.add_collection(collection, autolim=False)
+    collection.set_array(levels[is_defined])
     return collection
 
 
-def _inside(shown: FloatArray, window: Window) -> FloatArray:
-    return np.where(inside(shown, window)[..., None], shown, np.nan)
+def _hide_outside(points: FloatArray, window: Window) -> FloatArray:
+    return np.where(is_inside(points, window)[..., None], points, np.nan)
 
 
-def _make_room(axes: Any, window: Window | None) -> None:
+def _format_axes_in_space(axes: Any, window: Window | None) -> None:
     """Format axes in space: light planes, few ticks, and labels inside the picture (layouts would cut them off).
 
     With a window the box has the proportions of the window. matplotlib draws the edges of three planes only.
@@ -369,7 +374,7 @@ def _make_room(axes: Any, window: Window | None) -> None:
         axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], prune="both"))
         axis.labelpad = 0
     limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
-    for corner, other in combinations(product(*limits), 2):
-        if sum(a != b for a, b in zip(corner, other, strict=True)) == 1:
-            axes.plot(*zip(corner, other, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
+    for first_corner, second_corner in combinations(product(*limits), 2):
+        if sum(a != b for a, b in zip(first_corner, second_corner, strict=True)) == 1:
+            axes.plot(*zip(first_corner, second_corner, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
     axes.tick_params(pad=0)

@@ -22,9 +22,9 @@ from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 4_000_000  # of all orbits together: more points would not be visible in a picture
-_MAX_NUMBERS = 40_000_000
+_MAX_COORDINATES = 40_000_000
 # Up to this work and this number of steps, numpy is faster than loading compiled code.
-_LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
+_MAX_NUMPY_WORK, _MAX_NUMPY_STEPS = 10_000_000, 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Trajectories:
 
 
 def ensemble_for(
-    given: QuadraticSystem | MapFamily,
+    system_or_map: QuadraticSystem | MapFamily,
     eps: Any,
     starts: FloatArray,
     steps: int,
@@ -56,9 +56,9 @@ def ensemble_for(
     radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the ensemble of these initial points (n, dim) with the faster kernel; eps is half the time step."""
-    work = len(starts) * steps * (1 + given.dim**3 // 8)
-    kernel = "numpy" if work < _LITTLE_WORK and steps < _FEW_STEPS else None
-    return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel, radius=radius)
+    work = len(starts) * steps * (1 + system_or_map.dim**3 // 8)
+    kernel = "numpy" if work < _MAX_NUMPY_WORK and steps < _MAX_NUMPY_STEPS else None
+    return FloatEnsemble(system_or_map, eps, starts, backward=backward, form=form, kernel=kernel, radius=radius)
 
 
 def field_of(file: SystemFile) -> QuadraticSystem | None:
@@ -76,21 +76,22 @@ def ensemble_of_file(
     return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
 
 
-def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:
+def follow_orbits(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:
     """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
 
     >>> system = QuadraticSystem.from_text(["x"], ["x"])
-    >>> result = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
+    >>> result = follow_orbits(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
     >>> result.points[:, :, 0].tolist(), result.ended
     ([[1.0, 2.0], [3.0, 6.0], [9.0, 18.0]], {})
     """
     require_steps(steps)
-    most = min(MAX_POINTS, _MAX_NUMBERS // ensemble.system.dim)
-    if (steps + 1) * ensemble.n > most:
-        raise InputError(f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: use fewer steps")
+    bound = min(MAX_POINTS, _MAX_COORDINATES // ensemble.system.dim)
+    if (steps + 1) * ensemble.n > bound:
+        request = f"{steps} steps of {ensemble.n} orbits"
+        raise InputError(f"found {request}, expected at most {bound} points: use fewer steps")
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
-    words = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
-    ended = {text: int((ensemble.status == status).sum()) for status, text in words.items()}
+    texts = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
+    ended = {text: int((ensemble.status == status).sum()) for status, text in texts.items()}
     return Trajectories(
         ensemble.system.variables,
         points,

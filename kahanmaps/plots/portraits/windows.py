@@ -13,14 +13,14 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
-_SHARE = 10.0  # percent of the points at either end that are ignored if they are far away
-_REACH = 3.0  # "far away" is farther than this multiple of the range of all other points
-_UNBOUNDED, _SHOWN = 1e12, 10  # in units of the largest initial coordinate
+_OUTER_PERCENT = 10.0  # percent of the points at either end that are ignored if they are far away
+_FAR = 3.0  # "far away" is farther than this multiple of the range of all other points
+_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # in units of the largest initial coordinate
 _MARGIN = 0.04
 _LARGEST = 1e307  # largest number that matplotlib can subtract
-_LOOKED_AT = 4000  # maximal number of points used in the choice of axes
-_VARIABLES = 16
-_CELLS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
+_MAX_POINTS = 4000  # maximal number of points used in the choice of axes
+_MAX_VARIABLES = 16
+_CELLS_PER_AXIS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
 
 
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
@@ -39,13 +39,13 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     >>> window_of(10.0 ** np.arange(30)[:, None], np.array([[1.0]]))[0][1] < 11
     True
     """
-    first = points[:0] if starts is None else starts
-    reach = float(np.abs(first[np.isfinite(first)]).max(initial=0))
+    initial_points = points[:0] if starts is None else starts
+    largest_coordinate = float(np.abs(initial_points[np.isfinite(initial_points)]).max(initial=0))
     window = []
-    for column, required in zip(points.T, first.T, strict=True):
-        low, high = main_range(column, required)
-        if 0 < _UNBOUNDED * reach < max(-low, high):
-            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], required)
+    for column, initial_column in zip(points.T, initial_points.T, strict=True):
+        low, high = main_range(column, initial_column)
+        if 0 < _MAX_RATIO * largest_coordinate < max(-low, high):
+            low, high = main_range(column[np.abs(column) <= _SHOWN_RATIO * largest_coordinate], initial_column)
         unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in this unit nothing overflows
         margin = (high / unit - low / unit) * _MARGIN
         window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
@@ -62,16 +62,17 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
     unit = float(np.abs(values).max(initial=0))
     if unit == 0:
         return -1.0, 1.0
-    parts = [values]
+    samples = [values]
     if required is not None and len(required := np.clip(required[np.isfinite(required)], -_LARGEST, _LARGEST)):
-        parts.append(required)
+        samples.append(required)
     # The inner range, without a tenth of the points at either end, in a unit in which nothing overflows.
-    ends = [np.percentile(part, [_SHARE, 100 - _SHARE], method="nearest") / unit for part in parts]
-    first, last = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+    percents = [_OUTER_PERCENT, 100 - _OUTER_PERCENT]
+    ranges = [np.percentile(sample, percents, method="nearest") / unit for sample in samples]
+    left, right = float(min(first for first, _ in ranges)), float(max(last for _, last in ranges))
     low, high = float(values.min()) / unit, float(values.max()) / unit
-    if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
-        low = max(low, first - (last - first) / 2)
-        high = min(high, last + (last - first) / 2)
+    if low < left - _FAR * (right - left) or high > right + _FAR * (right - left):
+        low = max(low, left - (right - left) / 2)
+        high = min(high, right + (right - left) / 2)
     if high - low < 1e-9 * max(abs(low), abs(high)):  # equal values up to rounding: center them
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
@@ -89,15 +90,15 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
     return window
 
 
-def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
+def is_inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
     """Return which points (..., d) lie in the window; NaN counts as outside."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
-def outside(points: FloatArray, window: Window) -> int:
+def count_outside(points: FloatArray, window: Window) -> int:
     """Return the number of points (n, d) outside the window, without counting NaN."""
-    return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
+    return int((~np.isnan(points).any(axis=1) & ~is_inside(points, window)).sum())
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
@@ -116,15 +117,15 @@ def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
     points = points[~np.isnan(points).any(axis=1)]
     if not len(points):
         return tuple(range(count))
-    points = points[np.linspace(0, len(points) - 1, min(len(points), _LOOKED_AT)).astype(int)]
-    cells = _CELLS[count]
+    points = points[np.linspace(0, len(points) - 1, min(len(points), _MAX_POINTS)).astype(int)]
+    cells = _CELLS_PER_AXIS[count]
     with np.errstate(all="ignore"):
         low, high = np.array(window_of(points)).T
         boxes = np.clip(np.nan_to_num((points - low) / (high - low) * cells), 0, cells - 1).astype(int).T
     varying = [k for k in range(dim) if boxes[k].min() != boxes[k].max()]
-    candidates = (varying + [k for k in range(dim) if k not in varying])[: max(count, min(_VARIABLES, dim))]
+    candidates = (varying + [k for k in range(dim) if k not in varying])[: max(count, min(_MAX_VARIABLES, dim))]
 
-    def filled(choice: tuple[int, ...]) -> int:
-        return len(np.unique(sum(boxes[k] * cells**place for place, k in enumerate(choice))))
+    def count_boxes(axes: tuple[int, ...]) -> int:
+        return len(np.unique(sum(boxes[k] * cells**position for position, k in enumerate(axes))))
 
-    return max(combinations(sorted(candidates), count), key=filled)
+    return max(combinations(sorted(candidates), count), key=count_boxes)

@@ -71,8 +71,8 @@ class AffineDarbouxList(ResultPart):
     @property
     def text(self) -> str:
         """The number of functions, and whether the list is complete."""
-        more = "no others" if self.complete else self.reason
-        return f"{counted(len(self.functions), 'affine Darboux function')}, {more}"
+        completeness_text = "no others" if self.complete else self.reason
+        return f"{counted(len(self.functions), 'affine Darboux function')}, {completeness_text}"
 
 
 def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
@@ -125,9 +125,9 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
     free: list[int] = []
     rows: list[list[fmpq]] = [[fmpq(entry) for entry in vector] for vector in integrals]
     for j in range(n):
-        extended = [*rows, [fmpq(int(i == j)) for i in range(n)]]
-        if rank(QQ, fmpq_mat(extended)) == len(extended):
-            rows = extended
+        extended_rows = [*rows, [fmpq(int(i == j)) for i in range(n)]]
+        if rank(QQ, fmpq_mat(extended_rows)) == len(extended_rows):
+            rows = extended_rows
             free.append(j)
     coordinates = fmpq_mat([*rows[len(integrals) :], *rows[: len(integrals)]])  # (y, z) as forms of x
     inverse = coordinates.inv()
@@ -162,23 +162,23 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         return AffineDarbouxList((), True, "")
     coordinates = [[fmpq(int(i == j)) for i in range(n)] for j in range(n)]
 
-    def only_factors(reason: str) -> AffineDarbouxList:
+    def search_factors_only(reason: str) -> AffineDarbouxList:
         reason = f"{reason}: only factors of the right-hand sides were tried"
         return AffineDarbouxList(_affine_darboux_factors(system, coordinates), False, reason)
 
     if m > MAX_EXTACTIC_DIMENSION:
-        return only_factors(f"more than {MAX_EXTACTIC_DIMENSION} variables")
+        return search_factors_only(f"more than {MAX_EXTACTIC_DIMENSION} variables")
     if system.digits > LONG_COEFFICIENTS:
-        return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
+        return search_factors_only(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     over_Q = system.over(QQ)
     # A line parallel to a hyperplane does not meet it. The seed depends on the system, so that nobody can choose a
     # system with hyperplanes parallel to the line.
     rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
-    determinant_on_line = _determinant_along(over_Q, start, direction, quotient.free)
+    determinant_on_line = _interpolate_determinant(over_Q, start, direction, quotient.free)
     if determinant_on_line.degree() < 0:
-        return only_factors("the extactic determinant vanishes identically, there may be infinitely many")
-    complete = True
+        return search_factors_only("the extactic determinant vanishes identically, there may be infinitely many")
+    is_complete = True
     candidates = list[list[fmpq]]()
     for t in _rational_roots(determinant_on_line):
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
@@ -191,13 +191,13 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
             normals = []
             for eigenvalue in _rational_roots(fmpq_poly(action.charpoly().coeffs())):
                 combinations = nullspace(QQ, (basis * action - basis * eigenvalue).transpose())
-                complete = complete and len(combinations) <= 1
+                is_complete = is_complete and len(combinations) <= 1
                 normals += [tuple((fmpq_mat([list(c)]) * basis).entries()) for c in combinations]
         for v in normals:
             entries = dict(zip(quotient.free, v, strict=True))
             candidates.append([entries.get(i, fmpq(0)) for i in range(n)])
-    reason = "" if complete else "the flow degenerates on an invariant hyperplane: there may be further ones"
-    return AffineDarbouxList(_affine_darboux_factors(system, candidates), complete, reason)
+    reason = "" if is_complete else "the flow degenerates on an invariant hyperplane: there may be further ones"
+    return AffineDarbouxList(_affine_darboux_factors(system, candidates), is_complete, reason)
 
 
 def _taylor_rows(over_Q: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
@@ -206,14 +206,14 @@ def _taylor_rows(over_Q: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> 
     forms: list[fmpq_mat] = []
     for k in range(len(free)):
         forms.append(over_Q.hessian_times(series[k].entries()))
-        total = over_Q.B * series[k] + (over_Q.c if k == 0 else over_Q.c * 0)
+        derivative = over_Q.B * series[k] + (over_Q.c if k == 0 else over_Q.c * 0)
         for a in range(k + 1):
-            total = total + forms[a] * series[k - a] * fmpq(1, 2)
-        series.append(total * fmpq(1, k + 1))
+            derivative = derivative + forms[a] * series[k - a] * fmpq(1, 2)
+        series.append(derivative * fmpq(1, k + 1))
     return fmpq_mat([[column[i, 0] for i in free] for column in series[1:]])
 
 
-def _determinant_along(
+def _interpolate_determinant(
     over_Q: SystemOver, start: Sequence[fmpq], direction: Sequence[fmpq], free: Sequence[int]
 ) -> fmpq_poly:
     """Interpolate the extactic determinant at start + t direction as a polynomial in t."""
@@ -225,7 +225,7 @@ def _determinant_along(
     ]
     # Divided differences at 0, 1, 2, ...
     for k in range(1, len(values)):
-        differences = [(after - before) / k for before, after in pairwise(values[k - 1 :])]
+        differences = [(next_value - value) / k for value, next_value in pairwise(values[k - 1 :])]
         values[k:] = differences
     determinant = fmpq_poly([])
     for t in reversed(nodes):
@@ -286,17 +286,17 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     n, context = system.dim, function.context()
     *coefficients, _ = _coefficients(function)
     k = next(i for i, c in enumerate(coefficients) if c != 0)
-    on_hyperplane = list(context.gens())
-    on_hyperplane[k] = on_hyperplane[k] - function / coefficients[k]  # solves l = 0 for x_k
+    images = list(context.gens())
+    images[k] = images[k] - function / coefficients[k]  # solves l = 0 for x_k
     rng = random.Random("a point of the hyperplane")
-    free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
-    point = [evaluate(x, QQ, free) for x in on_hyperplane]
+    coordinates = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
+    point = [evaluate(x, QQ, coordinates) for x in images]
     for outcome, signed_eps in (("undefined", eps), ("contracted", -eps)):
         if KahanFamily(system).at(signed_eps).determinant(point) != 0:  # a nonzero value at one point suffices
             continue
         field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
         entries = [
-            Function(field, int(i == j) - f.derivative(j).compose(*on_hyperplane, ctx=context) * signed_eps, one)
+            Function(field, int(i == j) - f.derivative(j).compose(*images, ctx=context) * signed_eps, one)
             for i, f in enumerate(system.rhs)
             for j in range(n)
         ]

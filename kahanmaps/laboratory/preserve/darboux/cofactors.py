@@ -30,7 +30,14 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
-from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
+from kahanmaps.laboratory.modular_points import (
+    Exponent,
+    ModularMap,
+    Point,
+    exponents_up_to,
+    gradient_values,
+    monomial_index,
+)
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
     TwoPointBasis,
@@ -125,7 +132,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         D = None
     if D is None:
         return (Cofactor("det dPhi", n, None),)
-    degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.numerator, entry.denominator))
+    degree_of_map = max(degree_in(P, n) for entry in image for P in (entry.numerator, entry.denominator))
     cofactors = []
     for kind, polynomials in (("factor", [J.numerator]), ("pole", [J.denominator, D])):
         factors = {str(factor): factor for polynomial in polynomials for factor, _ in irreducible_factors(polynomial)}
@@ -187,8 +194,8 @@ def products(cofactors: Sequence[Cofactor], max_weight: int) -> list[CofactorPro
             for power in range(max_weight // cofactor.weight + 1)
             if sum(p * c.weight for p, c in zip((*powers, power), cofactors, strict=False)) <= max_weight
         ]
-    weighted = [CofactorProduct(p, sum(e * c.weight for e, c in zip(p, cofactors, strict=True))) for p in all_powers]
-    return sorted(weighted, key=lambda product: (product.weight, tuple(-p for p in product.powers)))
+    result = [CofactorProduct(p, sum(e * c.weight for e, c in zip(p, cofactors, strict=True))) for p in all_powers]
+    return sorted(result, key=lambda product: (product.weight, tuple(-p for p in product.powers)))
 
 
 @dataclass(frozen=True)
@@ -234,11 +241,11 @@ def cofactor_space(
     A `model` is the space modulo another prime: only the monomials of its elements are then used. The sample must have
     at least `points_needed` points.
     """
-    places = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.places
-    at_points, at_images = _values(sample, product, degree, places)
-    rows = [list(map(sub, after, before)) for before, after in zip(at_points, at_images, strict=True)]
-    vectors = null_space(rows, len(places), sample.map.prime)
-    return DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, sample.map.prime, places)
+    indices = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.indices
+    values, image_values = _evaluate_monomials(sample, product, degree, indices)
+    rows = [list(map(sub, image_row, row)) for row, image_row in zip(values, image_values, strict=True)]
+    vectors = null_space(rows, len(indices), sample.map.prime)
+    return DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, sample.map.prime, indices)
 
 
 def cofactor_spaces(
@@ -249,25 +256,25 @@ def cofactor_spaces(
     If there are `models`, only the monomials of their elements are used. Numbers c outside GF(p) are left out. If the
     cofactors of the sample are known exactly, only c = 1 is tried.
     """
-    prime, terms = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
-    places = sorted({k for model in models for k in model.places}) if models else range(terms)
+    prime, term_count = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
+    indices = sorted({k for model in models for k in model.indices}) if models else range(term_count)
     if not sample.up_to_numbers:
-        merged = DarbouxSpace(sample.map.dim, degree, [v for model in models for v in model.basis]) if models else None
-        space = cofactor_space(sample, product, degree, merged)
+        union = DarbouxSpace(sample.map.dim, degree, [v for model in models for v in model.basis]) if models else None
+        space = cofactor_space(sample, product, degree, union)
         return [(1, space)] if space.basis else []
     # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must
     # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
     # usually suffice.
-    count = len(places)
-    at_points, at_images = _values(sample, product, degree, places)
-    count_work(count**3 / 500)
-    M = matrix(at_points[:count], prime).solve(matrix(at_images[:count], prime))
-    K = matrix(at_images[count:], prime) - multiply(matrix(at_points[count:], prime), M)
+    size = len(indices)
+    values, image_values = _evaluate_monomials(sample, product, degree, indices)
+    count_work(size**3 / 500)
+    M = matrix(values[:size], prime).solve(matrix(image_values[:size], prime))
+    K = matrix(image_values[size:], prime) - multiply(matrix(values[size:], prime), M)
     entries = list[nmod]()
-    for _ in range(count // _SPARE + 2):
+    for _ in range(size // _SPARE + 2):
         entries += K.entries()
         K = multiply(K, M)
-    basis, dimension = null_space([entries[k : k + count] for k in range(0, len(entries), count)], count, prime), -1
+    basis, dimension = null_space([entries[k : k + size] for k in range(0, len(entries), size)], size, prime), -1
     while basis and len(basis) != dimension:  # shrink to the largest subspace that M maps into itself
         dimension = len(basis)
         images = integers(multiply(matrix(basis, prime), M.transpose()))
@@ -283,24 +290,24 @@ def cofactor_spaces(
     for factor, _ in action.charpoly().factor()[1]:
         if factor.degree() == 1:
             c = int(-factor[0] / factor[1])
-            shifted = [[entry - c * (i == j) for j, entry in enumerate(row)] for i, row in enumerate(integers(action))]
-            weights = null_space(list(zip(*shifted, strict=True)), len(basis), prime)
+            A_c = [[entry - c * (i == j) for j, entry in enumerate(row)] for i, row in enumerate(integers(action))]
+            weights = null_space(list(zip(*A_c, strict=True)), len(basis), prime)
             vectors = combine(weights, basis, prime)
-            spaces.append((c, DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, prime, places)))
+            spaces.append((c, DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, prime, indices)))
     return spaces
 
 
-def _values(
-    sample: Sample, product: CofactorProduct, degree: int, places: Sequence[int]
+def _evaluate_monomials(
+    sample: Sample, product: CofactorProduct, degree: int, indices: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
     """Return C m(x) and m(x~) for all monomials m, both times the denominator of C, as one row for each point."""
-    at_points, at_images, count = [], [], len(places) + _SPARE
-    count_work(count * len(places) / 8)
-    for (x, image), fraction in zip(sample.pairs[:count], sample.values(product, count), strict=True):
-        at_point, at_image = sample.map.monomials_at_both(x, image, degree, fraction)
-        at_points.append([at_point[k] for k in places])
-        at_images.append([at_image[k] for k in places])
-    return at_points, at_images
+    values, image_values, point_count = [], [], len(indices) + _SPARE
+    count_work(point_count * len(indices) / 8)
+    for (x, image), fraction in zip(sample.pairs[:point_count], sample.values(product, point_count), strict=True):
+        monomials_at_x, monomials_at_image = sample.map.monomials_at_both(x, image, degree, fraction)
+        values.append([monomials_at_x[k] for k in indices])
+        image_values.append([monomials_at_image[k] for k in indices])
+    return values, image_values
 
 
 def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
@@ -309,8 +316,8 @@ def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
     >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
     (18, 10)
     """
-    places = {k for model in models for k in model.places}
-    return (len(places) if models else len(exponents_up_to(dim, degree))) + _SPARE
+    indices = {k for model in models for k in model.indices}
+    return (len(indices) if models else len(exponents_up_to(dim, degree))) + _SPARE
 
 
 def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofactor]:
@@ -410,21 +417,21 @@ def search_cofactors(
     for degree in range(1, max_degree + 1):
         if independent_count >= required:
             break
-        cut = f"polynomials of degree {degree} and more with known cofactors were not all tried: {SPENT}"
+        message = f"polynomials of degree {degree} and more with known cofactors were not all tried: {SPENT}"
         if budget.is_spent:
-            return replace(result, cut=cut)
+            return replace(result, cut=message)
         orbit = relations_on_orbit(map_, degree)
-        relations, places = orbit.vectors, places_of(dim, degree)
+        relations, indices = orbit.vectors, monomial_index(dim, degree)
         if relations:
             joint_relations = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
-            rows = dict(zip(pivots(joint_relations), joint_relations, strict=True))
+            rows_by_pivot = dict(zip(pivots(joint_relations), joint_relations, strict=True))
             candidates = [
                 replace(product, powers=(*product.powers, *[0] * len(denominators)))
                 for product in products(cofactors, min(degree + 1, max_degree))
             ]
             for product in products(denominators, degree)[1:]:
                 denominator = prod(map(pow, polynomials, product.powers), start=context.constant(1))
-                if _is_spanned(denominator, places, rows, prime):
+                if _is_spanned(denominator, indices, rows_by_pivot, prime):
                     candidates.append(replace(product, powers=(*[0] * len(cofactors), *product.powers)))
             count = len(relations) + _SPARE
             sample = Sample.of(map_, all_cofactors, points_needed(dim, degree))
@@ -432,17 +439,19 @@ def search_cofactors(
             pairs_of_values = zip(
                 *(map_.monomials_at_both(x, image, degree) for x, image in sample.pairs[:count]), strict=True
             )
-            at_points, at_images = (multiply(matrix(list(values), prime), basis).tolist() for values in pairs_of_values)
+            x_values, image_values = (
+                multiply(matrix(list(values), prime), basis).tolist() for values in pairs_of_values
+            )
         for product in candidates if relations else ():
             if independent_count >= required:
                 break
             work += count**2
             if work > _MAX_WORK or budget.is_spent:
-                return replace(result, cut=cut) if budget.is_spent else result
+                return replace(result, cut=message) if budget.is_spent else result
             count_work(count * len(relations) / 3)
             equations = [
-                [b * v - a * u for u, v in zip(before, after, strict=True)]
-                for (a, b), before, after in zip(sample.values(product, count), at_points, at_images, strict=True)
+                [b * v - a * u for u, v in zip(row, image_row, strict=True)]
+                for (a, b), row, image_row in zip(sample.values(product, count), x_values, image_values, strict=True)
             ]
             coordinates = null_space(equations, len(relations), prime)
             # At a point of the orbit P = c Q, so the gradients of P/Q and of P - c Q are proportional.
@@ -471,8 +480,8 @@ def search_cofactors(
             continue
         work += 3 * points_needed(dim, degree) ** 2
         if budget.is_spent:
-            cut = f"polynomials of degree {degree} and more with known cofactors up to numbers were not all tried"
-            return replace(result, cut=f"{cut}: {SPENT}")
+            message = f"polynomials of degree {degree} and more with known cofactors up to numbers were not all tried"
+            return replace(result, cut=f"{message}: {SPENT}")
         if work > 2 * _MAX_WORK:
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
@@ -487,17 +496,17 @@ def search_cofactors(
     return result
 
 
-def _is_spanned(polynomial: nmod_mpoly, places: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
+def _is_spanned(polynomial: nmod_mpoly, indices: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
     """Return whether a polynomial is in the span of the rows of an echelon form; the keys of `rows` are pivots."""
-    remainder = {places[exponents]: int(c) for exponents, c in polynomial.terms()}
+    remainder = {indices[exponents]: int(c) for exponents, c in polynomial.terms()}
     count_work(5 + 2 * len(remainder))
     while remainder:
-        first = min(remainder)
-        if first not in rows:
+        pivot = min(remainder)
+        if pivot not in rows:
             return False
-        factor = remainder[first]
-        count_work(len(rows[first]) / 10)
-        for k, entry in enumerate(rows[first][first:], first):
+        factor = remainder[pivot]
+        count_work(len(rows[pivot]) / 10)
+        for k, entry in enumerate(rows[pivot][pivot:], pivot):
             if entry:
                 remainder[k] = (remainder.get(k, 0) - factor * entry) % prime
         remainder = {k: c for k, c in remainder.items() if c}

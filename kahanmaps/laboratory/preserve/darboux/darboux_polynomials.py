@@ -161,10 +161,10 @@ def darboux_polynomials(
     if flow or laboratory.defect:
         names = () if laboratory.defect else tuple(cofactor.name for cofactor in cofactors)
         return DarbouxSearch(*laboratory.request, degree, names, tuple(spaces), reason, flow=flow)
-    names, map_, requested = tuple(cofactor.name for cofactor in cofactors), laboratory.maps[0], degree
+    names, map_, requested_degree = tuple(cofactor.name for cofactor in cofactors), laboratory.maps[0], degree
     while comb(map_.dim + degree, degree) > _MAX_TERMS:
         degree -= 1
-    if degree < requested:
+    if degree < requested_degree:
         reason = f"degrees above {degree} were not tried: polynomials in dimension {map_.dim} have too many terms"
     candidates = products(cofactors, degree)
     if len(candidates) > _MAX_PRODUCTS:
@@ -179,44 +179,44 @@ def darboux_polynomials(
                 break
             progress(f"cofactor {product.text(cofactors)}")
             all_spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
-        nonconstant = dict[ScaledProduct, DarbouxSpace]()
+        spaces_by_C = dict[ScaledProduct, DarbouxSpace]()
         for C, space in all_spaces.items():
             basis = [vector for vector in space.basis if any(vector[1:])]  # without constants, which have C = 1
             if basis:
-                nonconstant[C] = DarbouxSpace(space.dim, space.degree, basis)
+                spaces_by_C[C] = DarbouxSpace(space.dim, space.degree, basis)
         # Different products of cofactors may be the same function, and have equal spaces. If products of elements span
         # one of these spaces, all of them are left out.
-        listed = [space for C, space in nonconstant.items() if _is_spanned_by_products(nonconstant, C, map_.prime)]
-        for C, space in nonconstant.items():
-            if space not in listed:
-                listed.append(space)
-                others = [other for key, other in all_spaces.items() if key[0] == C[0] and key != C]
-                result = _closed_form(laboratory, cofactors, C[0], [all_spaces[C], *others], budget)
+        seen_spaces = [space for C, space in spaces_by_C.items() if _is_spanned_by_products(spaces_by_C, C, map_.prime)]
+        for C, space in spaces_by_C.items():
+            if space not in seen_spaces:
+                seen_spaces.append(space)
+                scaled_spaces = [other_space for key, other_space in all_spaces.items() if key[0] == C[0] and key != C]
+                result = _find_formulas(laboratory, cofactors, C[0], [all_spaces[C], *scaled_spaces], budget)
                 if isinstance(result, str):
                     reason = result
                 else:
                     spaces.append(result)
-                    on_result(DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), UNFINISHED))
+                    on_result(DarbouxSearch(*laboratory.request, requested_degree, names, tuple(spaces), UNFINISHED))
     except NoPoint as error:
         reason = str(error)
-    return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
+    return DarbouxSearch(*laboratory.request, requested_degree, names, tuple(spaces), reason, flow=flow)
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
     """Return whether products P Q of elements of other spaces with cofactors of product `C` span the space of `C`."""
     space, (product, c) = spaces[C], C
-    others = {(key[0].powers, key[1]): other for key, other in spaces.items() if key != C}
+    other_spaces = {(key[0].powers, key[1]): other_space for key, other_space in spaces.items() if key != C}
     rows = []
-    for (powers, number), space_of_P in others.items():
-        quotient = tuple(a - b for a, b in zip(product.powers, powers, strict=True)), c * pow(number, -1, prime) % prime
-        space_of_Q = others.get(quotient)
-        if space_of_Q is not None and (powers, number) <= quotient:
+    for (powers, scalar), space_of_P in other_spaces.items():
+        quotient = tuple(a - b for a, b in zip(product.powers, powers, strict=True)), c * pow(scalar, -1, prime) % prime
+        space_of_Q = other_spaces.get(quotient)
+        if space_of_Q is not None and (powers, scalar) <= quotient:
             pairs = ((P, Q) for P in space_of_P.basis for Q in space_of_Q.basis)
             rows += [product_of(P, Q, space.dim, space.degree, prime) for P, Q in pairs]
     return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
 
 
-def _closed_form(
+def _find_formulas(
     laboratory: Laboratory,
     cofactors: Sequence[Cofactor],
     product: CofactorProduct,
@@ -240,15 +240,15 @@ def _closed_form(
         return f"no closed form for the cofactor {text}: {reason}"
     polynomials = tuple(P for P in bases[0] if not P.is_constant())
 
-    def number(map_: ModularMap) -> list[int]:
+    def find_scalar(map_: ModularMap) -> list[int]:
         """Return the number by which the product is multiplied in the cofactor."""
         sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
         [(numerator, denominator)], [pair] = sample.values(product, 1), sample.pairs
         arguments = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)
-        before, after = (int(evaluate(polynomials[0], field, values)) for values in arguments)
-        return [after * denominator * pow(before * numerator, -1, map_.prime) % map_.prime]
+        value, image_value = (int(evaluate(polynomials[0], field, values)) for values in arguments)
+        return [image_value * denominator * pow(value * numerator, -1, map_.prime) % map_.prime]
 
-    [c] = constants_of(laboratory, number)
+    [c] = constants_of(laboratory, find_scalar)
     if c is None:
         return f"no closed form for the numerical factor of the cofactor {text}"
     factor, map_, n = c, laboratory.map, laboratory.map.dim
@@ -271,8 +271,8 @@ def _closed_form(
             return [lhs], [rhs]
 
         powers = [(cofactor.polynomial, k) for cofactor, k in zip(cofactors, product.powers, strict=True)]
-        subject = (map_.symbols, map_.subject, P, factor, powers)
-        identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
+        identity_key = (map_.symbols, map_.subject, P, factor, powers)
+        identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=identity_key)
         return certified(identity, laboratory.seed)[0]
 
     verdicts = [certify_cofactor(P) for P in polynomials]

@@ -75,27 +75,43 @@ class DarbouxSpace:
 
     @classmethod
     def spanned_by(
-        cls, dim: int, degree: int, vectors: Vectors, prime: int, places: Sequence[int] | None = None
+        cls, dim: int, degree: int, vectors: Vectors, prime: int, indices: Sequence[int] | None = None
     ) -> DarbouxSpace:
-        """Return the span of vectors modulo a prime; their entries belong to all monomials, or to those in `places`."""
-        if places is not None:
+        """Return the span of vectors modulo a prime; their entries belong to all monomials or to `indices`."""
+        if indices is not None:
             full_rows = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
             for row, vector in zip(full_rows, vectors, strict=True):
-                for k, entry in zip(places, vector, strict=True):
+                for k, entry in zip(indices, vector, strict=True):
                     row[k] = entry
             vectors = full_rows
-        descending = echelon([vector[::-1] for vector in vectors], prime)
-        basis = [vector[::-1] for vector in reversed(descending)]
-        return cls(dim, degree, _sparsest(basis, dim, degree, prime) if len(basis) == 2 else basis)
+        descending_rows = echelon([vector[::-1] for vector in vectors], prime)
+        basis = [vector[::-1] for vector in reversed(descending_rows)]
+        if len(basis) != 2:
+            return cls(dim, degree, basis)
+        # The two sparsest elements of the pencil are among those that lack a monomial of the pencil.
+        P, Q = basis
+        degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
+        count_work(len(P) + 2 * len(degrees))
+        support = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
+        zero_sets: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
+        for k in support:
+            zero_sets.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
+        supports = [([k for k in support if k not in zeros], min(zeros)) for zeros in zero_sets.values()]
+        elements = []
+        for terms, zero in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
+            element = [(Q[zero] * p - P[zero] * q) % prime for p, q in zip(P, Q, strict=True)]
+            inverse = pow(element[terms[-1]], -1, prime)
+            elements.append([c * inverse % prime for c in element])
+        return cls(dim, degree, elements)
 
     @property
     def support(self) -> tuple[tuple[int, ...], ...]:
         """The exponents of the monomials that occur in the space."""
         exponents = exponents_up_to(self.dim, self.degree)
-        return tuple(exponents[k] for k in self.places)
+        return tuple(exponents[k] for k in self.indices)
 
     @property
-    def places(self) -> list[int]:
+    def indices(self) -> list[int]:
         """The indices of the monomials that occur in the space."""
         return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
 
@@ -111,86 +127,72 @@ class DarbouxSpace:
         return echelon([row for row in rows if row is not None], prime)
 
 
-def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
-    """Return the two sparsest elements of a pencil, among the elements that lack a monomial of the pencil."""
-    degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
-    P, Q = basis
-    count_work(len(P) + 2 * len(degrees))
-    occurring = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
-    zeros: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
-    for k in occurring:
-        zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
-    supports = [([k for k in occurring if k not in missing], min(missing)) for missing in zeros.values()]
-    members = []
-    for support, first in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
-        member = [(Q[first] * p - P[first] * q) % prime for p, q in zip(P, Q, strict=True)]
-        inverse = pow(member[support[-1]], -1, prime)
-        members.append([c * inverse % prime for c in member])
-    return members
-
-
 def darboux_spaces(
-    map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), largest: int = LARGEST_SPAN
+    map_: ModularMap, degree: int, known_spaces: Sequence[DarbouxSpace] = (), max_span: int = LARGEST_SPAN
 ) -> list[DarbouxSpace] | None:
-    """Find the spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
+    """Find the spaces of degree `degree` that are not multiples of the `known_spaces` ones of lower degree.
 
-    Returns None, without a search, if the relations span more than `largest` dimensions. There may be relations that no
-    space explains: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
+    Returns None, without a search, if the relations span more than `max_span` dimensions. There may be relations that
+    no space explains: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
     """
     prime = map_.prime
     span = span_of_relations(map_, degree, 2 * LARGEST_SPAN)
     if len(span) > 2 * LARGEST_SPAN:
         return None
-    multiples = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
+    multiples = echelon([row for space in known_spaces for row in space.multiples(degree, prime)], prime)
     # `complement` completes the multiples of known spaces to a basis of the sum of multiples and span.
-    stacked = [*multiples, *span]
-    independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
-    complement = [stacked[k] for k in independent if k >= len(multiples)]
+    stacked_rows = [*multiples, *span]
+    independent_indices = pivots(echelon(list(zip(*stacked_rows, strict=True)), prime)) if stacked_rows else []
+    complement = [stacked_rows[k] for k in independent_indices if k >= len(multiples)]
     if not complement:
         return []
     if not multiples and _is_darboux(map_, complement, degree):
         return [DarbouxSpace.spanned_by(map_.dim, degree, complement, prime)]
-    if len(complement) + len(multiples) > largest:
+    if len(complement) + len(multiples) > max_span:
         return None
     # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = complement + multiples.
     size = len(complement) + len(multiples)
-    positions = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    at_points, at_images = _values(map_, [*complement, *multiples], degree, len(positions) + _SPARE)
-    count_work(len(positions) ** 2 / 2)
+    upper_positions = [(a, b) for a in range(size) for b in range(a + 1, size)]
+    values, image_values = _evaluate_at_random_points(
+        map_, [*complement, *multiples], degree, len(upper_positions) + _SPARE
+    )
+    count_work(len(upper_positions) ** 2 / 2)
     rows = []
-    for x, y in zip(integers(at_points), integers(at_images), strict=True):
-        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in positions])
+    for x, y in zip(integers(values), integers(image_values), strict=True):
+        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in upper_positions])
     solutions = []
-    for vector in null_space(rows, len(positions), prime):
+    for vector in null_space(rows, len(upper_positions), prime):
         A = nmod_mat(size, size, prime)
-        for (a, b), entry in zip(positions, vector, strict=True):
+        for (a, b), entry in zip(upper_positions, vector, strict=True):
             A[a, b] = entry
             A[b, a] = -entry
         solutions.append(A)
-    bases = [basis for basis in _separate(solutions, complement, multiples, prime) if _is_darboux(map_, basis, degree)]
+    bases = [
+        basis for basis in _separate_spaces(solutions, complement, multiples, prime) if _is_darboux(map_, basis, degree)
+    ]
     if not bases and not multiples:
-        bases = [basis for basis in _of_rank_two(solutions, complement, prime) if _is_darboux(map_, basis, degree)]
+        bases = [basis for basis in _rank_two_spaces(solutions, complement, prime) if _is_darboux(map_, basis, degree)]
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
-def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple[nmod_mat, nmod_mat]:
+def _evaluate_at_random_points(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
     """Return the values of the polynomials at random points and at the images of these, one row for each point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
-    at_points, at_images = (
+    values, image_values = (
         multiply(matrix(rows, prime), polynomials)
-        for rows in zip(*(map_.monomials_at_both(x, image, degree) for x, image in map_.pairs(points)), strict=True)
+        for rows in zip(*(map_.monomials_at_both(x, image, degree) for x, image in map_.pairs(count)), strict=True)
     )
-    return at_points, at_images
+    return values, image_values
 
 
 def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
     """Return whether all ratios of the polynomials are conserved at random points."""
-    u, v = _values(map_, basis, degree, 6)
+    u, v = _evaluate_at_random_points(map_, basis, degree, 6)
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
-def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
+def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
     """Compute the spaces with a common cofactor from the matrices A on complement + multiples.
 
     The projections of the spaces to the complement are eigenspaces of a random E with E B = B E^T for the block B, on
@@ -231,17 +233,17 @@ def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors
         if factor.degree() != 1:
             continue  # the spaces of this factor are conjugate over an extension of the field
         root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
-        shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
-        eigenvectors = null_space(shifted, n, prime)
+        shifted_matrix = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
+        eigenvectors = null_space(shifted_matrix, n, prime)
         if len(eigenvectors) > 1:
             block = echelon(combine(eigenvectors, coordinates, prime), prime)
-            corrected = _add_corrections(solutions, block, k, size, prime)
-            if corrected is not None:
-                spaces.append(echelon(combine(corrected, [*complement, *multiples], prime), prime))
+            completed_block = _add_corrections(solutions, block, k, size, prime)
+            if completed_block is not None:
+                spaces.append(echelon(combine(completed_block, [*complement, *multiples], prime), prime))
     return spaces
 
 
-def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
+def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
     """Return the row space of the combination sum c_s A_s of rank 2 of few matrices A_s, if there is exactly one.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
@@ -256,8 +258,8 @@ def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> 
     rows = []
     count_work(2 * len(pairs) * (2 * size + count * (3 + size**2 / 100) + 5 * len(pairs)))
     for _ in range(2 * len(pairs)):
-        mix = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
-        compressed = [mix * A * mix.transpose() for A in solutions]
+        compression = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
+        forms = [compression * A * compression.transpose() for A in solutions]
 
         def pfaffian(A: nmod_mat, B: nmod_mat) -> int:
             return int(
@@ -270,17 +272,17 @@ def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> 
             )
 
         # entry (s, t) of c c^T is c_s c_t; its coefficient is the polar form, and half of it on the diagonal
-        half = (prime + 1) // 2
-        rows.append([pfaffian(compressed[s], compressed[t]) * (half if s == t else 1) % prime for s, t in pairs])
-    common = null_space(rows, len(pairs), prime)
-    if len(common) != 1:
+        one_half = (prime + 1) // 2
+        rows.append([pfaffian(forms[s], forms[t]) * (one_half if s == t else 1) % prime for s, t in pairs])
+    zeros = null_space(rows, len(pairs), prime)
+    if len(zeros) != 1:
         return []
-    products = dict(zip(pairs, common[0], strict=True))
-    lead = next((s for s in range(count) if products[s, s]), None)
-    if lead is None:
+    products = dict(zip(pairs, zeros[0], strict=True))
+    pivot = next((s for s in range(count) if products[s, s]), None)
+    if pivot is None:
         return []
-    total = combination_of([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
-    coordinates = echelon(integers(total), prime)
+    form = combination_of([products[min(pivot, t), max(pivot, t)] for t in range(count)], solutions)
+    coordinates = echelon(integers(form), prime)
     return [echelon(combine(coordinates, complement, prime), prime)] if len(coordinates) == 2 else []
 
 
@@ -294,11 +296,11 @@ def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: in
     # Take the combinations of the A whose blocks on the complement belong to this space: the columns of such blocks are
     # combinations of the vectors of `block`.
     block_pivots = pivots(block)
-    others = [i for i in range(k) if i not in block_pivots]
+    other_indices = [i for i in range(k) if i not in block_pivots]
     conditions = []
-    count_work(k * len(others) * len(solutions) * len(block_pivots) / 2)
+    count_work(k * len(other_indices) * len(solutions) * len(block_pivots) / 2)
     for b in range(k):
-        for i in others:
+        for i in other_indices:
             # entry (i, b) is determined by the entries (pivot, b)
             conditions.append(
                 [
@@ -315,10 +317,10 @@ def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: in
         for p in block_pivots:
             # A = sum a_pq (p + w_p)(q + w_q)^T with corrections w: row p has the entries sum_q a_pq w_q on multiples
             equations.append([int(A[p, q]) for q in block_pivots] + [int(A[p, t]) for t in range(k, size)])
-    reduced = echelon(equations, prime)
-    if len(reduced) < n or any(reduced[i][j] != (i == j) for i in range(n) for j in range(n)):
+    reduced_equations = echelon(equations, prime)
+    if len(reduced_equations) < n or any(reduced_equations[i][j] != (i == j) for i in range(n) for j in range(n)):
         return None
-    return [[*block[i], *reduced[i][n:]] for i in range(n)]
+    return [[*block[i], *reduced_equations[i][n:]] for i in range(n)]
 
 
 def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
@@ -387,7 +389,7 @@ class TwoPointMap(ModularMap):
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.two_point_basis = base.rng, base.map, two_point_basis
 
-    def _values(self, x: Point, y: Point) -> list[int]:
+    def _bilinear_values(self, x: Point, y: Point) -> list[int]:
         p, sign, X, Y = self.prime, self.two_point_basis.sign, (1, *x), (1, *y)
         count_work(len(pairs_of(self.dim)) / 2)
         # The Wronskian that stands for a square is 0. Random numbers replace it, so that no relation contains it.
@@ -401,11 +403,11 @@ class TwoPointMap(ModularMap):
     ) -> tuple[Sequence[Values], Point, int | None]:
         """Return the values along an orbit, its first point, and its period (None if the orbit does not close)."""
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
-        closed = len(points) < count + shift
-        shifted = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
-        rows = [self._values(x, y) for x, y in zip(points, shifted, strict=False)]
-        chosen = rows if support is None else [[row[k] for k in support] for row in rows]
-        return chosen, points[0], len(points) if closed else None
+        is_closed = len(points) < count + shift
+        shifted_points = points[shift % len(points) :] + (points[: shift % len(points)] if is_closed else [])
+        rows = [self._bilinear_values(x, y) for x, y in zip(points, shifted_points, strict=False)]
+        supported_rows = rows if support is None else [[row[k] for k in support] for row in rows]
+        return supported_rows, points[0], len(points) if is_closed else None
 
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
@@ -413,11 +415,11 @@ class TwoPointMap(ModularMap):
         """Return the values at a point and at its image, times the two `factors`."""
         points = [x, image]
         while len(points) < self.two_point_basis.shift + 2:
-            after = self.step(points[-1])
-            if after is None:
+            next_point = self.step(points[-1])
+            if next_point is None:
                 raise NoPoint("an iterate of a random point modulo a prime is an indeterminacy point")
-            points.append(after)
-        at_point, at_image = (self._values(points[k], points[k + self.two_point_basis.shift]) for k in (0, 1))
+            points.append(next_point)
+        at_point, at_image = (self._bilinear_values(points[k], points[k + self.two_point_basis.shift]) for k in (0, 1))
         return [factors[0] * value for value in at_point], [factors[1] * value for value in at_image]
 
 

@@ -93,41 +93,41 @@ def flow_polynomials(
     """
     if field.symbols:
         context = field.rhs[0].context()
-        extended = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
-        result = flow_polynomials(extended, max_degree, budget, seed)
+        extended_field = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
+        result = flow_polynomials(extended_field, max_degree, budget, seed)
         return replace(result, functions=tuple(P for P in result.functions if degree_in(P, field.dim)))
     n, last_degree = field.dim, 0
-    requested, max_monomials = (4, _DEFAULT_MONOMIALS) if max_degree is None else (max_degree, _MAX_MONOMIALS)
+    requested_degree, max_monomials = (4, _DEFAULT_MONOMIALS) if max_degree is None else (max_degree, _MAX_MONOMIALS)
     weights = gradings(field)
     # The work of a degree is about the sum of the cubes of the sizes of its supports.
-    while last_degree < requested and comb(n + last_degree + 1, n) <= _MAX_LISTED:
+    while last_degree < requested_degree and comb(n + last_degree + 1, n) <= _MAX_LISTED:
         if sum(len(support) ** 3 for support in _supports(n, last_degree + 1, weights)) > max_monomials**3:
             break
         last_degree += 1
     budget = budget or Budget()
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
-    known: dict[str, fmpq_mpoly] = {}
+    known_polynomials: dict[str, fmpq_mpoly] = {}
     # Factors of the right-hand sides come first: the search does not find a common factor of all, whose zeros are fixed
     # points; and if there are infinitely many P, as for x' = x, y' = y, formulas need these factors.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
-            known.setdefault(str(P), P)
+            known_polynomials.setdefault(str(P), P)
     settled_degree, reason = 0, ""
     primes = [random_prime(rng) for _ in range(_PRIMES)]
     while settled_degree < last_degree and not reason:
         for support in _supports(n, settled_degree + 1, weights):
-            reason = _Search(field, settled_degree + 1, support, rng, known).run(primes, budget)
+            reason = _Search(field, settled_degree + 1, support, rng, known_polynomials).run(primes, budget)
             if reason:
                 break
         else:
             settled_degree += 1
     if not reason and max_degree is not None and last_degree < max_degree:
         reason = "too many monomials"
-    listed = [P for P in known.values() if not field.derivative(P).is_zero()]
-    by_size = sorted(
-        listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()], str(P))
+    nonintegrals = [P for P in known_polynomials.values() if not field.derivative(P).is_zero()]
+    sorted_polynomials = sorted(
+        nonintegrals, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()], str(P))
     )
-    return FlowPolynomials(tuple(by_size), settled_degree, reason)
+    return FlowPolynomials(tuple(sorted_polynomials), settled_degree, reason)
 
 
 def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
@@ -161,26 +161,26 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
 
 @dataclass
 class _Search:
-    """The search for polynomials of one degree with given monomials; `known` has the results so far, by text."""
+    """The search for polynomials of one degree with given monomials; the keys of `known_polynomials` are texts."""
 
     field: PolynomialField
     degree: int
     support: Sequence[int]
     rng: random.Random
-    known: dict[str, fmpq_mpoly]
+    known_polynomials: dict[str, fmpq_mpoly]
 
     def __post_init__(self) -> None:
         exponents = exponents_up_to(self.field.dim, self.degree)
         self.monomials = [exponents[k] for k in self.support]
 
     def run(self, primes: list[int], budget: Budget) -> str:
-        """Add the polynomials to `known`; return why there may be further polynomials, or "" if there are none.
+        """Add the polynomials to the known ones; return why there may be further polynomials, or "" if there are none.
 
         The next search begins with the prime that settles this one: modulo this prime no conjugate polynomials exist
         whose products would reappear in a higher degree.
         """
         reason = "lines modulo primes leave others possible"
-        combined: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
+        combinations: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
         for prime in list(primes):
             if budget.is_spent:
                 return SPENT
@@ -188,58 +188,58 @@ class _Search:
                 flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
             except BadPrime:
                 continue
-            vectors, is_complete = self._modulo(flow, budget)
-            missing = list[list[int]]()
+            vectors, is_complete = self._search_modulo(flow, budget)
+            unlifted = list[list[int]]()
             for vector in vectors:
-                if not self._lifts(vector, prime):  # rational or conjugate, decided modulo a power
-                    residues, modulus = self._newton(vector, prime), prime**_PRECISION
-                    is_known = residues and self._lifts(residues, modulus)
+                if not self._try_lift(vector, prime):  # rational or conjugate, decided modulo a power
+                    residues, modulus = self._lift_to_power(vector, prime), prime**_PRECISION
+                    is_known = residues and self._try_lift(residues, modulus)
                     if not is_known and not any(_is_irrational(c, modulus) for c in residues):
-                        missing.append(vector)
+                        unlifted.append(vector)
             if not is_complete:
                 continue
-            pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in combined for new in missing]
-            combined = []
-            for residues, modulus, new in pairs[:_MAX_CHOICES]:
-                if new in missing and self._lifts(residues, modulus):
-                    missing.remove(new)
-                combined.append((residues, modulus))
-            if not missing:
+            pairs = [(chinese(c, m, vector, prime), m * prime, vector) for c, m in combinations for vector in unlifted]
+            combinations = []
+            for residues, modulus, vector in pairs[:_MAX_CHOICES]:
+                if vector in unlifted and self._try_lift(residues, modulus):
+                    unlifted.remove(vector)
+                combinations.append((residues, modulus))
+            if not unlifted:
                 primes.sort(key=lambda p: p != prime)
                 return ""
-            combined = combined or [(vector, prime) for vector in missing]
+            combinations = combinations or [(vector, prime) for vector in unlifted]
             reason = (
-                f"{counted(len(missing), 'polynomial')} of degree {self.degree} modulo a prime not lifted to Q "
+                f"{counted(len(unlifted), 'polynomial')} of degree {self.degree} modulo a prime not lifted to Q "
                 f"(limit: {_PRIMES} primes)"
             )
         return reason
 
-    def _modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
+    def _search_modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
         """Return coefficients of monic polynomials modulo the prime of a flow, and whether there are no others."""
-        common: list[Vectors] = []
+        spaces_so_far: list[Vectors] = []
         for k in range(_LINES):
-            spaces = _Line(flow, self.degree, self.support, self.known.values()).spaces()
-            if spaces is None or (k and len(common) * len(spaces) > _MAX_CHOICES):
+            spaces = _Line(flow, self.degree, self.support, self.known_polynomials.values()).spaces()
+            if spaces is None or (k and len(spaces_so_far) * len(spaces) > _MAX_CHOICES):
                 break
             if k:
-                intersections = (_intersection(A, B, flow.prime) for A in common for B in spaces)
-                distinct = dict.fromkeys(tuple(map(tuple, space)) for space in intersections if space)
-                spaces = [list(map(list, key)) for key in distinct]
-            common = spaces
-            if all(len(space) == 1 for space in common):
-                return [_monic(vector, flow.prime) for [vector] in common], True
+                intersections = (_intersect(A, B, flow.prime) for A in spaces_so_far for B in spaces)
+                distinct_spaces = dict.fromkeys(tuple(map(tuple, space)) for space in intersections if space)
+                spaces = [list(map(list, key)) for key in distinct_spaces]
+            spaces_so_far = spaces
+            if all(len(space) == 1 for space in spaces_so_far):
+                return [_make_monic(vector, flow.prime) for [vector] in spaces_so_far], True
             if budget.is_spent:
                 break
-        return [_monic(space[0], flow.prime) for space in common if len(space) == 1], False
+        return [_make_monic(space[0], flow.prime) for space in spaces_so_far if len(space) == 1], False
 
-    def _lifts(self, residues: Sequence[int], modulus: int) -> bool:
-        """Lift residues to rational coefficients; add a Darboux polynomial to `known`, and return whether it is one."""
+    def _try_lift(self, residues: Sequence[int], modulus: int) -> bool:
+        """Lift residues to rational coefficients; add a Darboux polynomial to the known ones, and say if it is one."""
         values = rational_vector(residues, modulus)
         if values is None:
             return False
         terms = {monomial: c for monomial, c in zip(self.monomials, values, strict=True) if c}
         P = primitive_part(self.field.rhs[0].context().from_dict(terms))[1]
-        if str(P) in self.known:
+        if str(P) in self.known_polynomials:
             return True
         if darboux_cofactor(self.field, P) is None:
             return False
@@ -254,10 +254,10 @@ class _Search:
                 zeros = [factor for factor, _ in line.restricted(P).factor()[1] if factor.degree() == 1]
                 is_special = bool(line.special(zeros[0])) if zeros else None
         if is_special:
-            self.known[str(P)] = P
+            self.known_polynomials[str(P)] = P
         return is_special
 
-    def _newton(self, vector: Sequence[int], p: int) -> list[int]:
+    def _lift_to_power(self, vector: Sequence[int], p: int) -> list[int]:
         """Lift the coefficients of P from p to a power of p; return [] if P and K are not a simple solution."""
         field, context = self.field, self.field.rhs[0].context()
         denominator = lcm(*(int(common_denominator(f)) for f in field.rhs))
@@ -265,7 +265,7 @@ class _Search:
         cofactor = [context.from_dict({m: 1}) for m in exponents_up_to(field.dim, max(0, field.degree - 1))]
         terms = [context.from_dict({m: 1}) for m in self.monomials]
 
-        def combination(weights: Sequence[int], polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+        def combine_polynomials(weights: Sequence[int], polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
             return sum((c * P for c, P in zip(weights, polynomials, strict=True) if c), context.constant(0))
 
         def flow_derivative(P: fmpq_mpoly) -> fmpq_mpoly:
@@ -273,34 +273,34 @@ class _Search:
 
         def solve(columns: Sequence[fmpq_mpoly], rhs: fmpq_mpoly) -> list[int] | None:
             """Solve sum c_k column_k = rhs modulo p; None unless there is exactly one solution."""
-            rows = {tuple(m) for column in (*columns, rhs) for m in column.monoms()}
-            table = [[int(column[m].p) % p for column in (*columns, rhs)] for m in sorted(rows)]
-            solution = echelon(table, p)
+            monomials = {tuple(m) for column in (*columns, rhs) for m in column.monoms()}
+            rows = [[int(column[m].p) % p for column in (*columns, rhs)] for m in sorted(monomials)]
+            solution = echelon(rows, p)
             is_unique = pivots(solution) == list(range(len(columns)))
             return [row[-1] for row in solution] if is_unique else None
 
         # P is determined up to a factor. One coefficient stays fixed, so that the linear systems have one solution.
-        fixed = next(k for k, c in enumerate(vector) if c)
-        P, P_coefficients = combination(vector, terms), list(vector)
+        fixed_index = next(k for k, c in enumerate(vector) if c)
+        P, P_coefficients = combine_polynomials(vector, terms), list(vector)
         K_coefficients = solve([P * k for k in cofactor], flow_derivative(P))
         if K_coefficients is None:
             return []
-        K = combination(K_coefficients, cofactor)
-        free = [k for k in range(len(terms)) if k != fixed]
-        columns = [*(flow_derivative(terms[k]) - K * terms[k] for k in free), *(-P * k for k in cofactor)]
+        K = combine_polynomials(K_coefficients, cofactor)
+        indices = [k for k in range(len(terms)) if k != fixed_index]
+        columns = [*(flow_derivative(terms[k]) - K * terms[k] for k in indices), *(-P * k for k in cofactor)]
         modulus = p
         for _ in range(_PRECISION - 1):
-            P = combination(P_coefficients, terms)
-            residual = flow_derivative(P) - combination(K_coefficients, cofactor) * P
+            P = combine_polynomials(P_coefficients, terms)
+            residual = flow_derivative(P) - combine_polynomials(K_coefficients, cofactor) * P
             if any(int(c.p) % modulus for c in residual.coeffs()):
                 return []
             count_work(len(terms) * sum(map(len, f)))  # `solve` counts its own work
             correction = solve(columns, residual / -modulus)
             if correction is None:
                 return []
-            for k, c in zip(free, correction, strict=False):
+            for k, c in zip(indices, correction, strict=False):
                 P_coefficients[k] += c * modulus
-            K_coefficients = [a + c * modulus for a, c in zip(K_coefficients, correction[len(free) :], strict=True)]
+            K_coefficients = [a + c * modulus for a, c in zip(K_coefficients, correction[len(indices) :], strict=True)]
             modulus *= p
         return P_coefficients
 
@@ -320,29 +320,29 @@ def _is_irrational(residue: int, modulus: int) -> bool:
         rows = [[modulus, *[0] * degree]]
         rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
         count_work(50 * degree**3)
-        shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
+        shortest_vector = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
         # For a random residue the entries of the shortest vector have about 1/(degree + 1) of the bits of the modulus.
-        if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
-            factors = [factor for factor, _ in fmpz_poly(shortest).factor()[1] if factor(residue) % modulus == 0]
+        if max(map(abs, shortest_vector)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
+            factors = [factor for factor, _ in fmpz_poly(shortest_vector).factor()[1] if factor(residue) % modulus == 0]
             return bool(factors) and all(factor.degree() > 1 for factor in factors)
     return False
 
 
-def _monic(vector: Sequence[int], prime: int) -> list[int]:
+def _make_monic(vector: Sequence[int], prime: int) -> list[int]:
     """Scale a vector modulo a prime so that its first nonzero entry is 1."""
-    lead = pow(next(c for c in vector if c), -1, prime)
-    return [c * lead % prime for c in vector]
+    inverse = pow(next(c for c in vector if c), -1, prime)
+    return [c * inverse % prime for c in vector]
 
 
 class _Line:
     """A random line x = start + t slope, and the special points on it.
 
     A point is special if more polynomials with monomials in the `support` vanish along the solution from the point than
-    along a generic solution. Zeros of the `known` polynomials are left out.
+    along a generic solution. Zeros of the known polynomials are left out.
     """
 
-    def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], known: Iterable[fmpq_mpoly]) -> None:
-        self.flow, self.degree, self.support, self.known = flow, degree, support, known
+    def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], factors: Iterable[fmpq_mpoly]) -> None:
+        self.flow, self.degree, self.support, self.known_polynomials = flow, degree, support, factors
         self.count = len(support)
         self.start, self.slope = flow.random_point(), flow.random_point()
         self._generic_dimensions: dict[int, int] = {}
@@ -351,57 +351,77 @@ class _Line:
         """Return the point with parameter t."""
         return tuple((a + t * b) % self.flow.prime for a, b in zip(self.start, self.slope, strict=True))
 
-    def special(self, on_line: nmod_poly) -> list[tuple[int, Vectors]]:
+    def special(self, polynomial: nmod_poly) -> list[tuple[int, Vectors]]:
         """Return, for each special factor of a polynomial in t, its degree and its space.
 
         The space consists of the polynomials that vanish along the solutions from the zeros of the factor. A factor is
         special if this space is larger than for equally many random points, where products of integrals I - c vanish.
         """
         points = []
-        count_work(max(0, int(on_line.degree())) ** 2)
-        for factor, _ in on_line.factor()[1] if on_line.degree() > 0 else ():
+        count_work(max(0, int(polynomial.degree())) ** 2)
+        for factor, _ in polynomial.factor()[1] if polynomial.degree() > 0 else ():
             if factor.degree() <= self.degree:
-                space = null_space(self._conjugates(factor), self.count, self.flow.prime)
+                space = null_space(self._rows_at_zero(factor), self.count, self.flow.prime)
                 if len(space) > self._generic_dimension(factor.degree()):
                     points.append((factor.degree(), space))
         return points
 
-    def _generic_dimension(self, points: int) -> int:
-        """Return the dimension of the space of polynomials that vanish along solutions from `points` random points."""
-        if points not in self._generic_dimensions:
-            rows = [row for _ in range(points) for row in self._rows(None)]
-            self._generic_dimensions[points] = len(null_space(rows, self.count, self.flow.prime))
-        return self._generic_dimensions[points]
+    def _generic_dimension(self, count: int) -> int:
+        """Return the dimension of the space of polynomials that vanish along solutions from `count` random points."""
+        if count not in self._generic_dimensions:
+            rows = [row for _ in range(count) for row in self._rows(None)]
+            self._generic_dimensions[count] = len(null_space(rows, self.count, self.flow.prime))
+        return self._generic_dimensions[count]
 
     def spaces(self) -> list[Vectors] | None:
         """Return the space of vanishing polynomials for each choice of zeros of total degree `degree`.
 
         Returns None if there are too many choices.
         """
-        p, extactic = self.flow.prime, self._extactic()
-        for P in self.known:
+        # The common factor, on the line, of the minors of the matrix of Taylor coefficients. The minors have as many
+        # rows as the rank at random points; the first rows are independent there. Replacing the last row by the next
+        # one gives the derivative of a minor along the flow; the common factor of minor and derivative contains all
+        # invariant factors (and multiple ones). Columns are combined at random. If there are more columns than the
+        # rank, the two minors use different combinations, and share the factor common to all minors.
+        p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
+        matrices = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
+        if size < self.count:
+            matrices[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
+        # The i-th derivative of a monomial has the degree of the monomial plus i (deg f - 1).
+        degree_step = max(0, flow.degree - 1)
+        degree_bound = sum(self.degree + order * degree_step for order in range(size)) + degree_step
+        values: list[tuple[int, ...]] = []
+        for t in range(degree_bound + 1):
+            *rows, last_row, next_row = flow.series(self.at(t), self.degree, size + 1, self.support)
+            minors = (
+                multiply(matrix([*rows, row], p), M) for row, M in zip((last_row, next_row), matrices, strict=True)
+            )
+            values.append(tuple(map(determinant, minors)))
+        minor, other_minor = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
+        extactic = minor.gcd(other_minor)
+        for P in self.known_polynomials:
             factor = self.restricted(P)
-            while (common := extactic.gcd(factor)).degree() > 0:
-                extactic = extactic // common
+            while (common_factor := extactic.gcd(factor)).degree() > 0:
+                extactic = extactic // common_factor
         points = self.special(extactic)
         spaces: list[Vectors] = []
-        waiting: list[tuple[int, int, Vectors]] = [(0, 0, [])]
-        tried = 0
-        while waiting:
-            start, total_degree, space_so_far = waiting.pop()
-            for k in range(start, len(points)):
+        partial_choices: list[tuple[int, int, Vectors]] = [(0, 0, [])]
+        choice_count = 0
+        while partial_choices:
+            first_index, total_degree, space_so_far = partial_choices.pop()
+            for k in range(first_index, len(points)):
                 degree, space = points[k]
                 if total_degree + degree > self.degree:
                     continue
-                tried += 1
-                intersection = _intersection(space_so_far, space, p) if total_degree else space
+                choice_count += 1
+                intersection = _intersect(space_so_far, space, p) if total_degree else space
                 if total_degree and len(intersection) <= self._generic_dimension(total_degree + degree):
                     continue
                 if total_degree + degree == self.degree:
                     spaces.append(intersection)
                 else:
-                    waiting.append((k + 1, total_degree + degree, intersection))
-            if tried > _MAX_CHOICES:
+                    partial_choices.append((k + 1, total_degree + degree, intersection))
+            if choice_count > _MAX_CHOICES:
                 return None
         return spaces
 
@@ -409,7 +429,7 @@ class _Line:
         """Return the Taylor coefficients of the monomials along the solution from a point (None: a random point)."""
         return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE, self.support)
 
-    def _conjugates(self, factor: nmod_poly) -> Sequence[Values]:
+    def _rows_at_zero(self, factor: nmod_poly) -> Sequence[Values]:
         """Return the Taylor coefficients at a zero of an irreducible polynomial in t, expanded in powers of the zero.
 
         These are polynomials in t, interpolated from values at nodes with Lagrange polynomials modulo `factor`.
@@ -423,45 +443,20 @@ class _Line:
         all_nodes = reduce(mul, (nmod_poly([-t, 1], p) for t in nodes))
         basis = []
         for t in nodes:
-            others = all_nodes // nmod_poly([-t, 1], p)
-            L = others * ~others(t) % factor
+            other_nodes = all_nodes // nmod_poly([-t, 1], p)
+            L = other_nodes * ~other_nodes(t) % factor
             basis.append([int(L[k]) for k in range(factor.degree())])
         coefficients = combine(list(zip(*basis, strict=True)), values, p)
         return [row[k : k + self.count] for row in coefficients for k in range(0, len(row), self.count)]
 
-    def _extactic(self) -> nmod_poly:
-        """Return the common factor, on the line, of the minors of the matrix of Taylor coefficients.
-
-        The minors have as many rows as the rank at random points; the first rows are independent there. Replacing the
-        last row by the next one gives the derivative of a minor along the flow; the common factor of minor and
-        derivative contains all invariant factors (and multiple ones). Columns are combined at random. If there are more
-        columns than the rank, the two minors use different combinations, and share the factor common to all minors.
-        """
-        p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
-        mixes = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
-        if size < self.count:
-            mixes[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
-        # The i-th derivative of a monomial has the degree of the monomial plus i (deg f - 1).
-        step = max(0, flow.degree - 1)
-        degree_bound = sum(self.degree + order * step for order in range(size)) + step
-        values: list[tuple[int, ...]] = []
-        for t in range(degree_bound + 1):
-            *rows, last_row, next_row = flow.series(self.at(t), self.degree, size + 1, self.support)
-            minors = (
-                multiply(matrix([*rows, row], p), mix) for row, mix in zip((last_row, next_row), mixes, strict=True)
-            )
-            values.append(tuple(map(determinant, minors)))
-        first, second = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
-        return first.gcd(second)
-
     def restricted(self, P: fmpq_mpoly) -> nmod_poly:
         """Return the restriction of a polynomial to the line, as a polynomial in t."""
-        residues, nodes = GF(self.flow.prime), range(degree_in(P, self.flow.dim) + 1)
-        points = ([residues.convert(c) for c in self.at(t)] for t in nodes)
-        return interpolated(nodes, [int(evaluate(P, residues, x)) for x in points], self.flow.prime)
+        field_p, nodes = GF(self.flow.prime), range(degree_in(P, self.flow.dim) + 1)
+        points = ([field_p.convert(c) for c in self.at(t)] for t in nodes)
+        return interpolated(nodes, [int(evaluate(P, field_p, x)) for x in points], self.flow.prime)
 
 
-def _intersection(A: Vectors, B: Vectors, prime: int) -> Vectors:
+def _intersect(A: Vectors, B: Vectors, prime: int) -> Vectors:
     """Return a basis of the intersection of the spans of two bases."""
     kernel = null_space(list(zip(*A, *B, strict=True)), len(A) + len(B), prime)
     return combine([weights[: len(A)] for weights in kernel], A, prime)

@@ -37,7 +37,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
+from kahanmaps.laboratory.modular_points import IndependentGradients, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, densities_of
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, integrals_of
@@ -73,17 +73,16 @@ class Limit:
     @property
     def text(self) -> str:
         """A sentence on the integral of the flow: whether the map conserves or deforms it."""
-        relation = "one of the map tends to"
+        clause = "one of the map tends to"
         if self.conserved.holds or self.conserved is Certainty.REFUTED:
-            relation = f"the map conserves ({self.conserved})" if self.conserved.holds else "the map deforms"
+            clause = f"the map conserves ({self.conserved})" if self.conserved.holds else "the map deforms"
         series = f"{self.combination} {'tends to' if self.on_solutions else '='} {self.name}"
         series += " at successive points of one solution" * self.on_solutions
         if self.second is not None:
-            power = "eps" if self.order == 1 else f"eps^{self.order}"
-            series += f" + {power}*({_short(self.second, _SHOWN_TERMS_SECOND)}) + ..."
-        return (
-            f"{self.name} = {_short(self.leading, _SHOWN_TERMS)} is an integral of the flow that {relation}: {series}"
-        )
+            eps_power = "eps" if self.order == 1 else f"eps^{self.order}"
+            series += f" + {eps_power}*({_short_text(self.second, _SHOWN_TERMS_SECOND)}) + ..."
+        formula = _short_text(self.leading, _SHOWN_TERMS)
+        return f"{self.name} = {formula} is an integral of the flow that {clause}: {series}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -136,32 +135,34 @@ class FlowAndMap:
         for F in self.other_integrals if others else ():
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))
         names = ", ".join(F.name for F in self.other_integrals)
-        shown = counted(self.count, "integral") if self.count else "no integral"
-        shown += " free of n" if self.map_search.time_dependent else ""  # time-dependent integrals contain the step n
+        number = counted(self.count, "integral") if self.count else "no integral"
+        number += " free of n" if self.map_search.time_dependent else ""  # time-dependent integrals contain the step n
         if self.lost:
-            which = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
+            lost_names = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
             verb, degree = "is" if self.lost == 1 else "are", self.map_search.profile.degree
-            statements.append(("measured", f"{which} {verb} lost up to degree {degree}: the map shows {shown}{limits}"))
+            statements.append(
+                ("measured", f"{lost_names} {verb} lost up to degree {degree}: the map shows {number}{limits}")
+            )
         if self.lost < len(self.other_integrals):
-            missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
-            why = missing if self.without_limit else "its integrals were not counted"
-            statements.append(("undecided", f"what the map makes of {names}: {why}"))
-        missing_formulas = (
+            missing_text = f"the limits of {counted(self.without_limit, 'integral')} are not known"
+            reason = missing_text if self.without_limit else "its integrals were not counted"
+            statements.append(("undecided", f"what the map makes of {names}: {reason}"))
+        missing_count = (
             0 if self.search is None else self.search.codimension - len(self.limits) - len(self.other_integrals)
         )
-        if self.search is not None and missing_formulas > 0:
-            number = counted(self.search.codimension, "independent integral")
+        if self.search is not None and missing_count > 0:
+            counted_text = counted(self.search.codimension, "independent integral")
             statements.append(
-                ("measured", f"solutions show {number} of the flow, {missing_formulas} without a formula")
+                ("measured", f"solutions show {counted_text} of the flow, {missing_count} without a formula")
             )
         elif self.search is not None and self.search.profile.nullities and not self.search.is_exact:
-            more = "other " * bool(self.limits or self.other_integrals)
-            tried = f"relations along solutions up to degree {self.search.profile.degree}"
-            statements.append(("measured", f"no {more}rational integral of the flow shows in {tried}"))
+            other_text = "other " * bool(self.limits or self.other_integrals)
+            scope = f"relations along solutions up to degree {self.search.profile.degree}"
+            statements.append(("measured", f"no {other_text}rational integral of the flow shows in {scope}"))
         if self.search is not None and self.search.profile.cut == SPENT:
-            tried = f"relations of degree {self.search.profile.degree + 1} and more along solutions were not tried"
-            statements.append(("undecided", f"of the flow: {tried}: {SPENT}"))
+            scope = f"relations of degree {self.search.profile.degree + 1} and more along solutions were not tried"
+            statements.append(("undecided", f"of the flow: {scope}: {SPENT}"))
         if self.density is not None:
             statements.append((str(self.density.verdict), f"the flow preserves dx/phi, phi = {self.density.text}"))
         elif self.density_search is not None and self.reason:
@@ -174,14 +175,14 @@ class FlowAndMap:
             text = f"{time_dependent.name} = {time_dependent.text} is a time-dependent integral of the flow"
             statements.append((str(time_dependent.integral.verdict), text))
         if self.polynomials_degree > 1:
-            which, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
+            other_text, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
             degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {which}Darboux polynomials {degrees} {exceptions} factors of known integrals")
+                ("measured", f"no {other_text}Darboux polynomials {degrees} {exceptions} factors of known integrals")
             )
         if self.polynomials_reason:
-            which = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
-            statements.append(("undecided", f"{which}: {self.polynomials_reason}"))
+            subject_text = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
+            statements.append(("undecided", f"{subject_text}: {self.polynomials_reason}"))
         return statements
 
     def to_json(self) -> dict[str, Any]:
@@ -193,10 +194,10 @@ class FlowAndMap:
         }
 
 
-def _short(function: RationalFunction, max_terms: int) -> str:
+def _short_text(function: RationalFunction, max_terms: int) -> str:
     """Return the formula, or the numbers of its terms if there are more than `max_terms`."""
-    sizes = len(function.numerator), len(function.denominator)
-    return format_factored(function) if sum(sizes) <= max_terms else f"P/Q with {sizes[0]} and {sizes[1]} terms"
+    counts = len(function.numerator), len(function.denominator)
+    return format_factored(function) if sum(counts) <= max_terms else f"P/Q with {counts[0]} and {counts[1]} terms"
 
 
 def flow_and_map(
@@ -235,33 +236,33 @@ def flow_and_map(
     if search.eps is not None or not (is_kahan or (isinstance(map_, ImplicitMap) and map_.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
-    stages = budget_for("limits", effort).share([2, 2, 1])  # Darboux polynomials; integrals; densities
+    budgets = budget_for("limits", effort).share([2, 2, 1])  # Darboux polynomials; integrals; densities
     progress("Darboux polynomials of the flow")
-    darboux = laboratory.flow_polynomials(next(stages))
-    limits = _limits(search, laboratory) if is_kahan else _limits_on_solutions(search, laboratory)
-    independent, dim = Independent(laboratory.maps[0], [limit.leading for limit in limits]), laboratory.map.dim
-    stage = next(stages)
+    darboux_search = laboratory.flow_polynomials(next(budgets))
+    limits = _find_limits(search, laboratory) if is_kahan else _find_limits_on_solutions(search, laboratory)
+    independent, dim = IndependentGradients(laboratory.maps[0], [limit.leading for limit in limits]), laboratory.map.dim
+    integral_budget = next(budgets)
     if flow is None and len(limits) < dim - 1:
-        flow = integrals_of(laboratory, _MAX_DEGREE.get(dim, 3), stage, progress)
+        flow = integrals_of(laboratory, _MAX_DEGREE.get(dim, 3), integral_budget, progress)
     flow_integrals = flow.integrals if flow is not None else ()
-    others = [F for F in flow_integrals if independent.add(independent.gradient(F.function))]
-    functions = [*(limit.leading for limit in limits), *(F.function for F in others)]
+    other_integrals = [F for F in flow_integrals if independent.add(independent.gradient(F.function))]
+    functions = [*(limit.leading for limit in limits), *(F.function for F in other_integrals)]
     count = max(known, search.codimension)
-    density_search = densities_of(laboratory, _DENSITY_DEGREE, None, next(stages))
+    density_search = densities_of(laboratory, _DENSITY_DEGREE, None, next(budgets))
     density = next(iter(density_search.densities), None)
     functions += [] if density is None else [density.function]
     comparison = FlowAndMap(
         limits,
-        tuple(others),
+        tuple(other_integrals),
         max(0, count - len(limits)),
         count,
         search,
         flow,
         density,
         density_search,
-        _polynomials(laboratory, darboux.functions, functions),
-        darboux.degree,
-        darboux.reason,
+        _collect_polynomials(laboratory, darboux_search.functions, functions),
+        darboux_search.degree,
+        darboux_search.reason,
     )
     return with_limit(comparison, densities)
 
@@ -274,46 +275,46 @@ def with_limit(comparison: FlowAndMap, densities: DensitySearch | None) -> FlowA
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
     for map_density in densities.densities:
         field = FunctionField(laboratory.map.names)
-        *_, phi = _leading(Function(field, map_density.function.numerator, map_density.function.denominator))
+        *_, phi = _leading_term(Function(field, map_density.function.numerator, map_density.function.denominator))
         verdict, evidence = laboratory.verdict_on(phi, is_density=True)
         if verdict.holds:
             density = FoundDensity(phi, verdict, evidence)
-            polynomials = _polynomials(laboratory, comparison.polynomials, [phi])
+            polynomials = _collect_polynomials(laboratory, comparison.polynomials, [phi])
             return replace(comparison, density=density, density_search=None, polynomials=polynomials)
     return comparison
 
 
-def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
+def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
     """Compute the independent integrals of the flow to which integrals of the map tend."""
     n, symbols = search.file.dim, search.symbols
     field = FunctionField(laboratory.map.names, _BUDGET)
     labels = [integral.name + "(x)" * (integral.name in symbols) for integral in search.integrals]
-    formal = FunctionField((*labels, *symbols, "eps"), reduces=True)
+    formal_field = FunctionField((*labels, *symbols, "eps"), reduces=True)
     map_laboratory = Laboratory(search.file, symbols, None, search.seed)
-    independent = Independent(laboratory.maps[0])
+    independent = IndependentGradients(laboratory.maps[0])
     limits: list[Limit] = []
     # The combinations of integrals that have limits, as functions of x and as formulas in the names of the integrals.
     combinations: list[tuple[Function, Function]] = []
-    for integral, name in zip(search.integrals, formal.variables, strict=False):
+    for integral, formula in zip(search.integrals, formal_field.variables, strict=False):
         I = Function(field, integral.function.numerator, integral.function.denominator)
         R = None
         try:
             for _ in range(_MAX_ROUNDS):
-                order, content, leading = _leading(I)
-                I, name = (function * function.field.variables[-1] ** -order / content for function in (I, name))
+                order, content, leading = _leading_term(I)
+                I, formula = (function * function.field.variables[-1] ** -order / content for function in (I, formula))
                 if independent.adds(independent.gradient(leading)):
                     break
-                R = _relation([leading, *(limit.leading for limit in limits)], n, len(symbols))
-                I = evaluate(R, field, [I, *(before for before, _ in combinations), *field.variables[n:-1]])
-                name = evaluate(
-                    R, formal, [name, *(before for _, before in combinations), *formal.variables[len(labels) : -1]]
+                R = _find_relation([leading, *(limit.leading for limit in limits)], n, len(symbols))
+                I = evaluate(R, field, [I, *(F for F, _ in combinations), *field.variables[n:-1]])
+                formula = evaluate(
+                    R, formal_field, [formula, *(F for _, F in combinations), *formal_field.variables[len(labels) : -1]]
                 )
             else:
                 continue
             remainder = I - Function(field, leading.numerator, leading.denominator)
             order, second = 0, None
             if not remainder.numerator.is_zero():
-                order, content, second = _leading(remainder)
+                order, content, second = _leading_term(remainder)
                 second = RationalFunction(second.numerator * content, second.denominator)
         except (BudgetExceeded, _NoLimit):
             continue
@@ -322,12 +323,12 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
             continue
         independent.add(independent.gradient(leading))
         verdict = integral.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
-        combinations.append((I, name))
-        limits.append(Limit(f"L{len(limits) + 1}", formal.format(name), leading, order, second, verdict))
+        combinations.append((I, formula))
+        limits.append(Limit(f"L{len(limits) + 1}", formal_field.format(formula), leading, order, second, verdict))
     return tuple(limits)
 
 
-def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
+def _find_limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
     """Compute the integrals of the flow to which integrals of a polarized map tend.
 
     A point of such a map consists of several successive points x, x_1, ... of a method of order 2.
@@ -346,11 +347,11 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
         images += [x + h * g + h**2 * field.derivative(g) / 2 for x, g in zip(gens, f, strict=False)]
     images += gens[n:]
     map_gens = [*map_ring.gens()[:n], *map_ring.gens()[search.file.dim :]]
-    formal = FunctionField([integral.name for integral in search.integrals] + ["eps"], reduces=True)
-    functions = FunctionField(laboratory.map.names, _BUDGET)
-    independent = Independent(laboratory.maps[0])
+    formal_field = FunctionField([integral.name for integral in search.integrals] + ["eps"], reduces=True)
+    function_field = FunctionField(laboratory.map.names, _BUDGET)
+    independent = IndependentGradients(laboratory.maps[0])
     limits: list[Limit] = []
-    for integral, name in zip(search.integrals, formal.variables, strict=False):
+    for integral, formula in zip(search.integrals, formal_field.variables, strict=False):
         P, Q = (
             _truncate_at_third_order(polynomial.compose(*images, ctx=context))
             for polynomial in (integral.function.numerator, integral.function.denominator)
@@ -358,18 +359,20 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
         try:
             # A constant leading term is no integral: subtract it, and take the next term instead.
             for _ in range(2):
-                order, content, leading = _leading(Function(functions, P, Q))
+                order, content, leading = _leading_term(Function(function_field, P, Q))
                 if not (leading.is_polynomial and leading.numerator.is_constant()):
                     break
                 P = _truncate_at_third_order(P - content * Q)
-                name = name - formal.convert(content)
+                formula = formula - formal_field.convert(content)
             row = independent.gradient(leading)
         except (BudgetExceeded, _NoLimit, ZeroDivisionError):
             continue
         if not (independent.adds(row) and laboratory.verdict_on(leading)[0].holds):
             continue
         independent.add(row)
-        combination = formal.format(name * formal.variables[-1] ** -order / formal.convert(content))
+        combination = formal_field.format(
+            formula * formal_field.variables[-1] ** -order / formal_field.convert(content)
+        )
         polynomials = (
             polynomial.compose(*map_gens, ctx=map_ring) for polynomial in (leading.numerator, leading.denominator)
         )
@@ -389,38 +392,38 @@ class _NoLimit(KahanmapsError):
     """Raised if no combination of an integral with other integrals has a limit independent of their limits."""
 
 
-def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
+def _leading_term(I: Function) -> tuple[int, fmpq, RationalFunction]:
     """Return v, c and I_0 with I = c eps^v (I_0 + ...), I_0 a reduced quotient of primitive polynomials.
 
     Raises _NoLimit for I = 0.
     """
     if I.numerator.is_zero():
         raise _NoLimit("an integral is a function of others")
-    lowest = []
+    lowest_terms = []
     for P in (I.numerator, I.denominator):
         order = min(int(monomial[-1]) for monomial in P.monoms())
         terms = {(*monomial[:-1], 0): c for monomial, c in P.terms() if monomial[-1] == order}
-        lowest.append((order, P.context().from_dict(terms)))
-    (order_of_P, P), (order_of_Q, Q) = lowest
+        lowest_terms.append((order, P.context().from_dict(terms)))
+    (order_of_P, P), (order_of_Q, Q) = lowest_terms
     function = RationalFunction.reduced(P, Q)
-    content, primitive = primitive_part(function.numerator)
-    return order_of_P - order_of_Q, content, RationalFunction(primitive, function.denominator)
+    content, primitive_numerator = primitive_part(function.numerator)
+    return order_of_P - order_of_Q, content, RationalFunction(primitive_numerator, function.denominator)
 
 
-def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fmpq_mpoly:
+def _find_relation(functions: Sequence[RationalFunction], n: int, symbol_count: int) -> fmpq_mpoly:
     """Find a polynomial relation of least degree between the functions and the symbols. Raises _NoLimit.
 
     The relation is only known to hold at random points: the caller has to verify it.
     """
     rng = random.Random("relation")
-    count = len(functions) + symbols
+    count = len(functions) + symbol_count
     for degree in (1, 2, 3):
         support = exponents_up_to(count, degree)
         if len(support) > _MAX_UNKNOWNS:
             break
         rows: list[list[fmpq]] = []
         while len(rows) < len(support) + 3:
-            x = [fmpq(rng.randint(2, 999)) for _ in range(n + symbols)]
+            x = [fmpq(rng.randint(2, 999)) for _ in range(n + symbol_count)]
             values = [function.value(QQ, [*x, fmpq(0)]) for function in functions]
             if None not in values:
                 arguments = [*values, *x[n:]]
@@ -430,18 +433,18 @@ def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fm
     raise _NoLimit("leading terms depend on each other, but not by a relation of low degree")
 
 
-def _polynomials(
-    laboratory: Laboratory, known: Sequence[fmpq_mpoly], functions: Sequence[RationalFunction]
+def _collect_polynomials(
+    laboratory: Laboratory, candidates: Sequence[fmpq_mpoly], functions: Sequence[RationalFunction]
 ) -> tuple[fmpq_mpoly, ...]:
-    """Collect Darboux polynomials of the flow that are neither affine nor integrals, from `known` and from factors."""
+    """Collect Darboux polynomials of the flow, neither affine nor integrals, from `candidates` and from factors."""
     assert laboratory.field is not None
     n = laboratory.map.dim
-    polynomials = {str(P): P for P in known if degree_in(P, n) > 1}
+    polynomials = {str(P): P for P in candidates if degree_in(P, n) > 1}
     for function in functions:
-        for part, other in permutations((function.numerator, function.denominator)):
+        for polynomial, other in permutations((function.numerator, function.denominator)):
             # An irreducible P of the same degree as Q is no more special than any other member P - c Q of the pencil.
-            factors = irreducible_factors(part)
-            is_generic = [k for _, k in factors] == [1] and degree_in(part, n) == degree_in(other, n)
+            factors = irreducible_factors(polynomial)
+            is_generic = [k for _, k in factors] == [1] and degree_in(polynomial, n) == degree_in(other, n)
             for factor, _ in [] if is_generic else factors:
                 P = primitive_part(factor)[1]
                 K = darboux_cofactor(laboratory.field, P) if degree_in(P, n) > 1 else None

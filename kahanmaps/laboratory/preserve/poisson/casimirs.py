@@ -56,9 +56,9 @@ def casimir_candidates(
     context = ring((*names, *laboratory.symbols, "eps"))
     try:
         candidates = [
-            *_products(laboratory.maps[0], tensor, integrals, context),
-            *_polynomials(laboratory, tensor, integrals, budget),
-            *_fractions(laboratory, tensor, integrals, budget),
+            *_find_products(laboratory.maps[0], tensor, integrals, context),
+            *_find_polynomials(laboratory, tensor, integrals, budget),
+            *_find_fractions(laboratory, tensor, integrals, budget),
         ]
     except NoPoint:
         return
@@ -71,13 +71,13 @@ def casimir_candidates(
         yield format_rational_function(candidate), RationalFunction.reduced(value.numerator, value.denominator)
 
 
-def _products(
+def _find_products(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
 ) -> Iterator[RationalFunction]:
     """Yield the products of powers of at least two integrals that are Casimirs."""
     p, rows = map_.prime, list[list[int]]()
     for _ in range(_SPARE + len(integrals)):
-        values, fields = _hamiltonian_fields(map_, tensor, integrals)
+        values, fields = _evaluate_fields(map_, tensor, integrals)
         # I_1^a I_2^b ... is a Casimir if and only if the logarithmic fields satisfy a P grad I_1/I_1 + ... = 0.
         columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, fields, strict=True)]
         rows += [list(row) for row in zip(*columns, strict=True)]
@@ -98,14 +98,14 @@ def _products(
             yield RationalFunction(numerator, denominator)
 
 
-def _polynomials(
+def _find_polynomials(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """Yield a basis of the polynomials of degree at most 2 in the integrals that are Casimirs."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MAX_TERMS else 1
     powers = exponents_up_to(len(integrals), degree)[1:]
 
-    def columns(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
+    def columns_at_point(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
         rows = []
         for exponents in powers:
             weights = [
@@ -117,12 +117,12 @@ def _polynomials(
             rows.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*fields, strict=True)])
         return rows
 
-    for P in _linear_relations(laboratory, tensor, integrals, powers, columns, budget):
+    for P in _find_linear_relations(laboratory, tensor, integrals, powers, columns_at_point, budget):
         if degree_in(P, len(integrals)) > 1 or len(P) > 1:
             yield RationalFunction(P, P.context().constant(1))
 
 
-def _fractions(
+def _find_fractions(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """Yield quotients of affine functions of the integrals that are Casimirs.
@@ -136,25 +136,25 @@ def _fractions(
     pairs = list(combinations(range(count + 1), 2))
     powers = [tuple(int(k in (a - 1, b - 1)) for k in range(count)) for a, b in pairs]
 
-    def columns(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
+    def columns_at_point(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
         J, P = [1, *values], [[0] * len(fields[0]), *fields]
         return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
 
-    for form in _linear_relations(laboratory, tensor, integrals, powers, columns, budget):
-        letters, zero = [form.context().constant(1), *form.context().gens()[:count]], form.context().constant(0)
+    for form in _find_linear_relations(laboratory, tensor, integrals, powers, columns_at_point, budget):
+        basis, zero = [form.context().constant(1), *form.context().gens()[:count]], form.context().constant(0)
         w = dict.fromkeys(pairs, zero)
         for monomial, value in form.terms():
             pair = pairs[powers.index(tuple(map(int, monomial[:count])))]
             w[pair] += form.context().from_dict({(*([0] * count), *map(int, monomial[count:])): value})
         a, b = next(pair for pair in pairs if not w[pair].is_zero())
         u, v = (
-            sum(((w.get((k, c), zero) - w.get((c, k), zero)) * J for c, J in enumerate(letters)), start=zero)
+            sum(((w.get((k, c), zero) - w.get((c, k), zero)) * J for c, J in enumerate(basis)), start=zero)
             for k in (a, b)
         )
         yield RationalFunction.reduced(u, v)
 
 
-def _linear_relations(
+def _find_linear_relations(
     laboratory: Laboratory,
     tensor: MatrixPoissonTensor,
     integrals: Sequence[FoundIntegral],
@@ -164,30 +164,30 @@ def _linear_relations(
 ) -> Sequence[fmpq_mpoly]:
     """Interpolate the linear relations among columns, as polynomials in the integrals with the monomials `powers`.
 
-    `columns` computes one column for each monomial, from the result of `_hamiltonian_fields` at a point and the prime.
+    `columns` computes one column for each monomial, from the result of `_evaluate_fields` at a point and the prime.
     Coefficients of the relations may contain eps and the symbols.
     """
     count, degree = len(integrals), max(map(sum, powers))
     all_exponents = exponents_up_to(count, degree)
-    places = [all_exponents.index(exponents) for exponents in powers]
+    indices = [all_exponents.index(exponents) for exponents in powers]
 
-    def space(map_: ModularMap) -> DarbouxSpace:
+    def compute_space(map_: ModularMap) -> DarbouxSpace:
         p, rows = map_.prime, list[list[int]]()
         for _ in range(_SPARE + len(powers)):
-            at_point = columns(*_hamiltonian_fields(map_, tensor, integrals), p)
-            rows += [[entry % p for entry in row] for row in zip(*at_point, strict=True)]
-        return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, places)
+            columns_at_point = columns(*_evaluate_fields(map_, tensor, integrals), p)
+            rows += [[entry % p for entry in row] for row in zip(*columns_at_point, strict=True)]
+        return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, indices)
 
-    model = space(laboratory.maps[0])
+    model = compute_space(laboratory.maps[0])
     if not model.basis:
         return ()
     eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
     names = [integral.name for integral in integrals]
-    closed_forms = laboratory.formulas([model], lambda map_: [space(map_)], budget, names, eps_enters)
+    closed_forms = laboratory.formulas([model], lambda map_: [compute_space(map_)], budget, names, eps_enters)
     return closed_forms.bases[0] if closed_forms.bases is not None else ()
 
 
-def _hamiltonian_fields(
+def _evaluate_fields(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral]
 ) -> tuple[list[int], list[list[int]]]:
     """Return the values of the integrals at a random point, and P times their gradients.
@@ -204,7 +204,7 @@ def _hamiltonian_fields(
         value, denominator = function.value(field, [*x, eps]), evaluate(function.denominator, field, [*x, eps])
         if P is None or value is None or value == 0:
             raise NoPoint("an integral or the tensor is 0 or infinite at a random point modulo a prime")
-        column = (P * field.column(scaled_gradient(function, field, [*x, eps], map_.dim))).entries()
+        hamiltonian_field = (P * field.column(scaled_gradient(function, field, [*x, eps], map_.dim))).entries()
         values.append(int(value))
-        fields.append([int(entry / (denominator * denominator)) for entry in column])
+        fields.append([int(entry / (denominator * denominator)) for entry in hamiltonian_field])
     return values, fields

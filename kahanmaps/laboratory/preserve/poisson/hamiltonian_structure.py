@@ -110,7 +110,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
     integrals = affine_integrals(system)
     reason, proved = "the dimension is odd", True
     if n % 2 == 0:
-        K, proved = _invertible(forms, n, rng)
+        K, proved = _find_invertible(forms, n, rng)
         if K is not None:
             return ConstantStructures(system, forms, functions, _hamiltonian(system, all_variables, K), (), "", True)
         reason = "no skew K with K f a gradient is invertible" if forms else "no skew K makes K f a gradient"
@@ -125,7 +125,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
         proved = proved and len(integrals) == 1
     else:
         quotient = quotient_by(integrals, n)
-        K, decided = _invertible(closed_forms(system, quotient, rng), len(quotient.free), rng)
+        K, is_decided = _find_invertible(closed_forms(system, quotient, rng), len(quotient.free), rng)
         if K is not None:
             H = _hamiltonian(system, quotient, K)
             rows = fmpq_mat([[fmpq(entry) for entry in v] for v in integrals])
@@ -133,7 +133,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
             return ConstantStructures(system, forms, functions, H, casimirs, "", True)
         reason += ", and none has the affine integrals as its kernel"
         # With two integrals and even n the kernel is their span or 0; with three it may be a plane, not tried.
-        proved = proved and decided and len(integrals) <= 2
+        proved = proved and is_decided and len(integrals) <= 2
     return ConstantStructures(system, forms, functions, None, (), reason, proved)
 
 
@@ -142,27 +142,27 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
     m, n = len(quotient.free), system.dim
     count_work(n**4 + 5 * n**3)
     over_Q = system.over(QQ)
-    units = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
+    unit_vectors = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
     # K f'(x) must be symmetric, first at a random point, which leaves few K, then at the origin and in each direction.
     jacobians = [over_Q.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), over_Q.B]
-    jacobians += [over_Q.hessian_times(unit) for unit in units]
+    jacobians += [over_Q.hessian_times(unit) for unit in unit_vectors]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
-    forms = [_skew(m, {pair: 1}) for pair in pairs]
+    forms = [_skew_matrix(m, {pair: 1}) for pair in pairs]
     for jacobian in jacobians:
         if not forms:
             return ()
-        by_y = quotient.rows(jacobian) * quotient.section
-        products = [K * by_y for K in forms]
+        jacobian_in_y = quotient.rows(jacobian) * quotient.section
+        products = [K * jacobian_in_y for K in forms]
         conditions = fmpq_mat([[P[i, j] - P[j, i] for P in products] for i, j in pairs])
         forms = [combination_of(vector, forms) for vector in nullspace(QQ, conditions)]
-    echelon, _ = fmpq_mat([[K[i, j] for i, j in pairs] for K in forms]).rref()
-    rows = (primitive_integers(tuple(row)) for row in echelon.tolist())
-    return tuple(_skew(m, dict(zip(pairs, row, strict=True))) for row in rows)
+    reduced_rows, _ = fmpq_mat([[K[i, j] for i, j in pairs] for K in forms]).rref()
+    rows = (primitive_integers(tuple(row)) for row in reduced_rows.tolist())
+    return tuple(_skew_matrix(m, dict(zip(pairs, row, strict=True))) for row in rows)
 
 
-def _skew(m: int, upper: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
+def _skew_matrix(m: int, entries: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
     """Return the skew matrix with these entries in the upper triangle, zero elsewhere."""
-    return fmpq_mat(m, m, [upper.get((a, b), 0) - upper.get((b, a), 0) for a in range(m) for b in range(m)])
+    return fmpq_mat(m, m, [entries.get((a, b), 0) - entries.get((b, a), 0) for a in range(m) for b in range(m)])
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
@@ -196,7 +196,7 @@ def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fm
     return H
 
 
-def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[fmpq_mat | None, bool]:
+def _find_invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[fmpq_mat | None, bool]:
     """Find a simple invertible combination of skew m x m matrices, m even.
 
     Returns the matrix, or None if there is no such matrix, and whether the answer is proved.
@@ -205,15 +205,15 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
         return fmpq_mat(0, 0), True
     if not forms:
         return None, True
-    standard = standard_structure(m)
+    standard_form = standard_structure(m)
     vectors = [K.entries() for K in forms]
-    if fmpq_mat([*vectors, standard.entries()]).rank() == len(vectors):
-        return standard * -1, True
+    if fmpq_mat([*vectors, standard_form.entries()]).rank() == len(vectors):
+        return standard_form * -1, True
     field = GF(random_prime(rng))
-    modular = [field.convert_matrix(K) for K in forms]
+    forms_p = [field.convert_matrix(K) for K in forms]
     for _ in range(3):
-        generic = combination_of([rng.randrange(field.characteristic) for _ in modular], modular)
-        if int(generic.det()):
+        random_combination = combination_of([rng.randrange(field.characteristic) for _ in forms_p], forms_p)
+        if int(random_combination.det()):
             # Simple combinations come first, then random ones of growing size. The search ends, since the Pfaffian is a
             # nonzero polynomial.
             n = len(forms)
@@ -242,9 +242,9 @@ class InheritedIntegrals:
     @property
     def text(self) -> str:
         """The numbers of integrals as a phrase; empty if there are no integrals."""
-        affine, modified = len(self.quotient.integrals), len(self.forms)
-        phrases = [counted(affine, "affine integral")] if affine else []
-        return " and ".join([*phrases, counted(modified, "modified Hamiltonian")] if modified else phrases)
+        affine_count, modified_count = len(self.quotient.integrals), len(self.forms)
+        phrases = [counted(affine_count, "affine integral")] if affine_count else []
+        return " and ".join([*phrases, counted(modified_count, "modified Hamiltonian")] if modified_count else phrases)
 
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
         """Return covectors with the same span as the gradients of all inherited integrals at a point.
@@ -259,21 +259,21 @@ class InheritedIntegrals:
         if image is None or not self.forms:
             return rows
         point, image_point = ([field.convert(c) for c in coordinates] for coordinates in (x, image))
-        S, local = field.convert_matrix(self.quotient.section), map_.map.local
+        S, vector_field = field.convert_matrix(self.quotient.section), map_.map.local
         A, A_image = (
             field.matrix(len(free), len(free), [slopes[i, j] for i in free for j in range(len(free))])
-            for slopes in (local.jacobian(at) * S for at in (point, image_point))
+            for slopes in (vector_field.jacobian(at_point) * S for at_point in (point, image_point))
         )
         identity, eps = field.identity(len(free)), field.convert(map_.eps)
-        f = local.value(point)
+        f = vector_field.value(point)
         f_y = field.column([f[i] for i in free])
         u = field.column([image_point[i] - point[i] for i in free])
         du_dy = (identity - A * eps).inv() * (identity + A_image * eps) - identity
         # The integral of the map is H + grad H . (x~ - x)/3, where grad H = K f and the Hesse matrix of H is K A.
-        third = field.convert(fmpq(1, 3))
+        one_third = field.convert(fmpq(1, 3))
         for form in self.forms:
             K = field.convert_matrix(form)
-            slopes = K * f_y + (K * A * u + du_dy.transpose() * K * f_y) * third
+            slopes = K * f_y + (K * A * u + du_dy.transpose() * K * f_y) * one_third
             row = [0] * n
             for i, slope in zip(free, slopes.entries(), strict=True):
                 row[i] = int(slope)

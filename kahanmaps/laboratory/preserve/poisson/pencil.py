@@ -41,7 +41,7 @@ _BITS = 31  # of primes; python-flint does not sort factors with larger coeffici
 # The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the
 # curves: diller-favre-2001.
 GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
-_Local = dict[tuple[int, int], Any]  # a truncated power series in x, y at a point: coefficients by exponents
+_Series = dict[tuple[int, int], Any]  # a truncated power series in x, y at a point: coefficients by exponents
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ class BasePoints:
     @property
     def text(self) -> str:
         """The base points as a phrase."""
-        near = f" ({self.infinitely_near} infinitely near)" if self.infinitely_near else ""
-        return f"{self.count} of multiplicity {self.multiplicity}{near}"
+        near_text = f" ({self.infinitely_near} infinitely near)" if self.infinitely_near else ""
+        return f"{self.count} of multiplicity {self.multiplicity}{near_text}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -79,11 +79,11 @@ class Pencil:
     @property
     def text(self) -> str:
         """A sentence on degree, genus and base points of the generic curve."""
-        kind = "is" if self.components == 1 else f"has {self.components} components"
-        points = ", ".join(points.text for points in self.base_points)
+        verb = "is" if self.components == 1 else f"has {self.components} components"
+        points_text = ", ".join(points_text.text for points_text in self.base_points)
         return (
-            f"the generic curve {self.integral} = c {kind} of degree {self.degree} and genus {self.genus}; "
-            f"base points: {points}"
+            f"the generic curve {self.integral} = c {verb} of degree {self.degree} and genus {self.genus}; "
+            f"base points: {points_text}"
         )
 
     def motion(self, growth: Growth) -> str:
@@ -94,15 +94,15 @@ class Pencil:
         if self.genus > 1:
             return "the map has finite order, since such a curve has only finitely many automorphisms"
         if self.genus == 1 and growth is Growth.QUADRATIC:
-            where = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
-            return f"{where} is a translation, since the degrees grow"
+            subject_text = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
+            return f"{subject_text} is a translation, since the degrees grow"
         return ""
 
     def contradiction(self, growth: Growth) -> str:
         """Return a sentence on why this growth of the degrees is impossible; empty if the growth is possible."""
-        grows = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
-        possible = not grows or growth is GROWTH_ON.get(self.genus)
-        return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
+        is_unbounded = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
+        is_possible = not is_unbounded or growth is GROWTH_ON.get(self.genus)
+        return "" if is_possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -131,35 +131,35 @@ def pencil_of(
     >>> pencil.text
     'the generic curve I = c is of degree 3 and genus 1; base points: 9 of multiplicity 1 (8 infinitely near)'
     """
-    if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
+    if max(degree_in(polynomial, 2) for polynomial in (integral.numerator, integral.denominator)) > MAX_DEGREE:
         return None
     rng = random.Random(f"pencil {derive_seed(seed, integral, eps)}")
     budget = budget_for("invariant curves", effort)
-    earlier: list[Pencil] = []
+    earlier_pencils: list[Pencil] = []
     for _ in range(_TRIES):
         try:
             _require(not budget.is_spent)
             field = GF(random_prime(rng, _BITS))
             residue = field.random(rng) if eps is None else field.convert(eps)
-            pencil = _Reduced(field, rng, budget).pencil(name, integral, int(residue))
-        except (BadPrime, _Unclear):
+            pencil = _ModularPlane(field, rng, budget).pencil(name, integral, int(residue))
+        except (BadPrime, _NotGeneric):
             continue
-        if pencil in earlier:
+        if pencil in earlier_pencils:
             return pencil
-        earlier.append(pencil)
+        earlier_pencils.append(pencil)
     return None
 
 
-class _Unclear(Exception):
+class _NotGeneric(Exception):
     """Raised if the curves are not generic, or if the work limit is reached."""
 
 
 def _require(condition: bool) -> None:
     if not condition:
-        raise _Unclear
+        raise _NotGeneric
 
 
-class _Reduced:
+class _ModularPlane:
     """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, is near)."""
 
     def __init__(self, field: PrimeField, rng: random.Random, budget: Budget) -> None:
@@ -168,7 +168,7 @@ class _Reduced:
         self.points: Counter[tuple[int, bool]] = Counter()
 
     def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
-        """Compute the pencil of the components. Raises BadPrime, _Unclear."""
+        """Compute the pencil of the components. Raises BadPrime, _NotGeneric."""
         # Homogenize P and Q to the same degree and substitute random affine forms for x, y and z.
         x, y = self.ring.gens()
         forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
@@ -176,13 +176,13 @@ class _Reduced:
         degree, zero = int(max(f.total_degree() for f in at_eps)), self.ring.constant(0)
         count_work(500 + 60 * degree**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
-            [line**k for k in range(degree + 1)]
-            for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
+            [form**k for k in range(degree + 1)]
+            for form in (x * self._draw() + y * self._draw() + self._draw() for _ in "xyz")
         )
         P, Q = (sum((X[i] * Y[j] * Z[degree - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
         curves: list[nmod_mpoly] = []  # the components through three random points
         for _ in range(3):
-            point = [self._random(), self._random()]
+            point = [self._draw(), self._draw()]
             member = P * int(Q(*point)) - Q * int(P(*point))
             _require(not member.is_zero())
             through_point = [(C, e) for C, e in member.factor()[1] if not int(C(*point))]
@@ -196,14 +196,14 @@ class _Reduced:
         _require(remainder == 0)
         self._find_points(curves[0], curves[1], d)
         _require(sum(count * m * m for (m, _), count in self.points.items()) == d * d)
-        loss = sum(count * m * (m - 1) // 2 for (m, _), count in self.points.items())
+        genus_drop = sum(count * m * (m - 1) // 2 for (m, _), count in self.points.items())
         multiplicities = sorted({m for m, _ in self.points}, reverse=True)
         points = (
             BasePoints(m, self.points[m, False] + self.points[m, True], self.points[m, True]) for m in multiplicities
         )
-        return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - loss, tuple(points))
+        return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - genus_drop, tuple(points))
 
-    def _random(self) -> int:
+    def _draw(self) -> int:
         return self._rng.randrange(1, self.prime)
 
     def _find_points(self, C: nmod_mpoly, D: nmod_mpoly, d: int) -> None:
@@ -213,24 +213,24 @@ class _Reduced:
         _require(eliminant[-1] != 0)
         for factor, intersection in nmod_poly(eliminant, self.prime).factor()[1]:
             if intersection < 4:  # less than 2^2: a simple point, followed by simple points infinitely near to it
-                self._add_simple(int(factor.degree()), int(intersection), near=False)
+                self._add_simple(int(factor.degree()), int(intersection), is_near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
-            a = _root(K, [K(int(c)) for c in factor.coeffs()])
-            on_line = list[Any]()  # F(a, y) as polynomials over K
+            a = _find_root(K, [K(int(c)) for c in factor.coeffs()])
+            polynomials_on_line = list[Any]()  # F(a, y) as polynomials over K
             for F in (C, D):
                 coefficients = [K(0)] * (int(F.total_degree()) + 1)
                 for (i, j), c in F.terms():
                     coefficients[j] += a**i * K(int(c))
-                on_line.append(_polynomial(K, coefficients))
-            common = on_line[0].gcd(on_line[1])
-            k = int(common.degree())
+                polynomials_on_line.append(_polynomial(K, coefficients))
+            gcd = polynomials_on_line[0].gcd(polynomials_on_line[1])
+            k = int(gcd.degree())
             _require(k > 0)
-            b = -common[k - 1] / K(k)
-            _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
+            b = -gcd[k - 1] / K(k)
+            _require(gcd == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
             max_intersection = int(intersection)
             f, g = (  # F(x + a, y + b) without terms of degree above the bound
-                _nonzero(
+                _collect_terms(
                     ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
                     for (i, j), c in ((exponents, K(int(c))) for exponents, c in F.terms())
                     for k in range(min(i, max_intersection) + 1)
@@ -238,16 +238,17 @@ class _Reduced:
                 )
                 for F in (C, D)
             )
-            self._resolve(K, f, g, max_intersection, exact=True, near=False)
+            self._resolve(K, f, g, max_intersection, is_exact=True, is_near=False)
 
-    def _add_simple(self, conjugates: int, chain: int, near: bool) -> None:
-        self.points[1, near] += conjugates
-        self.points[1, True] += conjugates * (chain - 1)
+    def _add_simple(self, conjugate_count: int, chain_length: int, is_near: bool) -> None:
+        self.points[1, is_near] += conjugate_count
+        self.points[1, True] += conjugate_count * (chain_length - 1)
 
-    def _resolve(self, K: Any, f: _Local, g: _Local, max_intersection: int, *, exact: bool, near: bool) -> None:
+    def _resolve(self, K: Any, f: _Series, g: _Series, max_intersection: int, *, is_exact: bool, is_near: bool) -> None:
         """Count the origin and the points infinitely near to it, as far as they are common points of two curves over K.
 
-        The intersection number is at most `max_intersection`, and equal to it if `exact`; it bounds the degrees needed.
+        The intersection number is at most `max_intersection`, and equal to it if `is_exact`; it bounds the degrees of
+        the terms that matter.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())
@@ -255,15 +256,15 @@ class _Reduced:
         _require(m == min(map(sum, g), default=max_intersection + 1) and m * m <= max_intersection)
         if m == 0:
             return
-        if m == 1 and exact:
-            self._add_simple(K.degree(), max_intersection, near)
+        if m == 1 and is_exact:
+            self._add_simple(K.degree(), max_intersection, is_near)
             return
-        self.points[m, near] += K.degree()
+        self.points[m, is_near] += K.degree()
         if m * m == max_intersection:
             return
-        shear = K(self._random())  # afterwards x = 0 is tangent to neither curve
+        shear = K(self._draw())  # afterwards x = 0 is tangent to neither curve
         f, g = (  # F(x + s y, y)
-            _nonzero(((i - k, j + k), c * comb(i, k) * shear**k) for (i, j), c in F.items() for k in range(i + 1))
+            _collect_terms(((i - k, j + k), c * comb(i, k) * shear**k) for (i, j), c in F.items() for k in range(i + 1))
             for F in (f, g)
         )
         cones = [_polynomial(K, [F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
@@ -272,25 +273,25 @@ class _Reduced:
         for direction, _ in directions:
             k = int(direction.degree())
             L = fq_default_ctx(self.prime, K.degree() * k)
-            embedded = _embedding(K, L)
-            slope = _root(L, [embedded(c) for c in direction.coeffs()])
+            embed = _embedding(K, L)
+            slope = _find_root(L, [embed(c) for c in direction.coeffs()])
             bound = (max_intersection - m * m) // (k if len(directions) == 1 else 1)
             f_blown_up, g_blown_up = (  # F(x, x (y + slope))/x^m without terms of a degree above `bound`
-                _nonzero(
+                _collect_terms(
                     ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
-                    for (i, j), c in ((exponents, embedded(c)) for exponents, c in F.items())
+                    for (i, j), c in ((exponents, embed(c)) for exponents, c in F.items())
                     for k in range(min(j, bound - (i + j - m)) + 1)
                 )
                 for F in (f, g)
             )
-            self._resolve(L, f_blown_up, g_blown_up, bound, exact=exact and len(directions) == 1, near=True)
+            self._resolve(L, f_blown_up, g_blown_up, bound, is_exact=is_exact and len(directions) == 1, is_near=True)
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
     return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub does not allow lists
 
 
-def _root(K: Any, coefficients: list[Any]) -> Any:
+def _find_root(K: Any, coefficients: list[Any]) -> Any:
     return _polynomial(K, coefficients).roots()[0][0]
 
 
@@ -298,14 +299,14 @@ def _embedding(K: Any, L: Any) -> Any:
     """Return an embedding of the finite field K into L."""
     if K.degree() == L.degree():
         return lambda c: c
-    gen = _root(L, [L(int(c)) for c in K.modulus().coeffs()])
-    powers = [gen**k for k in range(K.degree())]
-    return lambda c: sum((power * L(int(part)) for part, power in zip(c.to_list(), powers, strict=False)), L(0))
+    generator = _find_root(L, [L(int(c)) for c in K.modulus().coeffs()])
+    powers = [generator**k for k in range(K.degree())]
+    return lambda c: sum((power * L(int(a)) for a, power in zip(c.to_list(), powers, strict=False)), L(0))
 
 
-def _nonzero(terms: Iterable[tuple[tuple[int, int], Any]]) -> _Local:
+def _collect_terms(terms: Iterable[tuple[tuple[int, int], Any]]) -> _Series:
     """Add up terms and drop those that are 0."""
-    total: _Local = {}
+    coefficients: _Series = {}
     for exponents, c in terms:
-        total[exponents] = total.get(exponents, 0) + c
-    return {exponents: c for exponents, c in total.items() if not c.is_zero()}
+        coefficients[exponents] = coefficients.get(exponents, 0) + c
+    return {exponents: c for exponents, c in coefficients.items() if not c.is_zero()}

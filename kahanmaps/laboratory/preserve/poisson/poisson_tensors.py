@@ -38,12 +38,12 @@ from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.defaults import budget_for, tensor_degree
 from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import (
-    Independent,
+    IndependentGradients,
     ModularMap,
     NoPoint,
     Point,
     exponents_up_to,
-    places_of,
+    monomial_index,
     product_of,
     scaled_gradient,
 )
@@ -101,8 +101,8 @@ class FoundTensor(LatexDisplay, ResultPart):
     @property
     def is_liouville_integrable(self) -> bool:
         """Whether enough integrals are known to be in involution for the theorem of Liouville."""
-        enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
-        return enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
+        has_enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
+        return has_enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
 
     @property
     def statement(self) -> str:
@@ -235,35 +235,35 @@ def find_poisson(
         raise InputError(f"found the degree {degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
     budget = budget_for("Poisson tensors", effort)
-    dim, requested = file.dim, degree
-    pairs = dim * (dim - 1) // 2
+    dim, top_degree = file.dim, degree
+    pair_count = dim * (dim - 1) // 2
     if denominator is not None:
         context = ring(laboratory.map.names)  # with the symbols
         gens = (*context.gens()[:dim], context.gens()[-1])
         polynomials = (denominator.numerator, denominator.denominator)
         denominator = RationalFunction(*(polynomial.compose(*gens, ctx=context) for polynomial in polynomials))
         if any(polynomial.is_zero() for polynomial in at_eps(denominator, laboratory.eps)):
-            at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
+            eps_text = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
             raise InputError(
                 f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or "
-                f"undefined{at}, expected a function that is not zero"
+                f"undefined{eps_text}, expected a function that is not zero"
             )
-    while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
+    while degree > 0 and pair_count * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
     tensors: list[FoundTensor] = []
     reason = laboratory.defect
-    cut = f"degrees above {degree} were not tried" if degree < requested else ""
-    if pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
+    limit_text = f"degrees above {degree} were not tried" if degree < top_degree else ""
+    if pair_count * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
         # The stages: all tensors; log-canonical tensors; density as denominator; verification; brackets.
-        stages = budget.share([3, 1, 2, 2, 3])
-        candidate_tensors, reason = _tensors(laboratory, degree, denominator, next(stages))
-        log_canonical_budget, density_budget = next(stages), next(stages)
-        if not candidate_tensors and degree < 2 <= requested and dim <= _MAX_LOG_CANONICAL_DIM and denominator is None:
-            cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
-            candidate_tensors, _ = _tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
+        budgets = budget.share([3, 1, 2, 2, 3])
+        candidate_tensors, reason = _find_tensors(laboratory, degree, denominator, next(budgets))
+        log_canonical_budget, density_budget = next(budgets), next(budgets)
+        if not candidate_tensors and degree < 2 <= top_degree and dim <= _MAX_LOG_CANONICAL_DIM and denominator is None:
+            limit_text = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
+            candidate_tensors, _ = _find_tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
         if not candidate_tensors and denominator is None:
             # Try the product of the factors of a known density as denominator; its degree is added to the degree.
             density = None
@@ -273,24 +273,24 @@ def find_poisson(
                 ).density
             factors = [g for g, _ in density.factors] if density is not None else []
             higher_degree = degree + sum(degree_in(g, dim) for g in factors)
-            if factors and pairs * comb(dim + higher_degree, dim) <= _MAX_UNKNOWNS // 2:
+            if factors and pair_count * comb(dim + higher_degree, dim) <= _MAX_UNKNOWNS // 2:
                 psi = reduce(lambda a, b: a * b, factors)
                 density_denominator = RationalFunction(psi, psi.context().constant(1))
-                candidate_tensors, _ = _tensors(laboratory, higher_degree, density_denominator, density_budget)
+                candidate_tensors, _ = _find_tensors(laboratory, higher_degree, density_denominator, density_budget)
                 denominator = density_denominator if candidate_tensors else None
-                addition = (
+                reason_with_density = (
                     f", and none of degree at most {higher_degree} over {format_rational_function(density_denominator)}"
                 )
-                reason = "" if candidate_tensors else reason + addition
+                reason = "" if candidate_tensors else reason + reason_with_density
         for k, tensor in enumerate(candidate_tensors, 1):
             progress(f"verifying tensor {k} of {len(candidate_tensors)}")
-            law = transformation_identity(laboratory.map, tensor, laboratory.eps)
+            identity = transformation_identity(laboratory.map, tensor, laboratory.eps)
             # In high dimension the identity is too long to expand, so its budget is 0.
-            verdict, evidence = _verdict(laboratory, law, budget if dim <= MAX_DIMENSION else Budget(0))
+            verdict, evidence = _certify(laboratory, identity, budget if dim <= MAX_DIMENSION else Budget(0))
             if not verdict.holds:
                 continue
-            jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, laboratory.eps), budget)
-            P = _at(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
+            jacobi, jacobi_evidence = _certify(laboratory, jacobi_identity(tensor, laboratory.eps), budget)
+            P = _evaluate(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
             rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
             tensors.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
             on_result(PoissonSearch(*laboratory.request, tuple(tensors), (), degree, denominator, None, UNFINISHED))
@@ -299,19 +299,19 @@ def find_poisson(
         # Poisson tensors first, then by descending rank.
         tensors.sort(key=lambda P: (not P.jacobi.holds, -P.rank))
         tensors = [replace(P, name=f"P{k}" if len(tensors) > 1 else "P") for k, P in enumerate(tensors, 1)]
-    if cut:
-        cut = f"{cut}: such tensors have too many coefficients"
-        reason = f"{reason}; {cut}" if reason and not tensors else cut
+    if limit_text:
+        limit_text = f"{limit_text}: such tensors have too many coefficients"
+        reason = f"{reason}; {limit_text}" if reason and not tensors else limit_text
     pencil = None
     if 1 < len(tensors) <= _MAX_PENCIL and all(P.jacobi.holds for P in tensors):
-        identity = jacobi_identity(_pencil([P.tensor for P in tensors]), laboratory.eps)
-        pencil, _ = _verdict(laboratory, identity, budget)
+        jacobi_of_pencil = jacobi_identity(_generic_combination([P.tensor for P in tensors]), laboratory.eps)
+        pencil, _ = _certify(laboratory, jacobi_of_pencil, budget)
     search = PoissonSearch(*laboratory.request, tuple(tensors), (), degree, denominator, pencil, reason)
     if tensors and integrals is None:
         progress("integrals, for their brackets")
-        half = budget.part(0.5)
+        share = budget.part(0.5)
         with suppress(KahanmapsError):  # some maps do not support the search for integrals
-            integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, effort=half, seed=seed).integrals
+            integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, effort=share, seed=seed).integrals
     return with_brackets(search, integrals or (), budget)
 
 
@@ -320,14 +320,14 @@ def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], bud
     tensors = result.tensors
     if tensors and integrals:
         laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
-        tensors = tuple(_with_brackets(laboratory, tensor, integrals, budget) for tensor in tensors)
+        tensors = tuple(_add_brackets(laboratory, tensor, integrals, budget) for tensor in tensors)
     if tensors and budget.is_spent:
-        cut = f"some identities were not expanded, or some Casimirs not searched for: {SPENT}"
-        result = replace(result, reason="; ".join(filter(None, [result.reason, cut])))
+        limit_text = f"some identities were not expanded, or some Casimirs not searched for: {SPENT}"
+        result = replace(result, reason="; ".join(filter(None, [result.reason, limit_text])))
     return replace(result, tensors=tensors, integrals=tuple(integrals))
 
 
-def _tensors(
+def _find_tensors(
     laboratory: Laboratory,
     degree: int,
     denominator: RationalFunction | None,
@@ -339,12 +339,12 @@ def _tensors(
     Returns the tensors and an empty text, or no tensors and the reason.
     """
     try:
-        model, other = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
+        model, other_space = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
     except NoPoint as error:
         return [], str(error)
     if not model.basis:
         return [], f"no tensor of degree at most {degree} is preserved (measured modulo a prime)"
-    if len(other.basis) != len(model.basis):
+    if len(other_space.basis) != len(model.basis):
         return [], "the tensors found at one eps do not exist at another"
     support = frozenset(model.support)
     variables = laboratory.map.variables
@@ -360,13 +360,13 @@ def _tensors(
     # Leave out tensors in the span of earlier tensors and of products of polynomial integrals with tensors.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
-    places, rows = places_of(2 * n, degree), list[list[int]]()
+    indices, rows = monomial_index(2 * n, degree), list[list[int]]()
     for integral in integrals.basis:
         if any(integral[1:]):
-            in_x_and_d = [0] * len(places)
+            integral_in_x_and_d = [0] * len(indices)
             for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
-                in_x_and_d[places[(*exponent, *[0] * n)]] = c
-            products = (product_of(in_x_and_d, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
+                integral_in_x_and_d[indices[(*exponent, *[0] * n)]] = c
+            products = (product_of(integral_in_x_and_d, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
             rows += [P for P in products if P is not None]
     context, spanned_rank, tensors = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
     divisor, multiplier = context.constant(1), context.constant(1)
@@ -405,15 +405,15 @@ def tensor_space(
     Bivectors are polynomials in x and d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
-    places, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
+    indices, pairs = monomial_index(2 * n, degree + 2), list(combinations(range(n), 2))
     unknowns = []  # for each monomial x^a d_i d_j the indices of the monomial, of the pair (i, j) and of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
         for m, exponent in enumerate(exponents_up_to(n, degree)):
             if support is None or (*exponent, *directions) in support:
-                unknowns.append((places[(*exponent, *directions)], p, m))
+                unknowns.append((indices[(*exponent, *directions)], p, m))
 
-    def factor(x: Point) -> int:
+    def divisor_at(x: Point) -> int:
         """Return the value of `denominator` at a point (None: 1). Raises NoPoint at a pole of this function."""
         if denominator is None:
             return 1
@@ -427,7 +427,7 @@ def tensor_space(
     rows = []
     for x, image in map_.pairs(max(unknowns_by_pair, default=0) + _SPARE_POINTS):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
-        monomials, image_monomials = map_.monomials_at_both(x, image, degree, (factor(image), factor(x)))
+        monomials, image_monomials = map_.monomials_at_both(x, image, degree, (divisor_at(image), divisor_at(x)))
         count_work(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
@@ -438,28 +438,28 @@ def tensor_space(
                 ]
             )
     vectors = null_space(rows, len(unknowns), prime)
-    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [place for place, _, _ in unknowns])
+    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [index for index, _, _ in unknowns])
 
 
-def _at(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
+def _evaluate(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
     """Return the matrix of a tensor at a point modulo a prime."""
     field = GF(map_.prime)
     return tensor.value(field, field.convert(map_.eps), tuple(field.convert(c) for c in (*x, *map_.values)))
 
 
-def _with_brackets(
+def _add_brackets(
     laboratory: Laboratory, found_tensor: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> FoundTensor:
     """Add to the tensor its Casimirs, and a largest set of integrals in involution."""
     tensor, map_ = found_tensor.tensor, laboratory.maps[0]
-    field, casimir_gradients = GF(map_.prime), Independent(map_)
-    P = _at(tensor, map_, casimir_gradients.point)
+    field, casimir_gradients = GF(map_.prime), IndependentGradients(map_)
+    P = _evaluate(tensor, map_, casimir_gradients.point)
     rows = [casimir_gradients.gradient(integral.function) for integral in integrals]
     casimirs: list[str] = []
 
     def add_casimir(name: str, function: RationalFunction, row: list[int]) -> None:
         is_in_kernel = all(entry == 0 for entry in (P * field.column(row)).entries())
-        if is_in_kernel and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), budget)[0].holds:
+        if is_in_kernel and _certify(laboratory, _involution(laboratory, tensor, [function], True), budget)[0].holds:
             casimirs.append(name)
             casimir_gradients.add(row)
 
@@ -473,27 +473,27 @@ def _with_brackets(
                 add_casimir(name, function, row)
     # The first largest set of integrals whose brackets with each other vanish at the point.
     hamiltonian_fields = [(P * field.column(row)).entries() for row in rows]
-    vanish = [
+    is_zero = [
         [sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in hamiltonian_fields] for row in rows
     ]
     indices = range(min(len(rows), _MAX_INTEGRALS))
     subsets = (subset for size in range(len(indices), 0, -1) for subset in combinations(indices, size))
-    best = next((subset for subset in subsets if all(vanish[i][j] for i, j in combinations(subset, 2))), ())
-    chosen = [integrals[k] for k in best]
+    largest_subset = next((subset for subset in subsets if all(is_zero[i][j] for i, j in combinations(subset, 2))), ())
+    integrals_in_involution = [integrals[k] for k in largest_subset]
     involution = None
-    if chosen:
-        functions = [integral.function for integral in chosen]
-        involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), budget)
-    names = tuple(integral.name for integral in chosen)
+    if integrals_in_involution:
+        functions = [integral.function for integral in integrals_in_involution]
+        involution, _ = _certify(laboratory, _involution(laboratory, tensor, functions, False), budget)
+    names = tuple(integral.name for integral in integrals_in_involution)
     return replace(found_tensor, casimirs=tuple(casimirs), in_involution=names, involution=involution)
 
 
-def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
+def _certify(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
     """Certify an identity, without an expansion if the budget is spent."""
     return certified(identity, laboratory.seed, expands=not budget.is_spent)
 
 
-def _brackets(
+def _involution(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, functions: Sequence[RationalFunction], of_variables: bool
 ) -> Identity:
     """Return the identity {F, G} = 0 for all functions F, G or, if `of_variables`, {F, x_i} = 0 for all variables."""
@@ -504,22 +504,22 @@ def _brackets(
         if P is None:
             return None
         with field.working():
-            columns = [field.column(scaled_gradient(function, field, (*point, eps), n)) for function in functions]
+            gradients = [field.column(scaled_gradient(function, field, (*point, eps), n)) for function in functions]
             brackets: list[Any] = []
-            for k, column in enumerate(columns):
-                hamiltonian_field = P * column
+            for k, gradient in enumerate(gradients):
+                hamiltonian_field = P * gradient
                 if of_variables:
                     brackets += hamiltonian_field.entries()
                 else:
-                    brackets += [(columns[j].transpose() * hamiltonian_field)[0, 0] for j in range(k)]
+                    brackets += [(gradients[j].transpose() * hamiltonian_field)[0, 0] for j in range(k)]
         return brackets, [field.zero] * len(brackets)
 
-    subject = ("brackets", tensor.subject, list(functions), of_variables)
+    identity_key = ("brackets", tensor.subject, list(functions), of_variables)
     has_eps = laboratory.map.has_eps or tensor.has_eps
-    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
+    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=identity_key)
 
 
-def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
+def _generic_combination(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
     """Return the sum of the tensors, each multiplied by a different symbol."""
     names = tensors[0].rows[0][0].names
     prefix = "c"
@@ -529,12 +529,12 @@ def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
     gens = context.gens()
     old_gens, symbols = (*gens[: len(names) - 1], gens[-1]), gens[len(names) - 1 : -1]
 
-    def combination(entries: Iterable[RationalFunction]) -> RationalFunction:
+    def combine(entries: Iterable[RationalFunction]) -> RationalFunction:
         numerator, denominator = context.constant(0), context.constant(1)
         for symbol, entry in zip(symbols, entries, strict=True):
-            N, D = (part.compose(*old_gens, ctx=context) for part in (entry.numerator, entry.denominator))
+            N, D = (F.compose(*old_gens, ctx=context) for F in (entry.numerator, entry.denominator))
             numerator, denominator = numerator * D + symbol * N * denominator, denominator * D
         return RationalFunction.reduced(numerator, denominator)
 
     n = tensors[0].dim
-    return MatrixPoissonTensor([[combination(P.rows[i][j] for P in tensors) for j in range(n)] for i in range(n)])
+    return MatrixPoissonTensor([[combine(P.rows[i][j] for P in tensors) for j in range(n)] for i in range(n)])

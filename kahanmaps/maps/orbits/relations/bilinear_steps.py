@@ -3,8 +3,8 @@
 Cramer's rule gives the integers of the next point as determinants, several times as long as in lowest terms. If the
 orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation on it, then the homogeneous
 coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), all products
-X_i(n + 1) X_j(n - lag) and X_k(n) X_l(n + 1 - lag) are sections of one bundle. If the
-products X_k(n) X_l(n + 1 - lag) span its sections, then
+X_i(n + 1) X_j(n - lag) and X_k(n) X_l(n + 1 - lag) are sections of one bundle. If the products X_k(n) X_l(n + 1 - lag)
+span its sections, then
 
     f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
 
@@ -12,7 +12,6 @@ with bilinear forms B_ij that have integer coefficients and do not depend on n. 
 step consists of products and of exact divisions by the last coordinate at step n - lag.
 The forms are computed modulo primes and need no proof: each point that they give is verified exactly in the equation of
 the step.
-step, exactly.
 """
 
 from __future__ import annotations
@@ -53,21 +52,22 @@ class BilinearForms:
     def point(self, number: int) -> IntegerPoint | None:
         """Return None: a point is computed only from the points before it."""
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point after the points in `last`; None if the forms do not give it."""
-        current, earlier, divided_by = (
-            [*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag)
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+        """Return the point after the points in `last_points`; None if the forms do not give it."""
+        last_coordinates, lagged_coordinates, divisor_coordinates = (
+            [*last_points[k].numerators, last_points[k].denominator] for k in (-1, -self.lag, -1 - self.lag)
         )
-        column = fmpz_mat(len(self.products), 1, [current[i] * earlier[j] for i, j in self.products])
+        products = [last_coordinates[i] * lagged_coordinates[j] for i, j in self.products]
+        column = fmpz_mat(len(products), 1, products)
         values: list[fmpz] = (self.coefficients * column).entries()
-        quotients = [self._multiple * value // divided_by[-1] for value in values]
+        quotients = [self._multiple * value // divisor_coordinates[-1] for value in values]
         image = lowest(quotients[:-1], quotients[-1])
-        if image is not None and self._steps.is_image(last[-1], image):
+        if image is not None and self._steps.is_image(last_points[-1], image):
             return image
         image = lowest(values[:-1], values[-1])
-        if image is None or not self._steps.is_image(last[-1], image):
+        if image is None or not self._steps.is_image(last_points[-1], image):
             return None
-        self._multiple = self._multiple.lcm(fmpq(values[-1], image.denominator * divided_by[-1]).q)
+        self._multiple = self._multiple.lcm(fmpq(values[-1], image.denominator * divisor_coordinates[-1]).q)
         return image
 
 
@@ -91,44 +91,46 @@ class _Search:
         self._steps, self._point, self._lag = steps, point, lag
         size = steps.dim + 1
         self.products = [(i, j) for i in range(size) for j in range(size) if lag > 1 or i <= j]
-        self._used: list[int] | None = None  # the unknowns that are not 0 modulo the first prime
+        self._nonzero_unknowns: list[int] | None = None  # the unknowns that are not 0 modulo the first prime
 
     def modulo(self, prime: int) -> list[list[int]] | None:
         """Return the coefficients of the forms modulo a prime; None if no forms exist or they are not unique."""
-        lag, unknowns = self._lag, len(self.products)
-        length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _EXTRA_POINTS
+        lag, unknown_count = self._lag, len(self.products)
+        length = 3 * unknown_count // 2 + _EXTRA_POINTS
+        if self._nonzero_unknowns is not None:
+            length = max(unknown_count, len(self._nonzero_unknowns) // 2) + _EXTRA_POINTS
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
-        images, points_at_n, points_before, earliest = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
+        images, points_at_n, points_before, earliest_points = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
         values = [
             [x[i] * y[j] % prime for i, j in self.products] for x, y in zip(points_at_n, points_before, strict=True)
         ]
-        if self._used is None:
-            independent = pivots(echelon(values, prime))
-            self.products = [self.products[k] for k in independent]
-            values = [[row[k] for k in independent] for row in values]
+        if self._nonzero_unknowns is None:
+            independent_columns = pivots(echelon(values, prime))
+            self.products = [self.products[k] for k in independent_columns]
+            values = [[row[k] for k in independent_columns] for row in values]
         # f = f_n, for points with last coordinate 1: f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
         # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
-        unknowns = len(values[0])
-        zeros, rows = [0] * unknowns, []
-        for row, *endpoints in zip(values, images, earliest, strict=True):
-            g, h = (sum((k * k + 2) * entry for k, entry in enumerate(endpoint)) for endpoint in endpoints)
+        unknown_count = len(values[0])
+        zeros, rows = [0] * unknown_count, []
+        for row, *outer_points in zip(values, images, earliest_points, strict=True):
+            g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in outer_points)
             rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
             rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
-        columns = list(range(3 * unknowns)) if self._used is None else self._used
+        columns = list(range(3 * unknown_count)) if self._nonzero_unknowns is None else self._nonzero_unknowns
         relations = kernel(*matrix([[row[k] for k in columns] for row in rows], prime).rref())
         if len(relations) != 1:
             return None
         weights = dict(zip(columns, relations[0], strict=True))
-        self._used = [k for k, weight in weights.items() if weight]
-        factors = [sum(weights.get(2 * unknowns + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
+        self._nonzero_unknowns = [k for k, weight in weights.items() if weight]
+        factors = [sum(weights.get(2 * unknown_count + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
         # The combinations of the columns that are f_n times the coordinates of the next point:
-        sides = [[f * x % prime for x in coordinates] for f, coordinates in zip(factors, images, strict=True)]
+        right_sides = [[f * x % prime for x in coordinates] for f, coordinates in zip(factors, images, strict=True)]
         try:
-            solution = matrix(values[:unknowns], prime).solve(matrix(sides[:unknowns], prime))
+            solution = matrix(values[:unknown_count], prime).solve(matrix(right_sides[:unknown_count], prime))
         except ZeroDivisionError:
             return None
-        if matrix(values, prime) * solution != matrix(sides, prime):
+        if matrix(values, prime) * solution != matrix(right_sides, prime):
             return None
         return [[entry for column in integers(solution.transpose()) for entry in column]]

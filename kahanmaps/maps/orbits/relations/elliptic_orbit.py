@@ -16,14 +16,13 @@ and the multiples n T are different from 0 as long as W(n) is not 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle, islice
+from itertools import cycle, islice, product
 from typing import NamedTuple
 
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import from_residues
-from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import ElementaryMap, Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
@@ -71,7 +70,7 @@ def elliptic_steps(
             search = _Search(period, start_point, stride)
             try:
                 numbers = search.numbers(max_primes)
-                exact_curves = None if numbers is None else _Exact(search, numbers)
+                exact_curves = None if numbers is None else _ExactCurves(search, numbers)
             except ArithmeticError:
                 is_special = True
                 continue
@@ -109,25 +108,39 @@ class _Search:
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(factor.integer_steps.is_triangular for factor in factors):
             # Each coordinate must be a copy of a new coordinate some steps before; coordinates must not only permute.
-            earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
-            ungrouped = [(k, i) for k in range(stride) for i in range(n)]
+            earlier: list[list[int | None]] = [[None] * n for _ in range(stride)]
+            for k, copied_coordinates in enumerate(earlier):
+                # The index of the equal coordinate of the point, for each coordinate of the image that is a copy.
+                equation = factors[(k - 1) % len(factors)].equation
+                for row in equation.terms:
+                    unknowns = [j for j in range(n) if row[j]]
+                    if len(unknowns) == 1 and len(row[unknowns[0]]) == len(row[n]) == 1:
+                        ((left, a),), ((right, b),) = row[unknowns[0]], row[n]  # indices of monomials, coefficients
+                        exponent_pairs = zip(equation.exponents[left], equation.exponents[right], strict=True)
+                        exponent_change = [y - x for x, y in exponent_pairs]
+                        is_copy = sorted(exponent_change) == [-1] + [0] * (n - 1) + [1] and exponent_change[n] == -1
+                        if a == -b and is_copy:
+                            copied_coordinates[unknowns[0]] = exponent_change.index(1)
+            unresolved = list(product(range(stride), range(n)))
             for _ in range(stride * n):
-                ungrouped = [((k - 1) % stride, g) for k, i in ungrouped if (g := earlier[k][i]) is not None]
-            if not ungrouped:
+                unresolved = [((k - 1) % stride, g) for k, i in unresolved if (g := earlier[k][i]) is not None]
+            if not unresolved:
                 self.groups, self.earlier = [(i,) for i in range(n)], earlier
-        self.new = [(k, g) for k, row in enumerate(self.earlier) for g, copied in enumerate(row) if copied is None]
+        self.new_groups = [
+            (k, g) for k, row in enumerate(self.earlier) for g, copied_group in enumerate(row) if copied_group is None
+        ]
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
         """Return the numbers of all new groups; None if no curves exist or the numbers are too long."""
-        residues = from_residues(self._modulo, max_primes)
+        residues = from_residues(self._numbers_modulo, max_primes)
         if residues is None:
             return None
         rows = [
             Numbers(residues[k][0], residues[k + 1][0], residues[k + 2][0], residues[k + 3])
             for k in range(0, len(residues), 4)
         ]
-        return dict(zip(self.new, rows, strict=True))
+        return dict(zip(self.new_groups, rows, strict=True))
 
     @property
     def first(self) -> int:
@@ -136,13 +149,17 @@ class _Search:
 
     def degree(self, k: int, group: int) -> int:
         """Return the degree of a group of coordinates on a curve."""
-        copied = self.earlier[k][group]
-        return self.sections[k, group].degree if copied is None else self.degree((k - 1) % self.stride, copied)
+        copied_group = self.earlier[k][group]
+        return (
+            self.sections[k, group].degree if copied_group is None else self.degree((k - 1) % self.stride, copied_group)
+        )
 
-    def _modulo(self, prime: int) -> list[list[int]] | None:
+    def _numbers_modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
         for point_count in (
-            [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
+            [max(sections.points_used for sections in known_sections.values())]
+            if known_sections
+            else points_needed(size)
         ):
             points: Rows = []  # the initial point, then one point for each step of a factor
             point = self._start.residues(prime)
@@ -153,33 +170,19 @@ class _Search:
                 point = factor.integer_steps.image_modulo(point, prime)
             curves: dict[tuple[int, int], Curve] = {}
             try:
-                for k, g in self.new:
+                for k, g in self.new_groups:
                     coordinates = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
                     curve_of_group = curve(coordinates, prime, known_sections.get((k, g)))
                     if curve_of_group is None:
                         break
                     curves[k, g] = curve_of_group
                 else:
-                    self.sections = {key: factor.sections for key, factor in curves.items()}
-                    return [group for factor in curves.values() for group in factor.numbers]
+                    self.sections = {key: curve_of_key.sections for key, curve_of_key in curves.items()}
+                    return [numbers for curve_of_key in curves.values() for numbers in curve_of_key.numbers]
             except ArithmeticError:
                 if known_sections or point_count == points_needed(size)[-1]:
                     raise
         return None
-
-
-def _copies(equation: Equation) -> list[int | None]:
-    """Return for each coordinate of the image the equal coordinate of the point; None for a new coordinate."""
-    n = equation.dim
-    copies: list[int | None] = [None] * n
-    for row in equation.terms:
-        unknowns = [j for j in range(n) if row[j]]
-        if len(unknowns) == 1 and len(row[unknowns[0]]) == len(row[n]) == 1:
-            ((k, a),), ((m, b),) = row[unknowns[0]], row[n]
-            change = [y - x for x, y in zip(equation.exponents[k], equation.exponents[m], strict=True)]
-            if a == -b and sorted(change) == [-1] + [0] * (n - 1) + [1] and change[n] == -1:
-                copies[unknowns[0]] = change.index(1)
-    return copies
 
 
 def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
@@ -208,24 +211,24 @@ def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bo
     return all(steps.multiples.integer(n) != 0 for n in range(1, search.first // stride + max_degree + 2))
 
 
-class _Exact:
+class _ExactCurves:
     """The sequences and forms over Q, constructed from the numbers of each group."""
 
     def __init__(self, search: _Search, numbers: dict[tuple[int, int], Numbers]) -> None:
         self._search = search
         size = len(search.groups[0]) + 1
-        self._tables = {
+        self._coefficient_matrices = {
             key: fmpz_mat(size, search.sections[key].degree, primitive_integers(numbers_of_key.coefficients))
             for key, numbers_of_key in numbers.items()
         }
-        first_of_sequences = {
+        initial_terms = {
             key: first_terms(numbers_of_key.H, numbers_of_key.y, numbers_of_key.z)
             for key, numbers_of_key in numbers.items()
         }
-        self._W, *others = (W for W, _ in first_of_sequences.values())
-        if any(other != self._W for other in others):
+        self._W, *other_sequences = (W for W, _ in initial_terms.values())
+        if any(sequence != self._W for sequence in other_sequences):
             raise ArithmeticError("the curves differ")
-        self._U = {key: U for key, (_, U) in first_of_sequences.items()}
+        self._U = {key: U for key, (_, U) in initial_terms.items()}
         terms_at_0 = [around(U, 0, self._W)[0] for U in self._U.values()]
         if 0 in terms_at_0:
             raise ArithmeticError("the initial point is special")
@@ -234,19 +237,21 @@ class _Exact:
             self._primes = self._primes.lcm(number.p).lcm(number.q)
         self._all_primes = {}
         for key, U in self._U.items():
-            bound = common_primes(search.sections[key].degree, self._tables[key], self._W, U)
-            self._all_primes[key] = self._primes.lcm(bound.p).lcm(bound.q)
+            common_number = common_primes(search.sections[key].degree, self._coefficient_matrices[key], self._W, U)
+            self._all_primes[key] = self._primes.lcm(common_number.p).lcm(common_number.q)
 
     def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
         """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
-        new = {
-            key: Coordinates(sections[key].degree, self._tables[key], W, Terms(U, numbers, W), self._all_primes[key])
+        new_coordinates = {
+            key: Coordinates(
+                sections[key].degree, self._coefficient_matrices[key], W, Terms(U, numbers, W), self._all_primes[key]
+            )
             for key, U in self._U.items()
         }
         rows = [
-            [new[k, g] if copied is None else copied for g, copied in enumerate(row)]
+            [new_coordinates[k, g] if copied_group is None else copied_group for g, copied_group in enumerate(row)]
             for k, row in enumerate(self._search.earlier)
         ]
         return EllipticSteps(map_over, rows, self._search.first, skipped)

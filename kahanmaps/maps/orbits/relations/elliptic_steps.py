@@ -55,15 +55,15 @@ class EllipticSteps:
         """The largest degree of coordinates that are computed together on one curve."""
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, after the previous one was computed or skipped; None if undetermined."""
         return self.point(number) if self.skip(number) else None
 
     def skip(self, number: int) -> bool:
         """Return whether the orbit modulo a prime proves that the previous point has an image."""
         if self._residue is None:
-            previous = self.point(number - 1)
-            self._residue = None if previous is None else previous.residues(_PRIME)
+            previous_point = self.point(number - 1)
+            self._residue = None if previous_point is None else previous_point.residues(_PRIME)
         for factor in self._map.factors:
             self._residue = self._residue and factor.integer_steps.image_modulo(self._residue, _PRIME)
         return self._residue is not None
@@ -111,31 +111,34 @@ class Coordinates:
         self.W, self.degree, self._U, self._primes = W, degree, U, primes
         self._exponents = exponents(degree)
         # The content of a column is multiplied into the monomial, not into each row: fewer products of long numbers.
-        self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
-        self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
+        self._contents = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
+        self._forms = fmpz_mat([[c // g for c, g in zip(row, self._contents, strict=True)] for row in forms.tolist()])
 
     def at(self, n: int) -> list[fmpz]:
         """Return numerators and denominator in lowest terms, n >= 2. Raises ArithmeticError if the denominator is 0."""
         W, U = self.W, self._U
-        mixed, own = U.mixed_quotient(n), W.own_quotient(n)
+        mixed_quotient, own_quotient = U.mixed_quotient(n), W.own_quotient(n)
         weights = primitive_integers(
-            tuple(g * mixed**k * own**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
+            tuple(
+                g * mixed_quotient**k * own_quotient**j
+                for g, (k, _, j) in zip(self._contents, self._exponents, strict=True)
+            )
         )
-        first, second = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
-        term, (square, outer) = W.integer(n), W.pair(n)
-        first, second = (first, second * term) if self.degree % 2 else (first * term, second)
-        powers = {(i, j): square**i * outer**j for i, j in {(i, j) for _, i, j in self._exponents}}
+        product0, product1 = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
+        term, (square, neighbour_product) = W.integer(n), W.pair(n)
+        product0, product1 = (product0, product1 * term) if self.degree % 2 else (product0 * term, product1)
+        powers = {(i, j): square**i * neighbour_product**j for i, j in {(i, j) for _, i, j in self._exponents}}
         column = [
-            weight * (second if k else first) * powers[i, j]
+            weight * (product1 if k else product0) * powers[i, j]
             for weight, (k, i, j) in zip(weights, self._exponents, strict=True)
         ]
         values: list[fmpz] = (self._forms * fmpz_mat(len(column), 1, column)).entries()
         if values[-1] == 0:
             raise ZeroDivisionError
-        common = common_part(values[::-1], self._primes)
+        common_factor = common_part(values[::-1], self._primes)
         if values[-1] < 0:
-            common = -common
-        return values if common == 1 else [value // common for value in values]
+            common_factor = -common_factor
+        return values if common_factor == 1 else [value // common_factor for value in values]
 
     def forget(self, n: int) -> None:
         """Discard the long terms with index below n."""

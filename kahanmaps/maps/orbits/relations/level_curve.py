@@ -7,7 +7,7 @@ on the curve is the degree minus 2 meet the curve in two more points: so the cur
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
@@ -27,10 +27,10 @@ def is_conserved(family: MapFamily, eps: fmpq, integral: RationalFunction) -> bo
     point = tuple(K.variables)
     try:
         image = family.at(eps, K).step(point)
-        before, after = (integral.value(K, (*x, K.convert(eps))) for x in (point, image))
+        value, image_value = (integral.value(K, (*x, K.convert(eps))) for x in (point, image))
     except (BudgetExceeded, ZeroDivisionError):
         return False
-    return before is not None and after is not None and K.equal(before, after)
+    return value is not None and image_value is not None and K.equal(value, image_value)
 
 
 def level_curve(
@@ -51,48 +51,49 @@ def level_curve(
         return None
     F = substitute(integral.numerator - level * integral.denominator, {integral.names[2]: eps})
     components = [factor for factor, _ in irreducible_factors(F)]
-    through = [[k for k, factor in enumerate(components) if evaluate(factor, QQ, point) == 0] for point in points]
-    if len(through[0]) != 1 or any(indices != through[0] for indices in through):
+    indices = [[k for k, factor in enumerate(components) if evaluate(factor, QQ, point) == 0] for point in points]
+    if len(indices[0]) != 1 or any(indices_of_point != indices[0] for indices_of_point in indices):
         return None
-    F = components[through[0][0]]
+    F = components[indices[0][0]]
     triples: list[Triple] = [(x, y, fmpq(1)) for x, y in points]
-    for center in _centers(F, triples[0]):
+    # Points that may have the required multiplicity: for a cubic the initial point, and rational points at infinity.
+    one, zero, degree, terms = fmpq(1), fmpq(0), F.total_degree(), F.to_dict()
+    centers: list[Triple] = [*triples[: degree == 3], (one, zero, zero), (zero, one, zero)]
+    for factor, _ in fmpq_poly([terms.get((degree - k, k), zero) for k in range(degree + 1)]).factor()[1]:
+        if factor.degree() == 1 and factor[0] != 0:
+            centers.append((one, -factor[0] / factor[1], zero))
+    for center in centers:
         quadratic = _lines_through(F, center)
         if quadratic is None:
             continue
         basis, (p0, p1, p2) = quadratic
         content, factors = (p1 * p1 - 4 * p0 * p2).factor()
-        g, square = fmpq_poly([content]), fmpq_poly([1])
+        g, square_root = fmpq_poly([content]), fmpq_poly([1])
         for factor, power in factors:
-            g, square = g * factor ** (power % 2), square * factor ** (power // 2)
+            g, square_root = g * factor ** (power % 2), square_root * factor ** (power // 2)
         if g.degree() not in (3, 4):
             continue
-        places: list[tuple[fmpq, fmpq] | None] = []
+        quartic_points: list[tuple[fmpq, fmpq] | None] = []
         for triple in triples:
             sigma, alpha, beta = basis.solve(fmpq_mat(3, 1, list(triple))).entries()
-            if alpha == 0 or square(beta / alpha) == 0:
-                places.append(None)
+            if alpha == 0 or square_root(beta / alpha) == 0:
+                quartic_points.append(None)
             else:
                 t = beta / alpha
-                places.append((t, (2 * p2(t) * sigma / alpha + p1(t)) / square(t)))
-        for first, second in pairwise(places):
-            if first is not None and second is not None and first[0] != second[0] and first[1] != 0:
-                return *_weierstrass(g, first, second), F
+                quartic_points.append((t, (2 * p2(t) * sigma / alpha + p1(t)) / square_root(t)))
+        for P, Q in pairwise(quartic_points):
+            if P is None or Q is None or P[0] == Q[0] or P[1] == 0:
+                continue
+            # The Weierstrass form of v^2 = g(t), with P = (t_0, v_0) as zero. With t = t_0 + 1/s and w = v s^2, it is
+            # w^2 = a s^4 + b s^3 + c s^2 + d s + e with a = v_0^2.
+            a, b, c, d, e = (g(fmpq_poly([P[0], 1]))[k] for k in range(5))
+            s = 1 / (Q[0] - P[0])
+            curve = EllipticCurve(c, b * d - 4 * a * e, a * d * d + b * b * e - 4 * a * c * e)
+            X = 2 * P[1] * Q[1] * s * s + 2 * a * s * s + b * s
+            Y = ((4 * a * X + 4 * a * c - b * b) * s + b * X + 2 * a * d) / (2 * P[1])
+            assert Y * Y == ((X + curve.a2) * X + curve.a4) * X + curve.a6
+            return curve, (X, Y), F
     return None
-
-
-def _centers(F: fmpq_mpoly, start: Triple) -> Iterator[Triple]:
-    """Yield points that may have the required multiplicity: for a cubic the start, and rational points at infinity."""
-    one, zero = fmpq(1), fmpq(0)
-    d = F.total_degree()
-    if d == 3:
-        yield start
-    yield from ((one, zero, zero), (zero, one, zero))
-    terms = F.to_dict()
-    top = fmpq_poly([terms.get((d - k, k), zero) for k in range(d + 1)])
-    for factor, _ in top.factor()[1]:
-        if factor.degree() == 1 and factor[0] != 0:
-            yield one, -factor[0] / factor[1], zero
 
 
 def _lines_through(F: fmpq_mpoly, center: Triple) -> tuple[fmpq_mat, tuple[fmpq_poly, ...]] | None:
@@ -101,30 +102,17 @@ def _lines_through(F: fmpq_mpoly, center: Triple) -> tuple[fmpq_mat, tuple[fmpq_
     O is the center; the columns of the matrix are the basis.
     """
     k = next(k for k in range(3) if center[k] != 0)
-    units = [tuple(fmpq(int(i == j)) for i in range(3)) for j in range(3) if j != k]
-    columns = [center, *units]
+    unit_vectors = [tuple(fmpq(int(i == j)) for i in range(3)) for j in range(3) if j != k]
+    columns = [center, *unit_vectors]
     s, t = ring(["s", "t"]).gens()
     X, Y, Z = (s * columns[0][i] + columns[1][i] + t * columns[2][i] for i in range(3))
-    d, total = F.total_degree(), 0 * s
+    d, restriction = F.total_degree(), 0 * s
     for (i, j), value in F.to_dict().items():
-        total += value * X**i * Y**j * Z ** (d - i - j)
-    if int(total.degrees()[0]) != 2:
+        restriction += value * X**i * Y**j * Z ** (d - i - j)
+    if int(restriction.degrees()[0]) != 2:
         return None
     rows: list[list[fmpq]] = [[fmpq(0)] * (d + 1) for _ in range(3)]
-    for (i, j), value in total.to_dict().items():
+    for (i, j), value in restriction.to_dict().items():
         rows[i][j] = value
     basis = fmpq_mat(3, 3, [columns[j][i] for i in range(3) for j in range(3)])
     return basis, tuple(fmpq_poly(row) for row in rows)
-
-
-def _weierstrass(g: fmpq_poly, zero: tuple[fmpq, fmpq], point: tuple[fmpq, fmpq]) -> tuple[EllipticCurve, AffinePoint]:
-    """Return the Weierstrass form of v^2 = g(t), with `zero` = (t, v), v != 0, as zero, and the image of `point`."""
-    shifted = g(fmpq_poly([zero[0], 1]))
-    a, b, c, d, e = (shifted[k] for k in range(5))
-    q, s = zero[1], 1 / (point[0] - zero[0])
-    curve = EllipticCurve(c, b * d - 4 * a * e, a * d * d + b * b * e - 4 * a * c * e)
-    # With t = t_0 + 1/s and w = v s^2, the curve is w^2 = a s^4 + b s^3 + c s^2 + d s + e with a = q^2.
-    x = 2 * q * point[1] * s * s + 2 * a * s * s + b * s
-    y = ((4 * a * x + 4 * a * c - b * b) * s + b * x + 2 * a * d) / (2 * q)
-    assert y * y == ((x + curve.a2) * x + curve.a4) * x + curve.a6
-    return curve, (x, y)

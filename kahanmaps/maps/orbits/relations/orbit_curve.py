@@ -38,14 +38,13 @@ from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
-from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 
-_BITS = 100_000  # bits of coefficients that are searched for, and of points on rational curves
-_LATER, _APART = 16, 8  # the search is repeated from later points, up to 16 steps in distances of 8, as long as
-_SHORT = 2000  # ... points have at most this number of bits
-_LEVEL_POINTS = 8  # number of points from which the translation on a level curve is computed
-_PERIODS = 24  # largest period that is recognized: twice the largest order of a torsion point
+_MAX_BITS = 100_000  # bits of coefficients that are searched for, and of points on rational curves
+# The search is repeated from later points, up to 16 steps in distances of 8, as long as points have at most 2000 bits.
+_LAST_SEARCH_STEP, _SEARCH_DISTANCE, _MAX_SEARCH_BITS = 16, 8, 2000
+_MAX_LEVEL_POINTS = 8  # number of points from which the translation on a level curve is computed
+_MAX_PERIOD = 24  # largest period that is recognized: twice the largest order of a torsion point
 _MAX_RATIONAL_DEGREE = 6  # largest degree of rational curves that are not rational normal curves
 _ACCURACY = 1e-15  # accuracy of rotation numbers
 
@@ -132,8 +131,8 @@ class OrbitCurve(PrintableResult):
 
     @property
     def text(self) -> str:
-        which = "" if self.iterate == 1 else f", iterate {self.iterate} of the map"
-        lines = [f"curve of the orbit\tgenus {self.genus} (proved){which}"]
+        iterate_text = "" if self.iterate == 1 else f", iterate {self.iterate} of the map"
+        lines = [f"curve of the orbit\tgenus {self.genus} (proved){iterate_text}"]
         if (
             self.curve is not None
             and self.point is not None
@@ -158,10 +157,10 @@ class OrbitCurve(PrintableResult):
             kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
             lines.append(f"  multiplier\t{kind}, infinite order (proved)")
         if self.rotation is not None:
-            of_second = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
-            lines.append(f"  rotation number\t{self.rotation.str(12)}{of_second}")
-            dense = "dense in the real components that it visits (proved: infinite order)"
-            lines.append(f"  orbit\t{dense if self.is_dense else 'finite (proved)'}")
+            note = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
+            lines.append(f"  rotation number\t{self.rotation.str(12)}{note}")
+            dense_text = "dense in the real components that it visits (proved: infinite order)"
+            lines.append(f"  orbit\t{dense_text if self.is_dense else 'finite (proved)'}")
         if self.height_constant is not None:
             lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically, of the largest coordinate")
         return "\n".join(lines)
@@ -213,27 +212,35 @@ def orbit_curve(
     require_rational(map_over)
     point = IntegerPoint.from_rationals(map_over.point(start))
     # An initial point in special position may give zeros among the first terms of the sequences.
-    curve, later = None, point
-    for skipped in range(_LATER + 1):
-        if skipped % _APART == 0:
-            found = _found_steps(map_over, later)
-            if found is not None:
-                curve = _on_elliptic_curve(map_over, found)
-                if curve.iterate == 1:
-                    return curve
-        image = map_over.integer_step(later)
-        if image is None or image.exceeding(_SHORT):
+    curve: OrbitCurve | None = None
+    search_point = point
+    for skipped in range(_LAST_SEARCH_STEP + 1):
+        if skipped % _SEARCH_DISTANCE == 0:
+            new_curve = _on_elliptic_curve(map_over, search_point)
+            if new_curve is not None and new_curve.iterate == 1:
+                return new_curve
+            curve = curve if new_curve is None else new_curve
+        image = map_over.integer_step(search_point)
+        if image is None or image.exceeding(_MAX_SEARCH_BITS):
             break
-        later = image
+        search_point = image
     orbit = _first_points(map_over, point)
-    if orbit[-1] is None and (before := orbit[-2]) and map_over.integer_step(before) is None:
+    if orbit[-1] is None and (last_point := orbit[-2]) and map_over.integer_step(last_point) is None:
         raise InputError(
             f"the orbit ends: the map is not defined at step {len(orbit) - 2}; choose another initial point"
         )
-    if map_over.dim == 2 and family is not None:
-        level = _on_level_curve(map_over, [entry.rationals() for entry in orbit if entry], family, integrals)
-        if level is not None:
-            return level
+    points = [entry.rationals() for entry in orbit if entry]
+    if map_over.dim == 2 and family is not None and len(points) > 2 and points[2] != points[0]:
+        # The level curves of integrals, if their genus is 1: an automorphism over Q of such a curve is a translation
+        # unless its square is the identity.
+        for integral in integrals:
+            curve_and_polynomial = level_curve(integral, map_over.eps, points[:_MAX_LEVEL_POINTS])
+            if curve_and_polynomial is not None and is_conserved(family, map_over.eps, integral):
+                level, translation, F = curve_and_polynomial
+                # The degree of single coordinates, or of coordinates with a common denominator, as in the search.
+                is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
+                degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
+                return OrbitCurve(1, 1, *level.short_model(translation), degree)
     if curve is not None:
         return curve
     if orbit[-1] == point and len(orbit) > 1:
@@ -258,42 +265,40 @@ def require_rational(map_over: Map) -> None:
         )
 
 
-def _found_steps(map_over: Map, start: IntegerPoint) -> EllipticSteps | None:
+def _on_elliptic_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
+    """Search for an elliptic curve, and return the geometry from the terms of W and the degrees of the coordinates."""
     try:
-        return elliptic_steps(map_over, start, _BITS, most_primes=_BITS)
+        steps = elliptic_steps(map_over, start, _MAX_BITS, most_primes=_MAX_BITS)
     except TooLongRelation:
         raise UnknownCurve(
-            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
+            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_MAX_BITS} "
             "bits: choose an initial point, eps or parameters with fewer digits"
         ) from None
-
-
-def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
-    """Return the geometry, computed from the terms of W and the degrees of the coordinates."""
-    W = found.multiples
-    H, third, fourth = (W.value(n) for n in (2, 3, 4))
-    a2, a3 = third / H**2, H
-    a1 = (fourth / a3**4 + a3) / a2
+    if steps is None:
+        return None
+    W2, W3, W4 = (steps.multiples.value(n) for n in (2, 3, 4))
+    a2, a3 = W3 / W2**2, W2
+    a1 = (W4 / a3**4 + a3) / a2
     curve, T = EllipticCurve(a2 + a1 * a1 / 4, a1 * a3 / 2, a3 * a3 / 4), (fmpq(0), a3 / 2)
-    # T is the translation by `stride` steps of factors.
-    factors = len(map_over.factors)
-    together = math.lcm(factors, found.stride)
-    iterate, times = together // factors, together // found.stride
-    point = curve.multiple(times, T)
+    # T is the translation by `stride` steps of factors; `factor_steps` is a multiple of that and of a step of the map.
+    factor_count = len(map_over.factors)
+    factor_steps = math.lcm(factor_count, steps.stride)
+    iterate = factor_steps // factor_count
+    point = curve.multiple(factor_steps // steps.stride, T)
     assert point is not None  # W(n) is not 0
     if curve.discriminant == 0:
         return _on_singular_cubic(curve, point, iterate)
     curve, point = curve.short_model(point)
-    return OrbitCurve(1, iterate, curve, point, found.degree)
+    return OrbitCurve(1, iterate, curve, point, steps.degree)
 
 
 def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
     bits = 128
     while bits <= MAX_BITS:
         with RR(bits).working():
-            real = EllipticCurve(*(arb(a) for a in (curve.a2, curve.a4, curve.a6)))
+            real_curve = EllipticCurve(*(arb(a) for a in (curve.a2, curve.a4, curve.a6)))
             try:
-                number, steps = rotation_number(real, (arb(point[0]), arb(point[1])), curve.discriminant > 0)
+                number, steps = rotation_number(real_curve, (arb(point[0]), arb(point[1])), curve.discriminant > 0)
             except PrecisionLost:
                 number = None
             if number is not None and number.is_finite() and float(number.rad()) < _ACCURACY:
@@ -308,10 +313,10 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
     The translation multiplies (Y + m (x - r))/(Y - m (x - r)), m^2 = r - s, by the value of this function at the point.
     """
     a, b, c = curve.a2, curve.a4, curve.a6
-    square = a * a - 3 * b  # (r - s)^2
-    if square == 0:
+    squared_difference = a * a - 3 * b  # (r - s)^2
+    if squared_difference == 0:
         return OrbitCurve(0, iterate, trace=fmpq(2))
-    r = (9 * c - a * b) / (2 * square)
+    r = (9 * c - a * b) / (2 * squared_difference)
     x, y = point
     m_squared, w = 3 * r + a, x - r  # r - s, as 2 r + s = -a
     return OrbitCurve(0, iterate, trace=2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
@@ -320,37 +325,17 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
     """Return enough points to recognize a period, which ends them, or a rational curve; None follows if too long."""
     dim = map_over.dim
-    top = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
+    map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
     degree = max(dim, _MAX_RATIONAL_DEGREE)
-    while len(points) < max(_PERIODS, top * degree + degree + 2, (dim + 1) * (degree + 1)) + dim:
+    while len(points) < max(_MAX_PERIOD, map_degree * degree + degree + 2, (dim + 1) * (degree + 1)) + dim:
         image = map_over.integer_step(points[-1])  # type: ignore[arg-type]
-        if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
+        if image is None or image.exceeding(_MAX_BITS):  # on a rational curve the length grows linearly
             return [*points, None]
         points.append(image)
         if image == start:
             break
     return points
-
-
-def _on_level_curve(
-    map_over: Map, points: Sequence[tuple[fmpq, ...]], family: MapFamily, integrals: Sequence[RationalFunction]
-) -> OrbitCurve | None:
-    """Return the geometry of an orbit in the plane on the level curve of an integral; None unless the genus is 1.
-
-    An automorphism over Q of a curve of genus 1 is a translation unless its square is the identity.
-    """
-    if len(points) < 3 or points[2] == points[0]:
-        return None
-    for integral in integrals:
-        found = level_curve(integral, map_over.eps, points[:_LEVEL_POINTS])
-        if found is not None and is_conserved(family, map_over.eps, integral):
-            (curve, point), F = found[0].short_model(found[1]), found[2]
-            # The degree of single coordinates, or of coordinates with a common denominator, as in the search.
-            is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
-            degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
-            return OrbitCurve(1, 1, curve, point, degree)
-    return None
 
 
 def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
@@ -361,24 +346,30 @@ def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> Orbi
     """
     if len(map_over.factors) > 1 or None in points:  # points between the factors lie on other curves
         return None
-    dim, top = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
+    dim, map_degree = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
     rows = [[fmpq(p.denominator), *(fmpq(x) for x in p.numerators)] for p in points if p is not None]
     size = dim + 3
-    chosen: list[int] = []  # coordinates that are independent on the orbit, beginning with the nonzero denominator
+    # Coordinates that are independent on the orbit, beginning with the nonzero denominator.
+    independent_columns: list[int] = []
     for k in range(dim + 1):
-        columns = [*chosen, k]
+        columns = [*independent_columns, k]
         if rank(QQ, fmpq_mat(size, len(columns), [row[i] for row in rows[:size] for i in columns])) == len(columns):
-            chosen = columns
-    independent, normal = [[row[k] for k in chosen] for row in rows], len(chosen) - 1
-    if normal < 1:
+            independent_columns = columns
+    independent_rows = [[row[k] for k in independent_columns] for row in rows]
+    d = len(independent_columns) - 1
+    if d < 1:
         return None
     # On a rational normal curve, hyperplanes through d - 1 points of the orbit give z. Otherwise try the coordinates.
-    parameters = [([row[k] / row[0] for row in rows], range(normal, _MAX_RATIONAL_DEGREE + 1)) for k in chosen[1:]]
-    through = fmpq_mat(normal - 1, normal + 1, [x for row in independent[: normal - 1] for x in row])
-    if len(pencil := nullspace(QQ, through)) == 2:
-        pairs = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in independent]
-        if all(second != 0 for _, second in pairs[normal - 1 :]):
-            parameters.insert(0, ([first / second for first, second in pairs[normal - 1 :]], range(normal, normal + 1)))
+    parameters = [
+        ([row[k] / row[0] for row in rows], range(d, _MAX_RATIONAL_DEGREE + 1)) for k in independent_columns[1:]
+    ]
+    conditions = fmpq_mat(d - 1, d + 1, [x for row in independent_rows[: d - 1] for x in row])
+    if len(pencil := nullspace(QQ, conditions)) == 2:
+        pairs = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in independent_rows]
+        pairs = pairs[d - 1 :]
+        if all(second != 0 for _, second in pairs):
+            quotients = [first / second for first, second in pairs]
+            parameters.insert(0, (quotients, range(d, d + 1)))
     for z, degrees in parameters:
         equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
         kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
@@ -388,8 +379,8 @@ def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> Orbi
         if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)):
             continue
         for degree in degrees:
-            enough = max(top * degree + degree + 2, len(chosen) * (degree + 1))
-            if _are_forms(z[:enough], independent[len(rows) - len(z) :][:enough], degree):
+            point_count = max(map_degree * degree + degree + 2, len(independent_columns) * (degree + 1))
+            if _are_forms(z[:point_count], independent_rows[len(rows) - len(z) :][:point_count], degree):
                 return OrbitCurve(0, 1, trace=(p + s) ** 2 / (p * s - q * r) - 2)
     return None
 
@@ -400,12 +391,12 @@ def _are_forms(z: Sequence[fmpq], rows: Sequence[Sequence[fmpq]], degree: int) -
     Unique forms have no common factor: otherwise another factor could replace it.
     """
     width = degree + 1
-    unknowns, equations = len(rows[0]) * width, []
+    unknown_count, equations = len(rows[0]) * width, []
     for value, row in zip(z, rows, strict=True):
         monomials = [value**k for k in range(width)]
         for i in range(1, len(row)):
-            equation = [fmpq(0)] * unknowns
+            equation = [fmpq(0)] * unknown_count
             equation[:width] = [row[i] * x for x in monomials]
             equation[i * width : (i + 1) * width] = [-row[0] * x for x in monomials]
             equations.append(equation)
-    return len(nullspace(QQ, fmpq_mat(len(equations), unknowns, [x for row in equations for x in row]))) == 1
+    return len(nullspace(QQ, fmpq_mat(len(equations), unknown_count, [x for row in equations for x in row]))) == 1

@@ -29,7 +29,7 @@ class Relations(Protocol):
     @property
     def name(self) -> str: ...
 
-    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+    def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, given the last points; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
@@ -58,30 +58,33 @@ class RationalOrbit:
         self.since: int | None = None
 
     def __iter__(self) -> Iterator[IntegerPoint | None]:
-        last, reached = deque([self.start], maxlen=3), 0
-        by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
-        search_bits: float = max(_MIN_BITS, by_coordinates, _LONGER_THAN_START * self.start.bits)
-        latest_bits = inf if self.max_bits is None else self.max_bits / 2  # above, few steps remain: bits grow like n^2
+        last_points, last_number = deque([self.start], maxlen=3), 0
+        min_bits_by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
+        search_bits: float = max(_MIN_BITS, min_bits_by_coordinates, _LONGER_THAN_START * self.start.bits)
+        # When points are longer than this, few steps remain, as bits grow like n^2.
+        max_search_bits = inf if self.max_bits is None else self.max_bits / 2
         yield self.start
         for number in count(1):
             if self.relations is not None and self._is_requested is not None and not self._is_requested(number):
                 # A point that is not requested is skipped, unless it might exceed the budget.
-                is_short = self.max_bits is None or 2 * last[-1].bits * number**2 < self.max_bits * reached**2
+                is_short = (
+                    self.max_bits is None or 2 * last_points[-1].bits * number**2 < self.max_bits * last_number**2
+                )
                 if is_short and self.relations.skip(number):
                     yield None
                     continue
-            image = None if self.relations is None else self.relations.step(last, number)
+            image = None if self.relations is None else self.relations.step(last_points, number)
             # Near the budget, an intermediate point of a composition may exceed it, which only single steps notice.
             if image is None or (
                 self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
             ):
-                if self.relations is not None and reached < number - 1:
-                    before = self.relations.point(number - 1)
-                    if before is not None:
-                        last.append(before)
-                        reached = number - 1
-                image = last[-1]
-                for _ in range(number - reached):
+                if self.relations is not None and last_number < number - 1:
+                    previous_point = self.relations.point(number - 1)
+                    if previous_point is not None:
+                        last_points.append(previous_point)
+                        last_number = number - 1
+                image = last_points[-1]
+                for _ in range(number - last_number):
                     if image is None or (self.max_bits is not None and image.exceeding(self.max_bits)):
                         break
                     image = self.map.integer_step(image, self.max_bits)
@@ -90,16 +93,16 @@ class RationalOrbit:
             yield image
             if self.max_bits is not None and image.exceeding(self.max_bits):
                 return
-            before = last[-1]
-            last.append(image)
-            reached = number
+            previous_point = last_points[-1]
+            last_points.append(image)
+            last_number = number
             # If a point keeps its common factors, the orbit grows fast; computing the exact length would take a gcd.
             if (
-                search_bits < latest_bits
+                search_bits < max_search_bits
                 and number > 1
                 and not image.keeps_factors
-                and image.approximate_bits < _SLOW_GROWTH * before.approximate_bits
-                and search_bits <= image.bits < min(latest_bits, _SLOW_GROWTH * before.bits)
+                and image.approximate_bits < _SLOW_GROWTH * previous_point.approximate_bits
+                and search_bits <= image.bits < min(max_search_bits, _SLOW_GROWTH * previous_point.bits)
             ):
                 try:
                     self.relations = relations(self.map, self.start, image)

@@ -20,10 +20,10 @@ _PRIME = 2**61 - 1
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
     """Return the values at n of the basis of sections that `exponents` describes."""
-    square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
-    first, second = U[n], U[n + 1] * W[n - 1]
-    first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
-    return [(second if k else first) * square**i * outer**j for k, i, j in exponents(degree)]
+    square, neighbour_product = W[n] * W[n], W[n + 1] * W[n - 1]
+    product0, product1 = U[n], U[n + 1] * W[n - 1]
+    product0, product1 = (product0, product1 * W[n]) if degree % 2 else (product0 * W[n], product1)
+    return [(product1 if k else product0) * square**i * neighbour_product**j for k, i, j in exponents(degree)]
 
 
 def exponents(degree: int) -> list[tuple[int, int, int]]:
@@ -32,8 +32,8 @@ def exponents(degree: int) -> list[tuple[int, int, int]]:
     k is 0 for U(n) and 1 for U(n + 1) W(n - 1); i and j are the exponents of W(n)^2 and W(n + 1) W(n - 1). The products
     with k = 0 (for odd degree, those with k = 1) have a further factor W(n).
     """
-    tops = ((degree - 1) // 2, (degree - 2) // 2)
-    return [(k, top - j, j) for k, top in enumerate(tops) for j in range(top + 1)]
+    max_exponents = ((degree - 1) // 2, (degree - 2) // 2)
+    return [(k, max_exponent - j, j) for k, max_exponent in enumerate(max_exponents) for j in range(max_exponent + 1)]
 
 
 def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[fmpq]) -> fmpq:
@@ -53,15 +53,15 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
             values = (fmpq_mat(table) * fmpq_mat(degree, 1, forms(degree, *terms, n))).entries()
             scale_of_basis, basis_row = _primitive(forms(length, *terms, n))
             scale_of_products, product_row = _primitive(
-                [value * psi for value in values for psi in _of_multiples(extra_degree, terms[0], n)]
+                [value * psi for value in values for psi in _sections_of_multiples(extra_degree, terms[0], n)]
             )
             basis.append(basis_row)
             products.append(product_row)
             factor *= scale_of_products / scale_of_basis
         columns = pivots(echelon([[int(x % _PRIME) for x in row] for row in products], _PRIME))
         if len(columns) == length:
-            chosen = fmpz_mat([[row[k] for k in columns] for row in products])
-            return factor * chosen.det() / fmpz_mat(basis).det()
+            independent_products = fmpz_mat([[row[k] for k in columns] for row in products])
+            return factor * independent_products.det() / fmpz_mat(basis).det()
     raise ArithmeticError("coordinates have zeros in common")
 
 
@@ -74,14 +74,14 @@ def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
     raise ArithmeticError("all values at a point are 0")
 
 
-def _of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:
+def _sections_of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:
     """Return a basis, at n, of the sections of a degree other than 1 that depend only on n T (that is, on W)."""
-    square, outer, third = W[n] * W[n], W[n + 1] * W[n - 1], W[n - 1] ** 2 * W[n + 2]
+    square, neighbour_product, odd_product = W[n] * W[n], W[n + 1] * W[n - 1], W[n - 1] ** 2 * W[n + 2]
 
-    def even(top: int) -> list[fmpq]:
-        return [square ** (top - j) * outer**j for j in range(top + 1)]
+    def monomials(degree_in_squares: int) -> list[fmpq]:
+        return [square ** (degree_in_squares - j) * neighbour_product**j for j in range(degree_in_squares + 1)]
 
-    half, odd = divmod(degree, 2)
-    if odd:
-        return [W[n] * value for value in even(half)] + [third * value for value in even(half - 1)]
-    return even(half) + [third * W[n] * value for value in even(half - 2)]
+    m, is_odd = divmod(degree, 2)
+    if is_odd:
+        return [W[n] * value for value in monomials(m)] + [odd_product * value for value in monomials(m - 1)]
+    return monomials(m) + [odd_product * W[n] * value for value in monomials(m - 2)]
