@@ -34,6 +34,9 @@ parsed = cache(ast.parse)  # several tests read all files of the project
 # Of what is in the catalogue, by name, without reading it all.
 DIMENSION = {name: dim for name, (dim, _) in titles().items()}
 
+# All but surrogates. This is the default of hypothesis, which takes seconds to make it in a fresh folder.
+CHARACTERS = st.characters(exclude_categories=["Cs"])
+
 # For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
 some = settings(suppress_health_check=[HealthCheck.filter_too_much])
 

@@ -23,6 +23,7 @@ SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
 # The cluster, the whole paper and planar fields have quicker tests of their own.
 LONG = {"08_the_paper", "10_cluster_batch", "13_planar_fields", "14_lotka_volterra_fields", "15_certified_classes"}
+LONG |= {"11_exact_and_float"}  # compiles machine code; docs/howto/python.md has its parts
 
 
 @pytest.mark.parametrize(
@@ -151,28 +152,6 @@ def test_fields_of_one_class_have_the_same_degrees():
         assert len(results) == 1
 
 
-def test_the_counts_of_planar_fields_on_the_page_are_those_of_the_example():
-    printed = (EXAMPLES / "13_planar_fields.out").read_text(encoding="utf-8")
-    page = (EXAMPLES.parent / "docs" / "beyond.md").read_text(encoding="utf-8").partition("## Small planar fields")[2]
-    lines = [
-        line.split(" | ") for line in re.findall(r"^\| ((?:bounded|linear|quadratic) .*) \|$", printed, re.MULTILINE)
-    ]
-    kinds = {"bounded": [], "linear, $2n$": [], "linear, $n + 1$": [], "quadratic": []}
-    for growth, degrees, _, _, fields, integral in lines:
-        kinds[f"{growth}, ${degrees.replace('*', '')}$" if growth == "linear" else growth].append(
-            (int(fields), integral)
-        )
-    for kind, found in kinds.items():
-        assert f"| {kind} | {len(found)} | {sum(fields for fields, _ in found)} |" in page
-    without = {kind: sum(integral == "none found" for _, integral in found) for kind, found in kinds.items()}
-    assert without == {"bounded": 0, "linear, $2n$": 0, "linear, $n + 1$": 31, "quadratic": 0}
-    exponential = sum(map(int, re.findall(r"^\| (\d+) \| \d", printed, re.MULTILINE)))
-    assert (
-        f"| exponential | {exponential} | {15624 - sum(fields for found in kinds.values() for fields, _ in found)} |"
-        in page
-    )
-
-
 def test_the_class_of_a_lotka_volterra_system_is_that_of_its_permutations_and_signs():
     module, draw = fields_of_the_plane("14_lotka_volterra_fields"), random.Random(3)
     for _ in range(200):
@@ -184,26 +163,6 @@ def test_the_class_of_a_lotka_volterra_system_is_that_of_its_permutations_and_si
     assert module.right_hand_sides(chain) == ["x*(y + z)", "y*(x - z)", "z*(-x - y)"]
     assert [module.is_indecomposable(A) for A in (chain, with_own_pair)] == [True, False]
     assert module.class_of(chain) == module.class_of(((0, 1, -1), (-1, 0, 1), (1, -1, 0)))  # LV(3, 1)
-
-
-def test_the_counts_of_lotka_volterra_systems_on_the_page_are_those_of_the_example():
-    printed = (EXAMPLES / "14_lotka_volterra_fields.out").read_text(encoding="utf-8")
-    page = (EXAMPLES.parent / "docs" / "beyond.md").read_text(encoding="utf-8")
-    page = page.partition("## Small Lotka-Volterra systems")[2]
-    rows = re.findall(r"^\| (.*) \| (\d+) \| (\d+) \|$", printed, re.MULTILINE)
-    counts = {kind: (int(inner), int(other)) for kind, inner, other in rows}
-    slow = ("bounded", "linear", "quadratic")
-    fast = [numbers for kind, numbers in counts.items() if kind not in slow]
-    table = {**{kind: counts[kind] for kind in slow}, "exponential": tuple(map(sum, zip(*fast, strict=True)))}
-    for kind, (inner, other) in table.items():
-        assert f"| {kind} | {inner} | {other} |" in page
-    assert sum(map(sum, table.values())) == 503
-    with_two = re.findall(r"^\| (?:bounded|linear|quadratic) \| .* \| 2 \| [^;|]*; [^;|]* \|$", printed, re.MULTILINE)
-    assert len(with_two) == sum(table[kind][0] for kind in slow) == 13
-    assert "fall into 503 classes" in page
-    assert f"In {sum(other for _, other in table.values())} of them" in page
-    for numbers in (f"3 ({counts['3'][0]} classes)", f"or 2 ({counts['2'][0]})"):
-        assert numbers in page
 
 
 def test_every_integral_of_the_tables_is_certified_by_sympy():

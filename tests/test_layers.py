@@ -193,13 +193,6 @@ WRONG = [
         "from kahanmaps.maps.floats.machine_code import MachineCode",
         "machine_code.MachineCode while",
     ),
-    ("kahanmaps/maps/floats/machine_code.py", "import matplotlib", "imports matplotlib while"),
-    ("kahanmaps/experiments/running/run.py", "class A:\n    import distributed", "imports distributed while"),
-    (
-        "kahanmaps/maps/floats/float_orbit.py",
-        "if TYPE_CHECKING:\n    pass\nelse:\n    import numba",
-        "imports numba while",
-    ),
 ]
 
 
@@ -212,13 +205,11 @@ def test_a_file_that_breaks_the_rule_is_reported_with_its_line(path, source, sen
 
 
 RIGHT = [
-    (MAPS, "from kahanmaps.algebra import fields"),
     (MAPS, "def f():\n    import numpy"),
     ("kahanmaps/experiments/results/store.py", "from kahanmaps import __version__"),
     ("kahanmaps/maps/floats/machine_code.py", "import llvmlite\nimport numpy as np"),
     ("kahanmaps/maps/floats/ensemble.py", "def f():\n    from kahanmaps.maps.floats.machine_code import MachineCode"),
     ("kahanmaps/plots/figures.py", "import numpy as np\ndef f():\n    from matplotlib.figure import Figure"),
-    ("kahanmaps/__init__.py", "from kahanmaps.plots import draw"),
     ("cli/kahanmaps_cli/main.py", "import click\nimport kahanmaps\nfrom kahanmaps.plots import draw"),
 ]
 

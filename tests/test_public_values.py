@@ -407,7 +407,7 @@ def test_the_verdict_of_an_analysis_in_a_word():
 
 
 def test_dynamical_degree_and_entropy_are_those_of_the_degrees():
-    assert str(km.dynamical_degree("henon_heiles").digits) == km.degrees("henon_heiles").dynamical_degree.digits
+    assert str(km.dynamical_degree("lotka_volterra").digits) == km.degrees("lotka_volterra").dynamical_degree.digits
     assert km.algebraic_entropy("x' = x*(1 - y); y' = y*(x - 1)") == np.log(2)
 
 

@@ -11,11 +11,8 @@ from fractions import Fraction
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import refuses
-from hypothesis import given
-from hypothesis import strategies as st
+from helpers import quick, refuses
 
-from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.certificates.certificate import (
@@ -49,8 +46,6 @@ from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     FalseClaim,
     InvariantTensor,
-    coprime,
-    homogeneous_value,
     invariant_tensor,
     map_data,
 )
@@ -77,9 +72,16 @@ PROGRAMS = {
     "gp": (["gp", "-q"], ".gp", r"^(c1 = \()", r"\g<1>1 + "),
     "sympy": ([sys.executable], ".py", r"^(c1 = \()", r"\g<1>1 + "),
 }
+# Every day most of it is asked of one of them: of PARI/GP, which takes the least time, or of SymPy without it.
+DAILY = "gp" if shutil.which("gp") else "sympy"
 SYSTEMS = ["lyness", "riccati", "weierstrass"]  # dimension 2 and 1; a map by formulas, and one with a modified H
 FURTHER = ["harmonic", "euler_top", "henon_heiles", "nahm_tetrahedral", "planar_cubic_hamiltonian", "qrt_symmetric"]
 FURTHER += ["volterra_periodic_3"]
+
+
+def over(*programs: str) -> pytest.MarkDecorator:
+    """The test with each of these programs, with one of them every day."""
+    return pytest.mark.parametrize("checker", quick(programs, [DAILY]))
 
 
 def run(checker: str, text: str, folder) -> subprocess.CompletedProcess[str]:
@@ -155,12 +157,13 @@ SLOW_CASES = [("paper_m3", "H1"), ("euler_top", "poisson"), ("paper_m2", "poisso
 SLOW_CASES += [("repaired_icosahedral", "F"), ("qrt_asymmetric", "volume"), ("volterra_periodic_4", "I2")]
 
 
+OFTEN = [*((case, DAILY) for case in CASES), (CASES[0], "sympy")]
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "checker"),
     [
-        pytest.param(
-            *case, checker, marks=() if (case in CASES and checker != "rocq") or case == CASES[0] else pytest.mark.slow
-        )
+        pytest.param(*case, checker, marks=[pytest.mark.slow] * ((case, checker) not in OFTEN))
         for case in [*CASES, *SLOW_CASES]
         for checker in PROGRAMS
     ],
@@ -172,7 +175,7 @@ def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed
         assert run(checker, CHECKERS[checker]([changed(claim)]), tmp_path).returncode != 0
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 @pytest.mark.parametrize(
     ("system", "other"),
     [
@@ -197,7 +200,7 @@ EQUIVALENT = System("x' = y + 1; y' = 24*(x - 2)^2 - 8")  # to weierstrass at g2
 FASTER = System("x' = 3*x - 3*x*y; y' = 3*x*y - 3*y")  # lotka_volterra at eps/c with c = 1/3
 
 
-@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
+@over(*PROGRAMS)
 def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     result = equivalent_system(EQUIVALENT)
     text = result.certificate(checker)
@@ -219,7 +222,7 @@ def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(che
         assert run(checker, false, tmp_path).returncode != 0
 
 
-@pytest.mark.parametrize("checker", ["gp", "sympy"])
+@over("gp", "sympy")
 def test_an_equivalence_by_a_given_map_and_one_that_changes_eps(checker, tmp_path):
     found = equivalent_system(FASTER)
     texts = [certificate(EQUIVALENT, checker, equivalent=load("weierstrass", {"g2": 64}), by=["4*x - 8", "4*y + 4"])]
@@ -242,7 +245,7 @@ def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
     refuses(message, certificate, EQUIVALENT, "gp", equivalent=load("weierstrass", {"g2": 64}), by=by)
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     file = load("lyness", {"a": 1})
     assert run(checker, certificate(file, checker, period=5), tmp_path).returncode == 0
@@ -255,7 +258,7 @@ def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, 
 POSITIVE = ["lotka_volterra", "fibonacci", "zander_120", "lotka_volterra_symplectic_euler"]
 
 
-@pytest.mark.parametrize("checker", ["gp", "sympy"])
+@over("gp", "sympy")
 @pytest.mark.parametrize(
     "name", ["fibonacci", *(pytest.param(n, marks=pytest.mark.slow) for n in ("lotka_volterra", "hietarinta_viallet"))]
 )
@@ -283,7 +286,8 @@ def test_positive_entropy_is_not_certified_for_integrable_maps():
             refuses("which proves nothing", certificate, load(name), checker, ["entropy"])
 
 
-@pytest.mark.parametrize("name", ["hietarinta_viallet", *(pytest.param(n, marks=pytest.mark.slow) for n in POSITIVE)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hietarinta_viallet", *POSITIVE])
 def test_coq_accepts_positive_entropy_from_one_axiom(name, tmp_path):
     done = run("rocq", certificate(load(name), "rocq", ["entropy"]), tmp_path)
     assert done.returncode == 0, done.stderr
@@ -333,7 +337,7 @@ def test_the_identity_commutes_with_every_map_and_has_no_certificate():
         refuses(message, certificate, first, "gp", commute=second)
 
 
-@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
+@over(*PROGRAMS)
 def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_poisson(checker, tmp_path):
     # For x~ = x every tensor is invariant; dz - y dx is a contact form, so the tensor with this kernel is not Poisson.
     names = ("x", "y", "z", "eps")
@@ -365,7 +369,7 @@ def test_false_claims_of_each_kind_have_no_certificate():
         invariant_tensor(data, "P", [[zero, one, zero], [one, zero, zero], [zero, zero, zero]])
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker, tmp_path):
     text = certificate(load("lotka_volterra"), checker, ["volume"])  # dx/(x*y)
     for old, new in (("num_1 x y * num_2 x y.", "num_1 x y ^ 2 * num_2 x y."), ("eP = [1, 1]", "eP = [2, 1]")):
@@ -377,7 +381,7 @@ def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker,
 
 
 @pytest.mark.parametrize("name", ["harmonic", "lotka_volterra"])
-@pytest.mark.parametrize("checker", ["gp", "sympy"])
+@over("gp", "sympy")
 def test_a_density_of_0_is_refused(name, checker, tmp_path):
     text = certificate(load(name), checker, ["volume"])
     wrong = re.sub(r"^P = ", "P = 0*", text, flags=re.MULTILINE)
@@ -392,7 +396,7 @@ WRONG_DERIVATIVES = {  # with the same determinant, so that the identity of the 
 }
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 @pytest.mark.parametrize("claim", ["volume", "poisson"])
 def test_a_matrix_that_is_not_the_derivative_of_the_equation_is_refused(claim, checker, tmp_path):
     wrong = certificate(load("harmonic"), checker, [claim])
@@ -411,13 +415,13 @@ def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_pa
     assert run("gp", wrong.replace("default(recover, 0);", ""), tmp_path).returncode == 0
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, tmp_path):
     text = certificate(System("I' = fun; fun' = -I"), checker, integrals={"O": "(I^2 + fun^2)/3"})
     assert run(checker, text, tmp_path).returncode == 0
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 def test_a_variable_h_is_not_the_letter_that_makes_forms_homogeneous(checker, tmp_path):
     text = certificate(System("h' = k; k' = -h"), checker, integrals={"I": "h^2 + k^2"})
     assert run(checker, text, tmp_path).returncode == 0
@@ -426,7 +430,7 @@ def test_a_variable_h_is_not_the_letter_that_makes_forms_homogeneous(checker, tm
         assert run(checker, text, tmp_path).returncode == 0
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@over(*PROGRAMS)
 def test_a_variable_t_is_not_the_step_of_a_derivative(checker, tmp_path):
     assert run(checker, certificate(System("t' = x; x' = -t"), checker, density="1"), tmp_path).returncode == 0
 
@@ -445,39 +449,6 @@ def test_names_of_factors_and_of_later_claims_differ():
     assert len(names) == len(set(names))
 
 
-@given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))
-def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
-    """D^k P(N/D) against P at the image that the map itself computes, modulo a prime."""
-    (formulas, data), field = _prepare(load("euler_top"), "gp"), GF(2**61 - 1)
-    P = parse_rational_function("x1^2*x2 - 3*x3 + eps*x1 + 5", data.names).numerator
-    point = [field.convert(value) for value in (x, y, z)]
-    step = field.convert(f"1/{eps}")
-    image = formulas.map.at(f"1/{eps}", field).step(tuple(point))
-
-    def at(polynomial, values):
-        total = field.zero
-        for exponents, coefficient in polynomial.terms():
-            term = field.convert(coefficient)
-            for value, exponent in zip((*values, step), exponents, strict=True):
-                term *= value ** int(exponent)
-            total += term
-        return total
-
-    D = at(data.determinant, point)
-    assert at(homogeneous_value(P, 4, data), point) == D**4 * at(P, image)
-
-
-def test_the_adjugate_solves_the_equation_of_the_map():
-    _, data = _prepare(load("volterra_periodic_4"), "gp")
-    n = data.dim
-    for i in range(n):
-        row = data.rows[i]
-        assert sum((row[j] * data.numerators[j] for j in range(n)), row[0] * 0) == data.determinant * row[-1]
-        for k in range(n):
-            entry = sum((data.adjugate[i][j] * data.rows[j][k] for j in range(n)), row[0] * 0)
-            assert entry == (data.determinant if i == k else 0)
-
-
 @pytest.mark.parametrize("function", ["x1^2 + x2^2", "(x1^2 + x3^2)/(1 + eps*x2)"])
 def test_a_function_that_is_not_conserved_has_no_certificate(function):
     refuses("F is not conserved", certificate, load("euler_top"), "gp", integrals={"F": function}, error=FalseClaim)
@@ -487,7 +458,7 @@ def test_a_quotient_of_darboux_polynomials_with_different_cofactors_has_no_certi
     refuses("F is not conserved", certificate, load("lotka_volterra"), "gp", integrals={"F": "x/y"}, error=FalseClaim)
 
 
-@pytest.mark.parametrize("checker", CHECKERS)
+@over(*PROGRAMS)
 @pytest.mark.parametrize(
     ("x_dot", "options"),
     [
@@ -549,7 +520,7 @@ def test_results_about_one_eps_or_the_flow_have_no_certificate():
     refuses("a str has no certificate: it proves nothing about a map", certificate_of, "lotka_volterra", "gp")
 
 
-@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
+@over(*PROGRAMS)
 def test_findings_and_results_write_certificates_of_what_they_prove(checker, tmp_path):
     member = verify("paper_m2", options=VerifyOptions(sections=(6,)))
     theorem = next(finding for finding in member if finding.claim.startswith("Theorem 9: The Kahan maps"))
@@ -595,20 +566,6 @@ def test_the_time_that_is_said_beforehand_is_that_of_coq_within_a_factor_of_3(na
     text = certificate(load(name), "rocq", everything=True)
     assert seconds / 3 < text.seconds < 3 * seconds
     assert str(len(text)) in text.summary
-
-
-@pytest.mark.parametrize("claim", ["euler_top F1", "zander_111 F", "repaired_icosahedral F"])
-def test_the_conserved_polynomials_have_the_same_cofactor_over_Z(claim):
-    name, integral = claim.split()
-    formulas, data = _prepare(load(name), "gp")
-    fraction = conserved_function(data, integral, formulas.integrals[integral]).fraction
-    P, Q = coprime(formulas.integrals[integral], data.names)
-    assert [product.polynomial for product in fraction.products] == [P, Q]
-    cofactors = [cofactor.at((data.determinant, *fraction.common_factors)) for cofactor in fraction.cofactors]
-    assert cofactors[0] == cofactors[1] != 0
-    assert homogeneous_value(P, fraction.degree, data) == cofactors[0] * P
-    assert homogeneous_value(Q, fraction.degree, data) == cofactors[0] * Q
-    assert all(c.q == 1 for letter in fraction.common_factors for _, c in letter.terms())
 
 
 def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():

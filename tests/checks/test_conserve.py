@@ -240,13 +240,6 @@ def test_an_integral_of_the_commutant_lemma_may_be_0(H, verdict):
     assert report.verdict is PROVED
 
 
-def test_an_orbit_alone_never_makes_a_claim_proved_or_supported():
-    # x is constant along the orbit of a start with y = 0, and nowhere else.
-    finding = check_claim(system_of("x y", "y", "x*y"), "x", Settings(eps="1/10", start=(2, 0), steps=5))
-    assert finding.verdict is REFUTED
-    assert finding.also[-1].summary.startswith("held exactly at 6 points")
-
-
 def test_a_system_without_any_integral_is_wrong_use():
     refuses("no integral of f is known or claimed", check_integrals, file_of(LOTKA_VOLTERRA))
 

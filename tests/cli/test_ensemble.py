@@ -97,16 +97,6 @@ def test_statistics_are_those_of_the_orbits(kahanmaps, tmp_path):
     assert modified < 1e-12 < 1e-9 < plain  # the map conserves the one and not the other
 
 
-def test_points_are_the_same_with_and_without_a_radius(kahanmaps, tmp_path):
-    command = f"{TOP} --random 7 --steps 50 --every 7 -q -o"
-    written = []
-    for more in ("", "--radius 1/2"):
-        kahanmaps(command, tmp_path / "x.npy", more)
-        written.append(np.load(tmp_path / "x.npy").tolist())
-    assert written[0] == written[1]
-    assert len(written[0]) == 8
-
-
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     for more in ("", " --integral F1"):

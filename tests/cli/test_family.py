@@ -3,7 +3,6 @@
 What a seed draws is the same everywhere. Files that are written are read by every other command.
 """
 
-import json
 from pathlib import Path
 
 import pytest
@@ -37,29 +36,6 @@ def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
     outcome = kahanmaps("family show", tmp_path / "a.toml", "--normal-form --json")
     assert (outcome.status, outcome.out) == (2, "")
     assert "chi has the repeated factor (t - 1)" in outcome.err
-
-
-@pytest.fixture
-def forgetful(kahanmaps, pair):
-    """The member `pair` once more: as H alone, and as equations alone."""
-    shown = kahanmaps("systems", pair, "--json").json
-    variables = f"variables = {json.dumps(shown['variables'])}\n"
-    declared, equations = pair.with_name("declared.toml"), pair.with_name("equations.toml")
-    declared.write_text(f"{variables}[hamiltonian]\nH = {json.dumps(shown['document']['family']['H'])}\nJ = 'standard'")
-    equations.write_text(f"{variables}[system]\nrhs = {json.dumps(shown['rhs'])}\n")
-    return declared, equations
-
-
-@pytest.mark.parametrize("which", [0, 1])
-def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, which):
-    shown = kahanmaps("family show", forgetful[which], "--json").json
-    member = kahanmaps("family show", pair, "--json").json
-    assert set(shown) == {*member, "found"}
-    assert set(shown["found"]) == {"text", "A", "generic", "dimension", "standard", "T"}
-    assert shown["found"]["A"] == shown["A"]
-    assert (shown["found"]["generic"], shown["found"]["dimension"], shown["found"]["standard"]) == (True, 2, True)
-    assert shown["hamiltonians"][0] == member["hamiltonians"][0]
-    assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
 
 
 def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):

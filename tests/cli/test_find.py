@@ -1,9 +1,8 @@
 """The commands find-...: what they print is accepted by the checks and can be pasted, JSON has all that is needed to
-search again, and what stays open gives 3. Witnesses of checks are verified by `kahanmaps orbit`.
+search again, and what stays open gives 3.
 """
 
 import shlex
-from fractions import Fraction
 
 import pytest
 
@@ -113,36 +112,6 @@ def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
     # On an orbit q p~ - p q~ and q^2 + p^2 are constants, and one is a multiple of the other.
     assert (basis["dimension"], basis["functions"]) == (1, ["q*p~", "p*q~", "q^2", "p^2"])
     assert kahanmaps("find-integrals lorenz --monomials 'x*y~,y*x~,1' --json").json["bases"][0]["dimension"] == 0
-
-
-def claims(report):
-    """Claim -> the rest, without the control."""
-    return {entry["claim"]: entry for entry in report["claims"] if "control" not in entry}
-
-
-def image(kahanmaps, system, point, eps):
-    """The image of a point under a Kahan map, by `kahanmaps orbit`."""
-    command = f"orbit {system} --start={','.join(point)} --eps {eps} --steps 1 --format jsonl"
-    return kahanmaps(command).records[-2]["x"]
-
-
-def test_a_witness_of_an_integral_is_verified_by_an_orbit(kahanmaps):
-    claim = claims(kahanmaps("check-integrals euler_top --integral s=x1-x2/3 --json").json)["s is conserved"]
-    witness = claim["witness"]
-    assert witness["field"] == "QQ"
-    before = [Fraction(entry) for entry in witness["point"]]
-    after = [Fraction(entry) for entry in image(kahanmaps, "euler_top", witness["point"], witness["eps"])]
-    assert [Fraction(text) for text in witness["right"]["value"]] == [before[0] - before[1] / 3]
-    assert [Fraction(text) for text in witness["left"]["value"]] == [after[0] - after[1] / 3]
-
-
-def test_a_witness_of_maps_that_do_not_commute_is_verified_by_orbits(kahanmaps):
-    (claim,) = kahanmaps("check-commute euler_top lorenz --json").json["claims"]
-    x, eps = claim["witness"]["point"], claim["witness"]["eps"]
-    f_first = image(kahanmaps, "lorenz", image(kahanmaps, "euler_top", x, eps), eps)
-    g_first = image(kahanmaps, "euler_top", image(kahanmaps, "lorenz", x, eps), eps)
-    assert claim["witness"]["left"] == {"is": "Phi_g(Phi_f(x))", "value": f_first}
-    assert claim["witness"]["right"] == {"is": "Phi_f(Phi_g(x))", "value": g_first}
 
 
 def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanmaps):

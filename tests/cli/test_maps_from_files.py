@@ -92,7 +92,6 @@ WORDS = {
     + ", ".join(['{ system = "lotka_volterra" }, { system = "weierstrass", inverse = true }'] * 5)
     + ']\n[density]\nphi = "x*y"\n[integrals]\nI = "x"',
 }
-STARTS = {"four": "1/2,1/3,1/5,1/7", "ten letters": "1/2,1/3"}
 
 
 @pytest.fixture
@@ -103,18 +102,6 @@ def word(tmp_path):
         return path
 
     return written
-
-
-@pytest.mark.parametrize(
-    ("name", "arithmetic"),
-    [("four", "exact"), *(("ten letters", kind) for kind in ("exact", "mod:10007", "float", "ball:auto"))],
-)
-def test_orbits_are_stepped(kahanmaps, word, name, arithmetic):
-    line = f"orbit {word(name)} --start {STARTS[name]} --eps 1/10 --steps 1 --arithmetic {arithmetic} --format jsonl -q"
-    result = kahanmaps(line)
-    records = [json.loads(text) for text in result.out.splitlines()]
-    assert (result.status, records[-1]["status"]) == (0, "completed")
-    assert len(records[0]["composition"]) == {"four": 4, "ten letters": 10}[name]
 
 
 LINES = [

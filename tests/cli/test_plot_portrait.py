@@ -31,7 +31,8 @@ def drawn(monkeypatch):
     return seen
 
 
-def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
+def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn, monkeypatch):
+    monkeypatch.setattr("kahanmaps.plots.portraits.flow.COUNT", 3)
     line = f"{PLOT} lotka_volterra --eps 1/20 --steps 30 --flow -p"
     assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
     near, result = (portrait for portrait, _ in drawn)
@@ -66,7 +67,9 @@ def test_starts_come_from_a_file_or_at_random(kahanmaps, drawn, tmp_path):
 
 
 def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):
-    command = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --levels modified_H"
+    command = (
+        f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --no-field --levels modified_H"
+    )
     kahanmaps(command)
     outcome = kahanmaps(command + " --levels-at=-1/2,1000")
     through, at = (portrait.levels for portrait, _ in drawn)
@@ -85,7 +88,7 @@ def test_ctrl_c_ends_a_portrait_without_a_picture(kahanmaps, drawn, monkeypatch,
 
 
 def test_points_are_coloured_by_an_integral_that_a_theorem_gives(kahanmaps, drawn):
-    words = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --colour-by"
+    words = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --no-field --colour-by"
     kahanmaps(f"{words} 'modified H'")
     kahanmaps(f"{words} H")  # of the flow, which the map does not conserve
     kept, moved = (np.ptp(portrait.values) for portrait, _ in drawn)

@@ -23,26 +23,8 @@ def test_a_map_is_shown_as_text_latex_and_data(kahanmaps, name):
     assert parse_system(kahanmaps(f"systems {name} --toml").out, name) == catalog.load(name)
 
 
-EULER = r"""\[
-\left\{
-\begin{aligned}
-\dot{x_1} &= x_2 x_3 \\
-\dot{x_2} &= -2 x_1 x_3 \\
-\dot{x_3} &= x_1 x_2
-\end{aligned}
-\right.
-\]
-\[
-F_1 = -\frac{\varepsilon^2 x_2^2 - 1}{2 \varepsilon^2 x_3^2 + 1}
-\]
-\[
-F_2 = \frac{2 \varepsilon^2 x_3^2 + 1}{2 \varepsilon^2 x_1^2 + 1}
-\]
-\[
-\phi = \left(2 \varepsilon^2 x_3^2 + 1\right)^2
-\]
-"""
-
-
-def test_a_system_in_latex(kahanmaps):
-    assert kahanmaps("systems euler_top --latex").out == EULER
+def test_a_system_in_latex_has_its_equations_integrals_and_density(kahanmaps):
+    lines = kahanmaps("systems euler_top --latex").out.splitlines()
+    assert r"\dot{x_2} &= -2 x_1 x_3 \\" in lines
+    assert r"F_2 = \frac{2 \varepsilon^2 x_3^2 + 1}{2 \varepsilon^2 x_1^2 + 1}" in lines
+    assert r"\phi = \left(2 \varepsilon^2 x_3^2 + 1\right)^2" in lines

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import table, together
+from helpers import CHARACTERS, table, together
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import PRIME, system
@@ -188,7 +188,12 @@ def test_files_that_are_too_large_or_no_text_are_refused_by_key(text, expected):
 
 
 @settings(max_examples=60)
-@given(st.sampled_from(list(HAND_WRITTEN.values())), st.integers(0, 10_000), st.integers(0, 40), st.text(max_size=3))
+@given(
+    st.sampled_from(list(HAND_WRITTEN.values())),
+    st.integers(0, 10_000),
+    st.integers(0, 40),
+    st.text(CHARACTERS, max_size=3),
+)
 def test_a_damaged_file_is_an_input_error_or_still_a_file(text, at, length, inserted):
     at %= len(text)
     try:

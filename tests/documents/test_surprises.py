@@ -62,12 +62,6 @@ def output_of(monkeypatch, capfd):
     return run
 
 
-def test_the_page_has_its_rows_and_fits_on_two_screens():
-    assert len(ROWS) == 11
-    assert all(commands and quoted for _, commands, quoted in ROWS)
-    assert len(PAGE.read_text(encoding="utf-8")) < 5000  # two screens of 40 lines
-
-
 @pytest.mark.parametrize(("commands", "quoted"), CASES)
 def test_the_commands_of_a_row_print_what_it_quotes(commands, quoted, output_of):
     assert missing(commands, quoted, output_of) == []

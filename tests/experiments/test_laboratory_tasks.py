@@ -110,14 +110,6 @@ def test_what_is_known_is_found(name, system, requested, expected):
     assert {key: record[key] for key in expected} == expected
 
 
-def test_what_is_missing_has_a_reason(monkeypatch):
-    # Four integrals by petrera-pfadler-suris-2009, not all of them quotients of small degree in x alone.
-    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.TWO_POINT_BASES", ())
-    record = perform("find-integrals", of_catalogue("clebsch_first_flow"), max_degree=2)
-    assert (record["status"], record["codimension"] > record["integrals"] > 0) == ("formulas missing", True)
-    assert "no closed form" in record["reason"]
-
-
 def test_a_census_is_that_of_the_library():
     record = perform("cycles", WEIERSTRASS, prime=31, eps="1/10", report=True)
     census = cycle_census(WEIERSTRASS.system, "1/10", 31)

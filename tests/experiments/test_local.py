@@ -358,7 +358,7 @@ def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path
 
 @pytest.mark.parametrize(("number", "first"), [(Signals.SIGTERM, "workers"), (Signals.SIGKILL, "parent")])
 def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: Path, number: Signals, first: str):
-    text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..29" }\n'
+    text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..14" }\n'
     (tmp_path / "spec.toml").write_text(text)
     command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
     process = subprocess.Popen(

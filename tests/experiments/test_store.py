@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from helpers import refuses
+from helpers import CHARACTERS, refuses
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, seeds, small_chunks, task, tasks
@@ -281,12 +281,12 @@ def test_shards_merged_in_any_order_are_the_whole(plan, bad, parts):
 
 
 plain = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    st.none() | st.booleans() | st.integers() | st.text(CHARACTERS, max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(CHARACTERS, max_size=3), inner, max_size=3),
     max_leaves=8,
 )
-tables = st.dictionaries(st.text(max_size=5), plain, max_size=4)
-any_task = st.builds(Task, st.text(max_size=8), st.none() | tables, tables)
+tables = st.dictionaries(st.text(CHARACTERS, max_size=5), plain, max_size=4)
+any_task = st.builds(Task, st.text(CHARACTERS, max_size=8), st.none() | tables, tables)
 
 ORBIT = Task("orbit", {"family": {"m": 2, "seed": 7}}, {"eps": "1/10", "steps": 5, "start": None})
 FILE = Task("orbit", {"document": "d", "name": "top", "parameters": {"a": "2"}}, {"eps": "1/10"})

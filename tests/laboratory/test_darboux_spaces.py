@@ -20,59 +20,20 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
+from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as module
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     Cofactor,
-    CofactorProduct,
-    Sample,
-    cofactor_space,
     determinant_factors,
     determinant_polynomial,
-    points_needed,
 )
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces, gradient_rank
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SMALL = 101
-
-
-def first_map(file, eps=None):
-    return Laboratory(file, (), eps).maps[0]
-
-
-def values(space, x, prime):
-    powers = monomial_values(x, space.degree, prime)
-    return [sum(c * m for c, m in zip(vector, powers, strict=True)) % prime for vector in space.basis]
-
-
-def is_common(map_, space):
-    """Whether all ratios are the same at points and their images: P(x~) Q(x) = Q(x~) P(x)."""
-    for x, image in map_.pairs(5):
-        here, there = values(space, x, map_.prime), values(space, image, map_.prime)
-        if any((there[k] * here[0] - there[0] * here[k]) % map_.prime for k in range(len(here))):
-            return False
-    return True
-
-
-@pytest.mark.parametrize(
-    ("name", "degree", "sizes"),
-    [
-        ("euler_top", 2, [3]),  # 1 - eps^2 a_j a_k x_i^2, i = 1, 2, 3
-        ("zhukovski_volterra_1", 2, [2, 2]),
-        ("lorenz", 3, []),
-    ],
-)
-def test_spaces_of_known_maps(name, degree, sizes):
-    map_ = first_map(load(name))
-    spaces = darboux_spaces(map_, degree)
-    assert all(is_common(map_, space) for space in spaces)
-    if sizes is not None:
-        assert sorted(len(space.basis) for space in spaces) == sizes
-    assert gradient_rank(map_, spaces) <= load(name).catalog["codimension"]
 
 
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
@@ -121,14 +82,6 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
         while not (others % entry.polynomial):
             others = others // entry.polynomial
     assert all(not any(monomial[: map_.dim]) for monomial in others.monoms())
-
-
-def test_polynomials_with_a_given_cofactor():
-    sample = Sample.of(Laboratory(load("lotka_volterra")).maps[0], [DETERMINANT], points_needed(2, 3))
-    # x y has the cofactor det dPhi, constants have 1
-    assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
-    assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
-    assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
 
 
 def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:

@@ -48,13 +48,6 @@ def test_an_expansion_refutes_what_random_points_let_pass(blind, is_density, eps
     assert evidence.method == "exact rational point"  # which the expansion asks for
 
 
-def test_the_proof_for_every_eps_is_for_eps_and_not_for_a_coordinate():
-    # Conserved where eps = x or eps = y, and nowhere else.
-    for name in ("x", "y"):
-        assert integral_verdict(ROTATION, function(f"(eps - {name})^2"), None)[0] is Certainty.REFUTED
-    assert integral_verdict(ROTATION, function("eps*(x^2 + y^2)"), None)[0] is Certainty.PROVED
-
-
 @pytest.mark.parametrize("is_density", [False, True])
 def test_a_function_without_values_at_the_eps_in_force_is_undecided(is_density):
     system = LOTKA_VOLTERRA if is_density else ROTATION

@@ -37,8 +37,7 @@ def derived(name):
 
 
 WRITTEN = [name for name in (*names(), *map_names()) if DIMENSION[name] <= 4]
-DAILY = ["riccati", "weierstrass", "euler_top", "dressing_chain_3"]
-DAILY += ["lorenz", "mcmillan", "somos_4", "hietarinta_viallet"]
+DAILY = ["riccati", "weierstrass", "euler_top", "mcmillan", "hietarinta_viallet"]
 FURTHER = Path(__file__).parent / "further_systems"
 # In these several contracted hypersurfaces are zeros of one form over Q: the degrees of all of them.
 OF_ONE_FORM = {

@@ -1,24 +1,17 @@
-"""A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only.
-
-Spaces with zeros at the same places are told apart by their coefficients, whatever the primes and the order.
-"""
+"""A search recorded and repeated on other maps; spaces with zeros at the same places are told apart for every seed."""
 
 import random
 from functools import cache
-from types import SimpleNamespace
 
 import pytest
-from flint import nmod
 from helpers import quick
 from search_helpers import system, values_on_orbits
 
-from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
@@ -84,33 +77,6 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
         search_spaces(laboratory.maps[0], profile, known, budget=Budget())
 
 
-# The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
-def pencil_at(prime, values):
-    a, eps = values
-    below = nmod(3 * eps - 1, prime)
-    if below == 0:
-        return None
-    entries = {(0, 0): nmod(1, prime), (1, 0): nmod(a * a, prime) / below}
-    support = exponents_up_to(2, 2)
-    vectors = [[int(entries.get(m, 0)) for m in support], [int(m == (0, 2)) for m in support]]
-    return [DarbouxSpace.spanned_by(2, 2, vectors, prime)]
-
-
-MODEL = pencil_at(2**61 - 1, (12345, 67890))
-
-
-def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
-    """What a laboratory makes of spaces that are given by the prime and the values, and not found on maps."""
-    laboratory = SimpleNamespace(map_for=lambda *place: place, symbols=symbols, root=None, seed=0)
-    return Laboratory.formulas(laboratory, model, lambda place: spaces_at(*place), budget, variables, eps_enters)
-
-
-def test_coefficients_are_interpolated():
-    formulas = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert [format_polynomial(P) for P in formulas.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
-    assert formulas.reason == ""
-
-
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the
 # other: (K + const)/(1 - eps^2 (a (dK/dz)^2 ...)) has its zeros where the other one has them.
 DX, DY = "(2*a1*x + a2*y + a4)", "(a2*x + 2*a3*y + a5)"
@@ -146,14 +112,6 @@ def spaces(prime, values, numbers, order):
     return results
 
 
-def root_of(n, prime):
-    """A square root of n modulo a prime, None where there is none."""
-    from flint import nmod_poly
-
-    factors = nmod_poly([-n % prime, 0, 1], prime).factor()[1]
-    return None if len(factors) == 1 and factors[0][0].degree() == 2 else int(-factors[0][0][0])
-
-
 @pytest.mark.parametrize("order", range(3))
 def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     numbers = [
@@ -179,15 +137,3 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     ]
     assert which[0] == which[1]
     assert sorted(which[0]) == [0, 1, 2]
-
-
-@pytest.mark.parametrize("names", [(), ("a",)])
-def test_spaces_that_are_conjugate_have_no_order(names):
-    """x + sqrt(2) y, or x + sqrt(2) a y, and its conjugate: two spaces modulo the primes where 2 is a square."""
-
-    def alike(prime, values):
-        root = root_of(2, prime)
-        return None if root is None else spaces(prime, values, [lambda p, a=1: root * a, lambda p, a=1: -root * a], 0)
-
-    prime = next(map_.prime for map_ in Laboratory(FAMILY).other_maps(20) if root_of(2, map_.prime) is not None)
-    assert find_branches(alike(prime, (3,) * len(names)), alike, names, 0, Budget()) is None

@@ -204,27 +204,6 @@ def test_a_form_splits_modulo_primes_with_a_root_of_minus_one(p, degrees):
     assert all(entry.order == 0 for entry in some)
 
 
-def test_orders_along_a_curve_are_those_of_each_component():
-    """X1 = X2 t^0 + t^3 has the order 3 on X1 = X2, 1 on X1 + X2 - 2 Z, and 0 on X3."""
-    curve = [(1, 1, 0, 1), (1, 1), (5,), (1,)]
-    orders = {entry.order for entry in components_on((X1**2 - X2**2) * (X1 + X2 - 2 * Z) * X3, 1000033, curve)}
-    assert orders == {0, 1, 3}
-    assert [entry.order for entry in components_on(X1 - X2, 1000033, [(1, 1), (1, 1), (5,), (1,)])] == [
-        None
-    ]  # it lies there
-
-
-def test_roots_are_points_of_the_component():
-    p = 1000033
-    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    for item in components_on((X1**2 + X2**2) * X3, p, curve):
-        for t in range(5):
-            for u in item.roots(t):
-                x1, x2, x3, _ = ((a + b * t + u * w) % p for (a, b), w in zip(curve, DIRECTION, strict=True))
-                assert (x1**2 + x2**2) * x3 % p == 0
-    assert not any(entry.roots(t) for entry in components_on(X1**2 + X2**2, 1000003, curve) for t in range(5))
-
-
 def conics(*signs):
     """What the map of the Euler top contracts, with these signs; that of its inverse at -eps."""
     return {

@@ -126,7 +126,7 @@ def test_an_orbit_in_normal_form_follows_the_exact_one(name):
 
 
 # The others are walked alike; machine code of a dense system takes seconds to be compiled.
-OFTEN = ["henon_heiles", "euler_top", "pivots", "normal form, one plane", "normal form, real and complex"]
+OFTEN = ["euler_top", "pivots", "normal form, real and complex"]
 OFTEN += ["normal form, repeated factors", "normal form, a repeated factor at a complex root"]
 
 

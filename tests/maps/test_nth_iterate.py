@@ -230,13 +230,6 @@ def test_small_starts_end_alike_by_steps_and_by_jumps(cubic):
     assert {"singular", "budget"} & set(seen)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("eps", EPS)
-@pytest.mark.parametrize("cubic", [*CUBICS, (1, 3, 3, -4), (1, 0, 0, 1), (0, 2, -1, 2), (2, -1, 0, 3), (0, 0, 1, 5)])
-def test_many_small_starts_end_alike_by_steps_and_by_jumps(cubic, eps):
-    assert {"singular", "budget"} & set(seen_from(cubic, eps, range(-12, 13, 3), [(120, 30), (31, 3), (25, 1)]))
-
-
 @over_members
 def test_members_end_alike_by_steps_and_by_jumps(name):
     normal_form, system = structure_and_system(name)
