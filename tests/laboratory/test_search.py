@@ -4,9 +4,11 @@ import random
 from functools import cache
 
 import pytest
+from flint import nmod_poly
 from helpers import quick
 from search_helpers import system, values_on_orbits
 
+from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
@@ -19,7 +21,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, g
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import candidates
-from kahanmaps.laboratory.preserve.search import find_branches, may_be_conjugate, repeat_search, search_spaces
+from kahanmaps.laboratory.preserve.search import Branches, find_branches, may_be_conjugate, repeat_search, search_spaces
 
 
 def searched(file, eps=None):
@@ -137,3 +139,32 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     ]
     assert which[0] == which[1]
     assert sorted(which[0]) == [0, 1, 2]
+
+
+def test_spaces_are_not_put_in_order_where_their_coefficients_are_equal_or_undefined():
+    m = Laboratory(system("x y", "a*y", "x", a="2"), ["a"]).maps[0]
+    a, eps = ring(("a", "eps")).gens()
+    value, one = m.values[0], a**0
+    three, half_of_a, pole = (
+        RationalFunction(3 * one, one),
+        RationalFunction(a, 2 * one),
+        RationalFunction(eps, a - value),
+    )
+    half = value * pow(2, -1, m.prime) % m.prime
+    different, equal = ([DarbouxSpace(2, 1, [[1, 0, 0], [0, c, 1]]) for c in pair] for pair in ((half, 3), (3, 3)))
+    assert Branches((1, 1), (three, half_of_a)).in_order(different, m) == different[::-1]
+    assert Branches((1, 1), (three, three)).in_order(equal, m) is None
+    assert Branches((1, 1), (three, pole)).in_order(different, m) is None
+
+
+def test_conjugate_spaces_have_no_branches():
+    """The coefficients are the square roots of 1 + eps^2, at values of eps where this is a square modulo the prime."""
+
+    def conjugate_spaces(prime, values):
+        factors = nmod_poly([-1 - values[0] ** 2, 0, 1], prime).factor()[1]
+        roots = [-int(factor[0]) for factor, _ in factors if factor.degree() == 1]
+        return spaces(prime, values, [lambda *_, c=c: c for c in roots], 0) if len(roots) == 2 else None
+
+    model = conjugate_spaces(23, (5,))  # 1 + 5^2 = 7^2 modulo 23
+    assert sorted(space.basis[1][1] for space in model) == [7, 16]
+    assert find_branches(model, conjugate_spaces, ("eps",), 0, Budget()) is None
