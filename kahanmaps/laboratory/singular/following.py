@@ -145,13 +145,13 @@ class AlongCurves(Protocol):
 class TrackedFunctions:
     """The functions whose orders are measured along curves through a hypersurface.
 
-    `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
+    `common_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
     not part of the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
     first `critical` functions belong to exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
-    minor_exponents: tuple[int, ...] = ()
+    common_exponents: tuple[int, ...] = ()
     initial_orders: tuple[int, ...] = ()
     critical: int = 0
 
@@ -159,18 +159,19 @@ class TrackedFunctions:
         """Return the rows of `OrbitData` for steps along a curve; without tracked functions, the orders of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
-        pairs = zip(divided_powers(run, self.initial_orders, self.minor_exponents), run, strict=True)
+        pairs = zip(divided_powers(run, self.initial_orders, self.common_exponents), run, strict=True)
         return tuple((mu, *step.orders[: self.critical]) for mu, step in pairs)
 
 
-def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_exponents: Sequence[int]) -> list[int]:
-    """Return the powers of t that are divided out, without the contributions of the common factor of the minors.
+def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], common_exponents: Sequence[int]) -> list[int]:
+    """Return for each step the power of t that the map divides out, without a common factor of the minors.
 
-    `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
+    The common factor of the minors of the equation is a product of the functions whose orders are measured, with the
+    `common_exponents`; it is not part of the map. `initial_orders` are the orders before the first step.
     """
     orders_before = [initial_orders, *(step.orders for step in run)]
     return [
-        step.common - sum(k * order for k, order in zip(minor_exponents, orders, strict=True))
+        step.common - sum(k * order for k, order in zip(common_exponents, orders, strict=True))
         for step, orders in zip(run, orders_before, strict=False)
     ]
 
