@@ -205,10 +205,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
             print_stdout(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
             print_stdout("the Kahan map conserves h/(1 + eps^2 D) at each of them")
         for part in form.parts:
-            root, weight = (
-                abbreviated(lib.format_number(part.root)),
-                abbreviated(lib.format_number(part.weight)),
-            )
+            root, weight = (abbreviated(lib.format_number(number)) for number in (part.root, part.weight))
             print_stdout(f"t = {root}: h = {abbreviated(part.text)}, D = {abbreviated(part.D_text)}, weight {weight}")
         point = "x" if structure is None or structure.is_standard else "y"
         print_stdout(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
