@@ -383,8 +383,8 @@ class Store(HtmlDisplay):
         with self._report_damage(f"the record of task {key}"):
             cells["outcome"] = Outcome(cells["outcome"])
             if (cells["outcome"] is Outcome.OK) is not (cells["result"] is not None):
-                no = "no " * (cells["result"] is None)
-                raise ValueError(f"the outcome is {cells['outcome']}, and the result {no}text")
+                presence = "no" if cells["result"] is None else "a"
+                raise ValueError(f"the outcome is {cells['outcome']}, and there is {presence} result")
             cells["result"] = None if cells["result"] is None else _parse_dict(cells["result"])
             cells["versions"] = _parse_dict(cells["versions"])
             cells["seconds"] = float(cells["seconds"])
