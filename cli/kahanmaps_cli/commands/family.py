@@ -360,8 +360,8 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
           --algebra 't^2+1'
 
     A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A parameter t of
-    SYSTEM stands for the generator of K. Each integral that SYSTEM claims gives m integrals of the map over Q, and its
-    density gives a density.
+    SYSTEM stands for the generator of K. If chi has degree m, each integral that SYSTEM claims gives m integrals of
+    the map over Q, and its density gives a density.
     """
     output = None if output == "-" else output
     algebra_file, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
