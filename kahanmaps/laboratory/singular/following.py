@@ -35,10 +35,9 @@ _MAX_PRECISION = 4096
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
 _CONSTANT = 8  # a column counts as constant if at least this number of last entries are equal
 _CONFIRMING_ORDERS = 4  # orders that must satisfy a recurrence, beyond the orders that determine it
-_FREE_STEPS = 100  # steps for which a confined hypersurface is followed
+_STEPS_AFTER_FIRST = 100  # steps for which a confined hypersurface is followed after the first steps
+_SHOWN_EVENTS = 6  # in a sentence
 
-
-_SHOWN = 6  # events in a sentence
 Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
@@ -124,7 +123,7 @@ class OrbitData:
 
 
 def _shorten(events: Sequence[str]) -> str:
-    return ", ".join(events[:_SHOWN]) + (", ..." if len(events) > _SHOWN else "")
+    return ", ".join(events[:_SHOWN_EVENTS]) + (", ..." if len(events) > _SHOWN_EVENTS else "")
 
 
 NO_ORBIT_DATA = OrbitData(())
@@ -247,7 +246,7 @@ class TestCurve:
         If the image is a critical hypersurface after some step, the pattern of the latter gives the later orders.
         """
         step_count = self.limits.first_steps
-        max_steps = min(self.limits.max_steps, step_count + _FREE_STEPS)
+        max_steps = min(self.limits.max_steps, step_count + _STEPS_AFTER_FIRST)
         while True:
             run = self.all_steps(step_count)
             rows = self.tracked.rows(run)
