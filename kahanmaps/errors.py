@@ -211,7 +211,7 @@ def is_out_of_memory(error: BaseException) -> bool:
     return isinstance(error, (ImportError, OSError)) and _NO_MEMORY.search(str(error)) is not None
 
 
-def is_of_the_machine(error: OSError) -> bool:
+def is_machine_failure(error: OSError) -> bool:
     """Whether the error is due to the state of the machine, so that the same request may succeed later or elsewhere."""
     return error.errno in _MACHINE_ERRORS
 

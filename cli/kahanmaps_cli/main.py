@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar
 import click
 
 from kahanmaps.checks.table import CHECKS
-from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
+from kahanmaps.errors import InputError, KahanmapsError, bounded, is_machine_failure, is_out_of_memory
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps_cli.groups import SuggestingGroup, rephrase
 from kahanmaps_cli.params import HELP_OPTIONS, with_common_rules
@@ -236,10 +236,10 @@ def _report_error(error: Exception) -> int:
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
         folder = os.path.dirname(error.filename) if isinstance(error.filename, str) else ""
-        is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
-        hint = f" (there is no folder {folder}: create it, or check the name)" if is_missing else ""
+        folder_is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
+        hint = f" (there is no folder {folder}: create it, or check the name)" if folder_is_missing else ""
         print_stderr(bounded(f"Error: {error.strerror or error}{where}{hint}"))
-        return UNDECIDED if is_of_the_machine(error) else USAGE_ERROR
+        return UNDECIDED if is_machine_failure(error) else USAGE_ERROR
     if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
         print_stderr(bounded(f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again"))
         return UNDECIDED

@@ -145,15 +145,13 @@ given_starts_options: Callable[[F], F] = stack(
         help="Grid of initial points: N values from A to B for a variable, or one value: x=-1:1:20,y=0:1:9,z=1/2. "
         "Other variables are 0.",
     ),
-    click.option("--line", metavar="X:Y:N", help="N initial points on a line from X to Y, e.g. 0,0:1,1/2:50."),
+    click.option("--line", metavar="X:Y:N", help="N initial points on the segment from X to Y, e.g. 0,0:1,1/2:50."),
 )
 
 starts_options: Callable[[F], F] = stack(
     given_starts_options,
-    click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points instead."),
-    click.option(
-        "--box", type=ExactNumber(), metavar="R", help="With --random: draw coordinates from -R to R (default 1)."
-    ),
+    click.option("--random", "count", type=Whole(1), metavar="N", help="Start at N random points."),
+    click.option("--box", type=ExactNumber(), metavar="R", help="With --random: coordinates from -R to R (default 1)."),
     click.option("--seed", type=Whole(), metavar="S", help="With --random: random seed (default 0)."),
 )
 
@@ -185,7 +183,7 @@ effort_options: Callable[[F], F] = stack(
         metavar="E",
         default=1,
         show_default=True,
-        help="Work limit of the search: each increment by 1 doubles it.",
+        help="Work limit: each increment by 1 doubles it.",
     ),
     seconds_option,
 )

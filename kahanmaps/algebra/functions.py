@@ -104,12 +104,12 @@ class FunctionField(Field):
         self.pay(len(left) * len(right) + 1)
         return left * right
 
-    def pay(self, products: int) -> None:
+    def pay(self, product_count: int) -> None:
         """Charge this number of products of terms to the budget. Raises BudgetExceeded if it is too small."""
-        self.budget -= products
+        self.budget -= product_count
         if self.budget < 0:
             raise BudgetExceeded(_BUDGET_MESSAGE)
-        count_work(1 + products / 100)
+        count_work(1 + product_count / 100)
 
     def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
         """Raise BudgetExceeded at once if the budget is too small for the products of all these pairs."""
@@ -369,13 +369,13 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, units_before = field.budget, counted()
     for cached_key in (key, (key, budget)):
-        minors, products, units = _cache.get(cached_key, (None, 0, 0))
-        if cached_key in _cache and products <= budget:
+        minors, product_count, units = _cache.get(cached_key, (None, 0, 0))
+        if cached_key in _cache and product_count <= budget:
             count_work(units)
             if minors is None:
                 field.budget = -1
                 raise BudgetExceeded(_BUDGET_MESSAGE)
-            field.budget -= products
+            field.budget -= product_count
             return minors
     try:
         if len(rows) > _MAX_ROWS_BY_MINORS:
@@ -392,10 +392,10 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     return minors
 
 
-def _cache_minors(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
+def _cache_minors(key: _Key, minors: list[fmpq_mpoly] | None, product_count: int, units: int) -> None:
     """Store minors, or None for a failure; remove the oldest entries of a full cache."""
     with _cache_lock:
-        _cache[key] = minors, products, units
+        _cache[key] = minors, product_count, units
         while (
             len(_cache) > _MAX_CACHED
             or sum(len(P) for cached_minors, *_ in _cache.values() for P in cached_minors or ()) > _MAX_CACHED_TERMS

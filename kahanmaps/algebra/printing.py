@@ -294,9 +294,10 @@ PLAIN = Notation(str, str, "{}^{}".format)
 
 
 def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_mpoly]:
-    """Return a quotient as its sign, numerator and denominator, both with integer coefficients and positive first term.
+    """Return whether a quotient has a minus sign, and numerator and denominator without it.
 
-    A polynomial is returned with its own coefficients and signs, and with the denominator 1.
+    Both have integer coefficients and a positive first term. A polynomial is not changed: for P the result is False, P
+    and 1, whatever the coefficients and signs of P.
     """
     numerator, denominator = function.numerator, function.denominator
     if function.is_polynomial or numerator.is_zero():

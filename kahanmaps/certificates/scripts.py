@@ -1,8 +1,9 @@
 """Certificates for PARI/GP and for SymPy: each identity is expanded, and `true` is printed if it holds.
 
-The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D if det M is not 0. Then it computes
-the polynomial D^k P(N/D) and compares it with C P. It ends with status 1 if an identity does not hold. Both languages
-get functions with the same names, so that the text of the checks differs only in the notation of powers.
+The map is given by M(x) x~ = r(x). The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D
+if det M is not 0. That a polynomial P of degree k satisfies P(x~) = P C/D^k, for instance, is the identity
+D^k P(N/D) = C P of polynomials, and the script computes both sides. It ends with status 1 if an identity does not hold.
+Both languages get functions with the same names, so that the text of the checks differs only in the notation of powers.
 """
 
 from __future__ import annotations
@@ -195,17 +196,17 @@ _REQUIRED_TOOLS = {"act": ("dot",), "images": ("image",)}
 class Language:
     """The syntax of a program for powers, definitions, vectors, matrices and comments, and its functions for checks."""
 
-    start: str
-    tools: dict[str, str]
-    end: str
-    run: str
+    start: str  # the first lines of a script
+    tools: dict[str, str]  # definitions of functions; a script contains those that it uses
+    end: str  # the last line, which sets the exit status
+    run: str  # the command that runs a script
     power: str
     comment: str
     definition: str
     vector: str
     matrix: str
-    next_row: str
-    residual: str
+    next_row: str  # between two rows of a matrix
+    residual: str  # M x~ - r, for the point x~ = new
 
 
 GP = Language(

@@ -187,12 +187,12 @@ def read_equations(
                 velocity += "_"
             velocities[name] = velocity
     notes += [f"{name}'' is read with a velocity, the variable {v}: {name}' = {v}" for name, v in velocities.items()]
-    sides = dict[str, str]()
+    right_sides = dict[str, str]()
     for name, formula in formulas.items():
-        sides[name] = velocities.get(name, "") or _formula_text(name, formula, orders, velocities)
+        right_sides[name] = velocities.get(name, "") or _formula_text(name, formula, orders, velocities)
     for name, velocity in velocities.items():
-        sides[velocity] = _formula_text(name, formulas[name], orders, velocities)
-    return sides, list(velocities.values()), notes
+        right_sides[velocity] = _formula_text(name, formulas[name], orders, velocities)
+    return right_sides, list(velocities.values()), notes
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
@@ -224,7 +224,11 @@ def _skip_argument(tokens: Sequence[str], position: int) -> int:
 
 
 def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
-    """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
+    """Return the right-hand side of the equation for `name` as text, with x instead of x(t).
+
+    `orders` has the order of the equation of each variable. The derivative x' of a variable with an equation of second
+    order is replaced by its name in `velocities`.
+    """
     words = [token for token in tokens if not token.isspace()]
     blanks, blank = list[str](), ""  # keep the blank before a word: "x y" must not become "xy"
     for token in tokens:

@@ -53,8 +53,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     `map` is the map; for a differential equation it is the Kahan map. `hamiltonian` and `member` are None unless the
     file (or the Python object from which it was made) declares them. `integrals` and `density` are claims: rational
-    functions of the variables and `eps`. `document` is the file as plain data, with names of parameters in its
-    formulas.
+    functions of the variables and `eps`. `document` is the file as plain data; its formulas contain the names of the
+    parameters, not their values.
     """
 
     name: str
@@ -148,7 +148,11 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         reason = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
             reason = f"stands for a {self.map.title}"
-        hint = "; of a Kahan map give the system x' = f(x)" if self.kind in ("bilinear", "map", "composition") else ""
+        hint = (
+            "; if it is a Kahan map, give its system x' = f(x)"
+            if self.kind in ("bilinear", "map", "composition")
+            else ""
+        )
         raise InputError(f"{self.name} {reason}, expected a quadratic vector field without eps{hint}")
 
     @property
@@ -311,7 +315,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 
 
 def _parse_document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
-    """Return the plain data of a text in TOML or with one equation in each line, and notes on its interpretation."""
+    """Return the plain data of a text in TOML or in the .ode format of XPP, and notes on its interpretation."""
     is_of_xpp = where.endswith(ENDING)
     try:
         if not is_of_xpp:

@@ -188,7 +188,8 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     # A gets as many distinct eigenvalues as possible, and small entries.
     blocks = list(_split_idempotent(space, QQ.identity(hamiltonian.dim)))
     A = fmpq_mat(hamiltonian.dim, hamiltonian.dim)
-    # The idempotent of largest rank gets the eigenvalue 1: then A = I + ... without a term for this idempotent.
+    # The idempotent with the longest entries gets the eigenvalue 1. As all idempotents add up to I, A is often I + ...
+    # without a term for this idempotent, and so has shorter entries.
     linear_blocks = sorted(
         (block for block in blocks if block.factor.degree() == 1), key=lambda block: -_total_bits(block.E)
     )

@@ -20,4 +20,6 @@ class Growth(StrEnum):
     UNDECIDED = "undecided"  # for heights that match no rule
 
 
-OF_DEGREES = tuple(kind for kind in Growth if kind not in (Growth.PERIODIC, Growth.LOGARITHMIC, Growth.UNDECIDED))
+GROWTHS_OF_DEGREES = tuple(
+    kind for kind in Growth if kind not in (Growth.PERIODIC, Growth.LOGARITHMIC, Growth.UNDECIDED)
+)

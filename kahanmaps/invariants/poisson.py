@@ -184,19 +184,20 @@ class MatrixPoissonTensor(PoissonTensor):
 
             def directional_derivative(partial_derivatives: Sequence[Any]) -> Any:
                 terms = [
-                    v * evaluate(P, field, arguments)
-                    for v, P in zip(direction, partial_derivatives, strict=False)
-                    if len(P)
+                    component * evaluate(partial_derivative, field, arguments)
+                    for component, partial_derivative in zip(direction, partial_derivatives, strict=False)
+                    if not partial_derivative.is_zero()
                 ]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
             upper_entries = {}
             for pair, entry in self._upper_entries.items():
-                numerator, denominator = self._gradients[pair]
+                numerator_gradient, denominator_gradient = self._gradients[pair]
                 N, D = evaluate(entry.numerator, field, arguments), evaluate(entry.denominator, field, arguments)
-                upper_entries[pair] = directional_derivative(numerator) / D
+                upper_entries[pair] = directional_derivative(numerator_gradient) / D
                 if not entry.is_polynomial:
-                    upper_entries[pair] = upper_entries[pair] - N * directional_derivative(denominator) / (D * D)
+                    correction = N * directional_derivative(denominator_gradient) / (D * D)
+                    upper_entries[pair] = upper_entries[pair] - correction
             return self._matrix(field, upper_entries)
 
     @cached_property

@@ -53,6 +53,8 @@ class PaperObjects:
     further vectors by name (random vectors at a point, indeterminates in a proof). `step_eps` is the eps of the maps,
     and `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
     and `error_of_second`, an error of the tensor f''.
+
+    A method whose name ends with an underscore takes the paper's index: `f_(i)` is f_i, and `H_tilde_(i, x)` is H~_i.
     """
 
     K: Field
@@ -73,7 +75,7 @@ class PaperObjects:
     base: SystemOver | None = None  # f_0, if it is given by a rational system
     sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to be tested; None: all
     associate_matrices: tuple[Any, ...] | None = None  # their matrices B, if given without the roots of chi
-    free_indices: tuple[int, ...] | None = None  # indices i for which a claim "for all i" is tested; None: all
+    indices_to_test: tuple[int, ...] | None = None  # indices i for which a claim "for all i" is tested; None: all
     order: int = 3  # order in eps^2 up to which series are expanded
     lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 of lower terms of H
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi in K, constant term first
@@ -347,9 +349,9 @@ class PaperObjects:
         return range(len(self.lam))
 
     @property
-    def free(self) -> Sequence[int]:
+    def tested_indices(self) -> Sequence[int]:
         """The indices i at which a claim "for all i" is tested."""
-        return self.each if self.free_indices is None else self.free_indices
+        return self.each if self.indices_to_test is None else self.indices_to_test
 
     @cache_by_id
     def lagrange(self, i: int) -> list[Any]:

@@ -234,7 +234,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
         roots=roots,
         draw=draw,
         sign_vectors=((1,), (-1,)) if m == 1 else signs,
-        free_indices=(0,),
+        indices_to_test=(0,),
         order=order,
     )
     if lower_letters:

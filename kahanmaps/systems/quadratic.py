@@ -227,7 +227,7 @@ class SystemOver:
         with field.working():
             for i, polynomial in enumerate(system.rhs):
                 for monomial, coefficient in polynomial.terms():
-                    # Of the variables in the monomial, each as often as it occurs.
+                    # The indices of the variables in the monomial, each as often as it occurs.
                     indices = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
                     # Twice x_j^2/2 is integral: f'' is defined modulo 2, though Q is not.
                     is_square = len(indices) == 2 and indices[0] == indices[1]

@@ -75,5 +75,5 @@ def test_what_is_no_map_over_the_rationals_or_no_vector_field_is_refused_in_word
     refuses("expected a map over the rational numbers", km.find_integrals, kahan().at(1, km.GF(101)))
     symbolic = km.explicit_map(["x"], [km.parse_rational_function("x + a*eps", ["x", "a", "eps"])])
     refuses("a map with the symbols a, expected numbers", km.analyze, symbolic)
-    refuses("of a Kahan map give the system x' = f", km.find_symmetry, kahan().at("1/10"))
+    refuses("if it is a Kahan map, give its system x' = f", km.find_symmetry, kahan().at("1/10"))
     refuses("not dominant", km.degrees, km.explicit_map(["x", "y"], ["x", "x"]).at(1))

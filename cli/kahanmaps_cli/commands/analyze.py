@@ -10,11 +10,11 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
+from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.runs.search import symbols_and_eps
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import formula, on_terminal, print_raw, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, on_terminal, print_raw, print_stdout
 from kahanmaps_cli.signals import INTERRUPTED, end_interrupts
 
 
@@ -55,7 +55,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     """
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
-    require_every_eps(options)
+    refuse_certificate_with_eps(options)
     symbols, eps = symbols_and_eps(options)
     arguments = {"symbols": symbols, "eps": eps, **opt.pick(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
@@ -121,6 +121,6 @@ class _ReportPrinter:
         for name, lines in sections[self._printed_count :]:
             print_stdout(f"\n{name}", style="bold")
             for line in lines:
-                print_stdout(f"{line.status}\t{formula(line.text)}")
+                print_stdout(f"{line.status}\t{abbreviated(line.text)}")
         self._printed_count = max(self._printed_count, len(sections))
         sys.stdout.flush()

@@ -403,13 +403,14 @@ def _print_status(data: Mapping[str, Any]) -> None:
 @_database()
 @json_option
 def show(key: str, db: str, as_json: bool) -> None:
-    """Show a task with its options, result and documents.
+    """Show a task with its options and its result.
 
     \b
       kahanmaps batch show 3fa8 --db study.db
       kahanmaps batch show 3fa8 --db study.db --json | jq .result
 
     KEY is the key of the task or its first digits, at least four; batch run --dry-run and batch export list keys.
+    With --json the system files of the task are shown as well ("documents").
     """
     with lib.Store.open(db, readonly=True) as store:
         matches = store.find(key)

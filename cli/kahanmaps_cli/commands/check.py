@@ -15,7 +15,7 @@ from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.params import ExactNumber
-from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
+from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import print_report
 
@@ -29,7 +29,7 @@ def command(name: str) -> click.Command:
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
         is_swapped, commutator = False, None
-        require_every_eps(options)
+        refuse_certificate_with_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
             is_swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)

@@ -38,13 +38,13 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
 
     drift is the largest relative error |I(x_n) - I(x_0)|/|I(x_0)| over all steps and initial points (absolute where
     I(x_0) = 0). Integrals are those of the file, those that theorems give, or those that a quick search finds; an
-    integral whose limit for eps -> 0 is a constant is normalized. The limits are conserved by the flow, not by the
-    Kahan map.
+    integral whose limit for eps -> 0 is a constant is normalized. The limits for eps -> 0 are compared as well: the
+    flow conserves them, and the Kahan map in general does not.
 
-    error is the error at a fixed time, compared with a Taylor solution in balls; measured is the order, the slope
-    between two step sizes. Equations of implicit methods are solved by Newton's method to rounding; orbits in which
-    this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian T(p) + V(q). yoshida4, suzuki4
-    and yoshida6 are compositions of Kahan's method, which is symmetric.
+    error is the difference at a fixed time from a Taylor solution in balls; the column measured has the order, the
+    slope of the error between two step sizes. Equations of implicit methods are solved by Newton's method to rounding;
+    orbits in which this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian T(p) + V(q).
+    yoshida4, suzuki4 and yoshida6 are compositions of Kahan's method, which is symmetric.
 
     FILE has the columns kind (drift or error), method, function, eps, step, value and evaluations of f.
 

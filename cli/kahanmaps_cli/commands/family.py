@@ -16,7 +16,7 @@ from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -189,24 +189,24 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     print_stdout("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
-        print_stdout(f"H_{k} = {formula(text)}")
+        print_stdout(f"H_{k} = {abbreviated(text)}")
     if any(sign < 0 for sign in member.signs):
         print_stdout(
-            f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}"
+            f"signs = {','.join(map(str, member.signs))}: K = {abbreviated(lib.format_polynomial(member.chosen.K))}"
         )
     if form is not None:
-        print_stdout(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
+        print_stdout(f"normal form over Q[t]/chi, chi = {abbreviated(form.chi_text)}:")
         print_stdout("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-        print_stdout(f"h = {formula(form.h_text)}")
-        print_stdout(f"D = {formula(form.D_text)}")
+        print_stdout(f"h = {abbreviated(form.h_text)}")
+        print_stdout(f"D = {abbreviated(form.D_text)}")
         print_stdout(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
         if form.parts:
             total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
             print_stdout(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
             print_stdout("the Kahan map conserves h/(1 + eps^2 D) at each of them")
         for part in form.parts:
-            root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
-            print_stdout(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
+            root, weight = (abbreviated(lib.format_number(number)) for number in (part.root, part.weight))
+            print_stdout(f"t = {root}: h = {abbreviated(part.text)}, D = {abbreviated(part.D_text)}, weight {weight}")
         point = "x" if structure is None or structure.is_standard else "y"
         print_stdout(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
         _print_matrix(form.S)
@@ -258,7 +258,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     )
     print_stdout(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
-        print_stdout(f"{k}\t{formula(text)}")
+        print_stdout(f"{k}\t{abbreviated(text)}")
 
 
 @command.command("associated")
@@ -337,10 +337,10 @@ def associated(
     print_stdout(f"{file.name}: signs belong to the factors {factors}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
-        print_stdout(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
+        print_stdout(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {abbreviated(row['K'])}")
     for row in conjugate_rows:
         signs, powers = "".join("+" if sign > 0 else "-" for sign in row["signs"]), ", ".join(row["B_in_powers_of_A"])
-        print_stdout(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
+        print_stdout(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {abbreviated(row['K'])}")
 
 
 @command.command("tensor")
@@ -360,8 +360,8 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
           --algebra 't^2+1'
 
     A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A parameter t of
-    SYSTEM stands for the generator of K. Each integral that SYSTEM claims gives m integrals of the map over Q, and its
-    density gives a density.
+    SYSTEM stands for the generator of K. If chi has degree m, each integral that SYSTEM claims gives m integrals of
+    the map over Q, and its density gives a density.
     """
     output = None if output == "-" else output
     algebra_file, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
@@ -390,7 +390,7 @@ def _write_file(file: lib.SystemFile, output: str | None) -> None:
 
 
 def _print_matrix(matrix: Any) -> None:
-    rows = [[formula(cell, 24) for cell in row] for row in lib.plain(matrix)]
+    rows = [[abbreviated(cell, 24) for cell in row] for row in lib.plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
         print_stdout("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

@@ -27,9 +27,10 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-density nahm_tetrahedral --toml
       kahanmaps find-density zander_120 --flow
 
-    phi is called density here. The command searches for a polynomial of least degree, and for products of known
-    polynomials to positive and negative powers, of any degree. If it finds neither, it searches for integrals and tries
-    products of powers of their factors too. Every formula is verified as an identity.
+    phi is called density here. The command searches for a polynomial of least degree. It also tries products of
+    positive and negative powers of polynomials that it knows from the map, such as the variables and the factors of
+    Jacobi determinants. If it finds neither, it searches for integrals and tries their factors, too. Every formula is
+    verified as an identity.
 
     phi times any integral is a density again: the shortest density found is shown, and --json lists all of them.
 

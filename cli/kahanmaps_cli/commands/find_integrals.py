@@ -22,7 +22,7 @@ from kahanmaps_cli.runs.search import (
 )
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import formula, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 
 
@@ -90,7 +90,8 @@ def command(system: str | None, **options: Any) -> int:
             )
         result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
-        line = f"{_count_line(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
+        _, _, count_text = _count_line(result).partition("\t")
+        line = f"{count_text}\t{abbreviated(formulas)}".rstrip()
         return Cell(line, lambda: record("find-integrals", result, search), lambda: None, result.reason)
 
     if rows_of(options["parameters"], system) is not None:
@@ -127,10 +128,10 @@ def command(system: str | None, **options: Any) -> int:
         for integral in result.time_dependent:
             prefix = "" if result.flow else "of the n-th point: "
             print_stdout(
-                f"{integral.name}\t{integral.integral.verdict}\t{formula(integral.text)}\n\t{prefix}depends on time"
+                f"{integral.name}\t{integral.integral.verdict}\t{abbreviated(integral.text)}\n\t{prefix}depends on time"
             )
         for status, text in () if comparison is None else comparison.lines(others=False):
-            print_stdout(f"{status}\t{formula(text)}")
+            print_stdout(f"{status}\t{abbreviated(text)}")
     return write_certificate(options, file.name, result.certificate, 3 if result.reason else 0)
 
 
@@ -148,7 +149,7 @@ def _search_darboux(system: str | None, options: dict[str, Any]) -> int:
         print_json(record("darboux-polynomials", result, search))
     else:
         print_stdout(f"Darboux polynomials: {result.file.name}{scope(result)}")
-        print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(result).split("\n")))
+        print_stdout("\n".join("\t".join(map(abbreviated, line.split("\t"))) for line in str(result).split("\n")))
     status = 3 if result.reason else 0
     return write_certificate(options, file.name, result.certificate, status)
 
@@ -162,7 +163,7 @@ def _search_bases(system: str | None, options: dict[str, Any]) -> int:
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         laboratory = lib.Laboratory(file, (), eps, options["seed"])
-        rows: list[lib.Basis] = []
+        bases: list[lib.Basis] = []
         reason = laboratory.defect
         for text in options["sets"]:
             formulas = [f.strip() for f in text.split(",")]
@@ -182,17 +183,17 @@ def _search_bases(system: str | None, options: dict[str, Any]) -> int:
                     )
             try:
                 if not reason:
-                    rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, formulas))
+                    bases.append(lib.hirota_kimura_basis(laboratory.maps, functions, formulas))
             except lib.NoPoint as error:
                 reason = str(error)
-    note = lib.closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
+    note = lib.closing_note(next((basis.period for basis in bases if basis.period), None), laboratory.eps, file.map)
     if options["as_json"]:
         print_json(
             {
                 **heading("hirota-kimura", laboratory, search),
                 "arithmetic": "residues modulo primes, eps random where none is given",
                 "primes": [str(prime) for prime in laboratory.primes],
-                "bases": [row.to_json() for row in rows],
+                "bases": [basis.to_json() for basis in bases],
                 "note": note,
                 "reason": reason,
                 "document": dict(file.document),
@@ -201,12 +202,12 @@ def _search_bases(system: str | None, options: dict[str, Any]) -> int:
         return 3 if reason else 0
     eps_text = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
     print_stdout(f"Hirota-Kimura bases: {file.name}{eps_text}, measured on two orbits modulo each of two primes")
-    for row in rows:
-        print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
-        for vector in row.constant:
-            names = [name for name, is_constant in zip(row.functions, vector, strict=True) if not is_constant]
+    for basis in bases:
+        print_stdout(f"dimension {basis.dimension}\t{', '.join(basis.functions)}")
+        for vector in basis.constant:
+            names = [name for name, is_constant in zip(basis.functions, vector, strict=True) if not is_constant]
             print_stdout(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
-        if not row.agree:
+        if not basis.agree:
             print_stdout("\tthe orbits that were compared do not agree: try another --seed")
     for text in filter(None, (note, reason)):
         print_stdout(f"note\t{text}")

@@ -54,9 +54,10 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     indeterminacy points of the map too: if the orbit meets one, the output says so, and gives the period under the
     translation.
 
-    --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
-    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps it also prints these levels in
-    each plane at a rational root of chi, as values of the integral h/(1 + eps^2 D).
+    --levels N is about all orbits on a level. In a plane with the cubic Hamiltonian h(u, v) the map conserves c = h/(1
+    + eps^2 D), and the period depends on gamma = 1 - 64 eps^6 disc(h) c^2 only. The command prints the polynomial
+    psi_N, whose roots gamma have the period N or a divisor of N, and the rational gamma with period N. With SYSTEM and
+    eps it also prints c^2 for these gamma, in each plane that belongs to a rational root of chi.
 
     Exit status: 0 if the period was found, or proved not to exist, 2 for a usage error or a system without a normal
     form, 3 if undecided, or if the orbit cannot be continued at some point.
@@ -122,7 +123,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
-    """Print the level curves with a period, and if a system is given, the level curves in its planes."""
+    """Print the levels on which all orbits have the period --levels, also in the planes of a system if one is given."""
     levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {
         **envelope("period levels"),
@@ -163,8 +164,8 @@ def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) ->
     for plane in data.get("planes", ()):
         print_stdout(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
         for square in plane["squares"]:
-            real = "" if square[0] != "-" else ", no real level"
-            print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
+            remark = ", no real level" if square[0] == "-" else ""
+            print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{remark}")
         if plane["disc"] == "0":  # no psi_N has the root 1
-            print_stdout("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
+            print_stdout("level\tnone, except perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

@@ -14,7 +14,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
 from kahanmaps_cli.params import Section
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
-from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
+from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 
@@ -85,7 +85,7 @@ def command(system: str | None, **options: Any) -> int:
     The exit status is that of the command named by --from.
     """
     is_named, is_drawn = _require_consistent(system, options)
-    require_every_eps(options)
+    refuse_certificate_with_eps(options)
     lib.page_template()  # raises InputError for a missing package before the computation
     page_options = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:

@@ -10,7 +10,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
-from kahanmaps_cli.screen.terminal import formula, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
 
 
 @click.command("singularities")
@@ -113,12 +113,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         print_stdout(f"# {file.name}, dimension {file.map.dim}{about_eps and ', '}{about_eps}")
         if symbolic is not None:
             factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-            print_stdout(f"factors of {name}\t{formula(factors, 200) or 'none'}")
+            print_stdout(f"factors of {name}\t{abbreviated(factors, 200) or 'none'}")
         for run in runs:
             at_eps = f"eps = {run.eps}: " if file.map.has_eps else ""
             text = str(run).replace("# ", f"\n# {at_eps}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
             print_stdout(
-                "\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
+                "\n".join("\t".join(abbreviated(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
             )
         print_stdout(f"\n# {runs[0].text if is_consistent else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:

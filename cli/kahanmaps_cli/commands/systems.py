@@ -10,7 +10,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, print_entry, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, print_entry, print_stdout
 
 
 @click.command("systems")
@@ -113,14 +113,16 @@ def _print_system(file: Any) -> None:
     for name, value in file.parameters.items():
         print_stdout(f"  {name} = {value}")
     for line in str(file.map).split("\n"):
-        print_stdout(formula(line))
+        print_stdout(abbreviated(line))
     if file.hamiltonian is not None:
-        print_stdout(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
+        print_stdout(f"H = {abbreviated(lib.format_polynomial(file.hamiltonian.H))}")
     claim_word = "" if file.catalog else "claimed "  # integrals of the catalogue are verified by tests
     for name, integral in file.integrals.items():
-        print_stdout(f"{claim_word}integral {name} = {formula(lib.format_factored(integral))}")
+        print_stdout(f"{claim_word}integral {name} = {abbreviated(lib.format_factored(integral))}")
     if file.density is not None:
-        print_stdout(f"{claim_word}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
+        print_stdout(
+            f"{claim_word}density phi = {abbreviated(lib.format_factored(file.density))}  (dx/phi is invariant)"
+        )
     facts, lines = _structured_facts(file), []
     if facts["verdict"]:
         lines.append(f"verdict: {facts['verdict']}")

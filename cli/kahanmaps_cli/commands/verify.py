@@ -13,7 +13,7 @@ from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
 from kahanmaps_cli.params import Section
-from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
+from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, on_terminal, print_raw, print_stdout, shorten, styled
@@ -106,7 +106,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
-    require_every_eps(options)
+    refuse_certificate_with_eps(options)
     if options["certificate"] is not None and (options["universal"] or options["beyond"] or options["controls"]):
         raise click.UsageError(
             "a certificate is about one member: give --certificate without --universal, --beyond and --controls"

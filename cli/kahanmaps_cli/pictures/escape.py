@@ -22,7 +22,9 @@ from kahanmaps_cli.screen.progress import SearchProgress
     click.option("--at", type=PointText(), metavar="X", help="The other coordinates, as a point (default: 0)."),
     click.option("--cells", type=Whole(1), metavar="N", default=300, show_default=True, help="N x N initial points."),
     click.option("--steps", type=Whole(1), metavar="N", default=200, show_default=True, help="Number of steps."),
-    click.option("--radius", type=ExactNumber(), metavar="R", default=None, help="The ball is max |x_i| <= R (1000)."),
+    click.option(
+        "--radius", type=ExactNumber(), metavar="R", default=None, help="The ball is max |x_i| <= R (default 1000)."
+    ),
     click.option(
         "--show", type=click.Choice(["time", "basin"]), default="time", show_default=True, help="What colors show."
     ),

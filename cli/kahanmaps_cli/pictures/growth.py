@@ -101,7 +101,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         metavar="FILE",
         help="Read a result of heights --json instead of SYSTEM; - is standard input.",
     ),
-    click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points (default 3)."),
+    click.option("--random", "count", type=Whole(1), metavar="N", help="Number of random initial points (default 3)."),
     click.option(
         "--start",
         "starts",

@@ -51,7 +51,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     The normal form of the Kahan map of a member is a product of planar maps, one for each root of chi, and each planar
     orbit lies on a cubic curve. Dots are colored by the step, in the same way in all panels.
 
-    A real root has a real plane with symplectic coordinates u, v in which h = kappa (u^3 - 3 u v^2) or
+    A real root has a real plane with symplectic coordinates u, v in which the Hamiltonian is kappa (u^3 - 3 u v^2) or
     kappa (u^3 + 3 u v^2). A pair of complex roots has one complex plane; u and v have a panel each, without a curve.
     The system need not be declared as a member. If chi has a repeated root, there are no such planes.
 

@@ -42,7 +42,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     from flint import fmpz
 
     if modulo is not None and not (modulo in primes if primes else fmpz(modulo).is_prime()):
-        raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
+        expected = f"one of --primes {','.join(map(str, primes))}" if primes else "a prime number"
+        raise click.UsageError(f"found --modulo {modulo}, expected {expected}")
     names = names_of(options)
     if len(names) != 2:
         raise click.UsageError(f"found --over {','.join(names)}, expected two parameters")

@@ -30,9 +30,11 @@ from kahanmaps_cli.screen.progress import Progress
         type=click.Choice(["up", "down", "both"]),
         default="up",
         show_default=True,
-        help="Count crossings to larger values of F, to smaller ones, or both.",
+        help="Show crossings to larger values of F, to smaller ones, or both.",
     ),
-    click.option("--axes", metavar="A,B", help="Axes: two variables or expressions (default: the largest spread)."),
+    click.option(
+        "--axes", metavar="A,B", help="Axes: two variables or expressions (default: the variables of largest spread)."
+    ),
     click.option("--no-curves", is_flag=True, help="Draw no level curves of known integrals."),
     window_option(),
     click.option("--equal", is_flag=True, help="Use the same unit of length on both axes."),

@@ -31,7 +31,7 @@ certificate_option = click.option(
 )
 
 
-def require_every_eps(options: dict[str, Any]) -> None:
+def refuse_certificate_with_eps(options: dict[str, Any]) -> None:
     """Refuse --certificate with --eps before the computation."""
     if options["certificate"] is not None and any(options.get(name) is not None for name in ("eps", "time_step")):
         raise click.UsageError("a certificate is about every eps: give --certificate or --eps, not both")

@@ -9,10 +9,10 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps
+from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, print_stdout
+from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -32,10 +32,10 @@ def search_options(section: str) -> Callable[[F], F]:
 
 
 def require_one_form(options: dict[str, Any]) -> None:
-    """Refuse more than one of --toml, --latex and --json."""
+    """Refuse more than one of --toml, --latex and --json, and --certificate with --eps."""
     if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
         raise click.UsageError("give one of --toml, --latex and --json")
-    require_every_eps(options)
+    refuse_certificate_with_eps(options)
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
@@ -104,7 +104,7 @@ def print_search(
         print_stdout(f"{name}: {result.file.name}{scope(result)}")
         for label, statement, origin in formulas:
             print_stdout(
-                f"{label}\t{statement.verdict}\t{formula(statement.text)}\n\t{origin}{statement.evidence.summary}"
+                f"{label}\t{statement.verdict}\t{abbreviated(statement.text)}\n\t{origin}{statement.evidence.summary}"
             )
         if count:
             print_stdout(count)

@@ -76,8 +76,8 @@ def console() -> Console:
     )
 
 
-def formula(text: str, width: int = 400) -> str:
-    """Shorten a long formula on a terminal; a pipe gets the complete formula."""
+def abbreviated(text: str, width: int = 400) -> str:
+    """Return a formula, shortened if it is long and goes to a terminal; a pipe gets the complete formula."""
     return shorten(text, width) if on_terminal() else text
 
 

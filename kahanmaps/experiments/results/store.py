@@ -35,7 +35,7 @@ from typing import Any, NamedTuple, Self
 
 from kahanmaps.atomic_files import resolve_path
 from kahanmaps.display_protocols import HtmlDisplay
-from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
+from kahanmaps.errors import InputError, KahanmapsError, is_machine_failure, note_source, quoted
 from kahanmaps.experiments.results.records import (
     KEY_LENGTH,
     Job,
@@ -213,7 +213,7 @@ class Store(HtmlDisplay):
         except BaseException as error:
             store.close()
             if isinstance(error, OSError) and not isinstance(error, Unavailable):
-                kind = Unavailable if is_of_the_machine(error) else StoreError
+                kind = Unavailable if is_machine_failure(error) else StoreError
                 reason = error.strerror or error
                 raise kind(f"{store.name} cannot be opened ({reason}): check its name and permissions") from error
             raise
@@ -383,8 +383,8 @@ class Store(HtmlDisplay):
         with self._report_damage(f"the record of task {key}"):
             cells["outcome"] = Outcome(cells["outcome"])
             if (cells["outcome"] is Outcome.OK) is not (cells["result"] is not None):
-                no = "no " * (cells["result"] is None)
-                raise ValueError(f"the outcome is {cells['outcome']}, and the result {no}text")
+                presence = "no" if cells["result"] is None else "a"
+                raise ValueError(f"the outcome is {cells['outcome']}, and there is {presence} result")
             cells["result"] = None if cells["result"] is None else _parse_dict(cells["result"])
             cells["versions"] = _parse_dict(cells["versions"])
             cells["seconds"] = float(cells["seconds"])

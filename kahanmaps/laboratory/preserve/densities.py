@@ -39,7 +39,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, common_orbit_period
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -219,7 +219,7 @@ def densities_of(
     flow = laboratory.flow
     if laboratory.defect:
         return DensitySearch(*laboratory.request, (), -1, laboratory.defect, flow=flow)
-    period = None if flow else closing_period(laboratory.maps)
+    period = None if flow else common_orbit_period(laboratory.maps)
     product = anti_invariant = None
     hamiltonian_density, dim, reason = _find_hamiltonian_density(laboratory), laboratory.map.dim, ""
     if hamiltonian_density is not None and (max_degree is None or hamiltonian_density.degree(dim) <= max_degree):

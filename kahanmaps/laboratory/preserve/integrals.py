@@ -39,7 +39,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, common_orbit_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     add_relation_spaces,
@@ -318,7 +318,7 @@ def integrals_of(
         prime = laboratory.maps[0].prime
         residues = [int(GF(prime).convert(value)) for value in values]
         map_at_values = laboratory.map_at(prime, residues, laboratory.maps[0].eps)
-    period_at_values = None if map_at_values is None or laboratory.defect else closing_period([map_at_values])
+    period_at_values = None if map_at_values is None or laboratory.defect else common_orbit_period([map_at_values])
 
     def build_result(profile: Profile, reason: str) -> IntegralSearch:
         return IntegralSearch(
@@ -355,11 +355,13 @@ def integrals_of(
         # For a vector field there would be too many candidates. Most integrals have denominators with these factors.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
-        denominators = denominators_among(factors, laboratory.map.dim)
+        denominator_cofactors = denominators_among(factors, laboratory.map.dim)
 
         def quick_search(map_: ModularMap) -> SpaceSearch:
             # On each map half of the remaining work: the other half is for the formulas.
-            return search_spaces(map_, profile, cofactors, denominators, budget=share.part(0.5), progress=progress)
+            return search_spaces(
+                map_, profile, cofactors, denominator_cofactors, budget=share.part(0.5), progress=progress
+            )
 
         base_map = laboratory.maps[0]
         base_map, space_search, formulas, reason = _interpolate_formulas(
@@ -385,7 +387,7 @@ def integrals_of(
 
             def thorough_search(map_: ModularMap) -> SpaceSearch:
                 second_search = search_spaces(
-                    map_, profile, cofactors, denominators, budget=share.part(0.5), progress=progress
+                    map_, profile, cofactors, denominator_cofactors, budget=share.part(0.5), progress=progress
                 )
                 add_relation_spaces(map_, profile, second_search, LARGEST_SPAN, share.part(0.5), progress)
                 return second_search
@@ -480,7 +482,7 @@ class _IntegralCollection:
             P = formula[0].numerator
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
-        for function, origin, product in sorted(map(self._normalize, formulas), key=sort_key):
+        for function, origin, factored_text in sorted(map(self._normalize, formulas), key=sort_key):
             gradient = self._gradients.gradient(function)
             if not self._gradients.adds(gradient):
                 continue
@@ -494,15 +496,15 @@ class _IntegralCollection:
             else:
                 verdict, evidence = laboratory.verdict_on(function)
             if verdict.holds:
-                self._add(gradient, function, origin, verdict, evidence, product)
+                self._add(gradient, function, origin, verdict, evidence, factored_text)
 
     def _normalize(self, formula: Formula) -> Formula:
         """Normalize the formula so that it tends to an integral of the flow as eps -> 0, if that is possible."""
-        function, origin, product = formula
+        function, origin, factored_text = formula
         if not self._has_limit:
             return formula
         normalized_function = normalized(function, self._laboratory.map.dim).function
-        return normalized_function, origin, product if normalized_function == function else ""
+        return normalized_function, origin, factored_text if normalized_function == function else ""
 
     @property
     def _has_limit(self) -> bool:

@@ -64,8 +64,8 @@ class Search(PrintableResult):
         return [f"# for eps = {self.eps} only{time_step_text}: check with --eps {self.eps}"]
 
 
-def closing_period(maps: Sequence[ModularMap]) -> int | None:
-    """Return the common period of random orbits of all maps; None if an orbit does not close within 64 points."""
+def common_orbit_period(maps: Sequence[ModularMap]) -> int | None:
+    """Return the period of random orbits, one of each map; None if they differ or do not close within 64 points."""
     try:
         [*other_periods, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
     except NoPoint:

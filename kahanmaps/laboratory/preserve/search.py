@@ -101,7 +101,7 @@ def search_spaces(
     map_: ModularMap,
     profile: Profile,
     cofactors: Sequence[Cofactor],
-    denominators: Sequence[Cofactor] = (),
+    denominator_cofactors: Sequence[Cofactor] = (),
     *,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
@@ -109,7 +109,7 @@ def search_spaces(
     """Search for spaces whose ratios give as many independent integrals as the profile shows, by fast methods only.
 
     The fast methods are: affine integrals, relations along orbits whose span has a small dimension, polynomials with
-    known cofactors, and polynomials over known denominators. After the `budget` is spent, only affine integrals are
+    known cofactors, and numerators over known denominators. After the `budget` is spent, only affine integrals are
     tried. Raises NoPoint.
     """
     result, required = SpaceSearch(), profile.codimension
@@ -127,7 +127,9 @@ def search_spaces(
     progress(
         f"polynomials of degree up to {max_degree} with {comb(dim + max_degree, max_degree)} terms and known cofactors"
     )
-    cofactor_result = search_cofactors(map_, cofactors, denominators, result.all_spaces, required, max_degree, budget)
+    cofactor_result = search_cofactors(
+        map_, cofactors, denominator_cofactors, result.all_spaces, required, max_degree, budget
+    )
     steps, spaces = [*result.steps, *cofactor_result.steps], [*result.spaces, *cofactor_result.spaces]
     result = replace(cofactor_result, steps=steps, spaces=spaces, searched=result.searched)
     if not is_of_vector_field:

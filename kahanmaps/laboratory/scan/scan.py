@@ -24,7 +24,7 @@ from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import map_with_symbols, split_names
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
-from kahanmaps.invariants.growth import OF_DEGREES, Growth
+from kahanmaps.invariants.growth import GROWTHS_OF_DEGREES, Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
@@ -64,8 +64,8 @@ _MANY_LINES = (150, 60)
 # The number of random planes, which meet components that lines do not meet, and their primes.
 _PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
 _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
-# The shares of the budget after which sweeps, conditions, confirmation and growth end.
-_STAGE_ENDS = (0.6, 0.75, 0.85, 0.9)
+# The shares of the budget that are spent at the end of each stage; the last share is for analyses.
+_SWEEPS_END, _CONDITIONS_END, _CONFIRMATION_END, _GROWTH_END = 0.6, 0.75, 0.85, 0.9
 # Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
 _DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
 _MAX_LENGTH = 4096
@@ -104,7 +104,7 @@ def scan(
         eps: half the time step (exact), or None for generic eps: the conditions then hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
         terms: the number of iterates that are measured; by default at most 7, all of small degree.
-        primes: at least three primes; the default has some ten thousand members modulo all primes.
+        primes: at least three primes; those chosen by default have some ten thousand members together.
         effort: an integer; each increase by 1 doubles the work limit. Stages that are skipped are reported.
         seed: the random seed.
         jobs: the number of threads, which need numba; by default the number of processors.
@@ -153,11 +153,11 @@ def scan(
         primes_text = ", ".join(map(str, primes))
         raise InputError(f"found the primes {primes_text}, expected at least three different ones, from 5 on")
     rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact_eps)}")
-    terms, max_length, cost = _choose_terms(map_, len(names), exact_eps, terms, rng)
+    terms, max_polynomial_length, cost = _choose_terms(map_, len(names), exact_eps, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
     max_members = _SWEEP_SHARE * budget.units / cost
     run = _ScanRun(
-        family, seed_prefix, {"terms": terms, "max_length": max_length, "jobs": jobs}, budget, cost, progress
+        family, seed_prefix, {"terms": terms, "max_length": max_polynomial_length, "jobs": jobs}, budget, cost, progress
     )
     run.sweep(_choose_plan(len(names), primes, max_members))
     components, omitted_count = run.components(rng)
@@ -170,17 +170,17 @@ def scan(
     components, omitted_count = run.apply(
         candidates,
         "confirms component",
-        _STAGE_ENDS[2],
+        _CONFIRMATION_END,
         lambda component, check: _confirm(component, family, candidates, rng, check),
     )
     run.omit(omitted_count, f"the confirmation of {counted(omitted_count, 'component')}")
     components.sort(key=lambda component: component.degrees[::-1])
-    # Growth that is measured on one component; other components with the same degrees share it if more degrees agree.
+    # Growth measured on one component. Another component with the same degrees shares it if further degrees agree, too.
     shared_growths: dict[Degrees, DegreeGrowth] = {}
     components, omitted_count = run.apply(
         components,
         "growth on component",
-        1 if analysis is None else _STAGE_ENDS[3],
+        1 if analysis is None else _GROWTH_END,
         lambda component, _: run.with_growth(component, shared_growths),
     )
     run.omit(omitted_count, f"the growth on {omitted_count} components")
@@ -188,7 +188,7 @@ def scan(
     growth_kinds |= {
         component.degrees: component.growth.growth for component in reversed(components) if component.growth is not None
     }
-    components.sort(key=lambda c: (OF_DEGREES.index(growth_kinds[c.degrees]), c.degrees[::-1], c.text))
+    components.sort(key=lambda c: (GROWTHS_OF_DEGREES.index(growth_kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
         analyzed_degrees: set[Degrees] = set()  # the degree sequences of points that were analyzed
 
@@ -206,9 +206,9 @@ def scan(
         run.omit(omitted_count, f"{omitted_count} verdicts")
     sweeps = tuple(run.sweeps)
     unassigned = tuple(_count_unassigned(result, components) for result in sweeps)
-    changes: tuple[tuple[str, ...], ...] = ()
+    parameter_changes: tuple[tuple[str, ...], ...] = ()
     try:
-        changes = tuple(symmetries(sweeps, components, names))
+        parameter_changes = tuple(symmetries(sweeps, components, names))
     except TimeLimit:
         run.is_interrupted = True
         run.omit(1, "changes of parameters that permute the special members")
@@ -216,7 +216,17 @@ def scan(
     generic_degrees = sweeps[0].generic if sweeps else ()
     omitted = tuple(run.omitted)
     return Scan(
-        file, names, exact_eps, seed, generic_degrees, tuple(components), sweeps, unassigned, changes, ended, omitted
+        file,
+        names,
+        exact_eps,
+        seed,
+        generic_degrees,
+        tuple(components),
+        sweeps,
+        unassigned,
+        parameter_changes,
+        ended,
+        omitted,
     )
 
 
@@ -281,7 +291,7 @@ class _ScanRun:
                     on=None if subspace_count is None else (subspace_count, dimension),
                     units=self.cost,
                     seed=f"{self.seed_prefix} {p} {subspace_count} {dimension}",
-                    check=self.check_until(_STAGE_ENDS[0]),
+                    check=self.check_until(_SWEEPS_END),
                     progress=on_progress,
                     **self.sweep_options,
                 )
@@ -358,7 +368,7 @@ class _ScanRun:
         components, skipped_count = self.apply(
             classes,
             "conditions for sequence of degrees",
-            _STAGE_ENDS[1],
+            _CONDITIONS_END,
             lambda degrees, check: conditions(degrees, self.sweeps, names, rng, check),
             fallback=lambda _: [],
         )

@@ -136,7 +136,7 @@ class _Forms:
 class _Curve:
     """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
-    `transversal` is a random vector that spans surfaces through the curve. `minor_exponents` are the exponents of the
+    `transversal` is a random vector that spans surfaces through the curve. `common_exponents` are the exponents of the
     forms in the common factor of the minors of the equation, which is not part of the map. `limits` bound the number of
     steps.
     """
@@ -147,7 +147,7 @@ class _Curve:
     direction: tuple[int, ...]
     transversal: tuple[int, ...]
     functions: tuple[Function, ...]
-    minor_exponents: tuple[int, ...]
+    common_exponents: tuple[int, ...]
     forms: _Forms
     limits: StepLimits
 
@@ -192,18 +192,14 @@ class _Curve:
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """The rows of `OrbitData` for all steps but the last, with orders of forms instead of hypersurfaces."""
-        return tuple(
-            (mu, *orders)
-            for mu, orders in zip(
-                divided_powers(run, self.initial_orders, self.minor_exponents), self.form_orders(run)[1:], strict=False
-            )
-        )
+        powers = divided_powers(run, self.initial_orders, self.common_exponents)
+        return tuple((mu, *orders) for mu, orders in zip(powers, self.form_orders(run)[1:], strict=False))
 
     def form_orders(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
         size, form_orders = len(self.forms.poles), []
         run_orders = [self.initial_orders, *(step.orders for step in run)]
-        powers = divided_powers(run, self.initial_orders, self.minor_exponents)
+        powers = divided_powers(run, self.initial_orders, self.common_exponents)
         for mu, orders, next_orders in zip(powers, run_orders, run_orders[1:], strict=False):
             images = zip(self.forms.images, next_orders[size:-1], strict=True)
             form_orders.append((*orders[:size], *(k + mu * int(form.total_degree()) for form, k in images), orders[-1]))
@@ -256,7 +252,7 @@ class _Orders:
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """Return the rows of all steps except the last. Raises OrbitDataUnknown."""
-        rows, powers = [], divided_powers(run, self.curve.initial_orders, self.curve.minor_exponents)
+        rows, powers = [], divided_powers(run, self.curve.initial_orders, self.curve.common_exponents)
         for t, (mu, orders_of_forms) in enumerate(zip(powers, self.curve.form_orders(run)[1:], strict=False)):
             column = fmpq_mat(len(orders_of_forms), 1, list(orders_of_forms))
             if t not in self.multiplicities:
@@ -439,11 +435,11 @@ def _search_line(
     if product.is_zero():
         raise OrbitDataUnknown("the map or its inverse is defined nowhere")
     radical = product // product.gcd(product.derivative())
-    minor_exponents = (*point_exponents[:-1], *([0] * len(forms.images)), point_exponents[-1])
+    common_exponents = (*point_exponents[:-1], *([0] * len(forms.images)), point_exponents[-1])
     points = [tuple((x + s * v) % p for x, v in zip(base, direction, strict=True)) for s in roots_modulo(radical)]
     (inverse,) = map_.inverse.equations
     curves = [
-        _Curve(equation, inverse, point, direction, transversal, functions, minor_exponents, forms, limits)
+        _Curve(equation, inverse, point, direction, transversal, functions, common_exponents, forms, limits)
         for point in points
     ]
     return degree, int(radical.degree()), curves

@@ -35,10 +35,9 @@ _MAX_PRECISION = 4096
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
 _CONSTANT = 8  # a column counts as constant if at least this number of last entries are equal
 _CONFIRMING_ORDERS = 4  # orders that must satisfy a recurrence, beyond the orders that determine it
-_FREE_STEPS = 100  # steps for which a confined hypersurface is followed
+_STEPS_AFTER_FIRST = 100  # steps for which a confined hypersurface is followed after the first steps
+_SHOWN_EVENTS = 6  # in a sentence
 
-
-_SHOWN = 6  # events in a sentence
 Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
@@ -124,7 +123,7 @@ class OrbitData:
 
 
 def _shorten(events: Sequence[str]) -> str:
-    return ", ".join(events[:_SHOWN]) + (", ..." if len(events) > _SHOWN else "")
+    return ", ".join(events[:_SHOWN_EVENTS]) + (", ..." if len(events) > _SHOWN_EVENTS else "")
 
 
 NO_ORBIT_DATA = OrbitData(())
@@ -145,13 +144,13 @@ class AlongCurves(Protocol):
 class TrackedFunctions:
     """The functions whose orders are measured along curves through a hypersurface.
 
-    `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
+    `common_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
     not part of the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
     first `critical` functions belong to exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
-    minor_exponents: tuple[int, ...] = ()
+    common_exponents: tuple[int, ...] = ()
     initial_orders: tuple[int, ...] = ()
     critical: int = 0
 
@@ -159,18 +158,19 @@ class TrackedFunctions:
         """Return the rows of `OrbitData` for steps along a curve; without tracked functions, the orders of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
-        pairs = zip(divided_powers(run, self.initial_orders, self.minor_exponents), run, strict=True)
+        pairs = zip(divided_powers(run, self.initial_orders, self.common_exponents), run, strict=True)
         return tuple((mu, *step.orders[: self.critical]) for mu, step in pairs)
 
 
-def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_exponents: Sequence[int]) -> list[int]:
-    """Return the powers of t that are divided out, without the contributions of the common factor of the minors.
+def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], common_exponents: Sequence[int]) -> list[int]:
+    """Return for each step the power of t that the map divides out, without a common factor of the minors.
 
-    `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
+    The common factor of the minors of the equation is a product of the functions whose orders are measured, with the
+    `common_exponents`; it is not part of the map. `initial_orders` are the orders before the first step.
     """
     orders_before = [initial_orders, *(step.orders for step in run)]
     return [
-        step.common - sum(k * order for k, order in zip(minor_exponents, orders, strict=True))
+        step.common - sum(k * order for k, order in zip(common_exponents, orders, strict=True))
         for step, orders in zip(run, orders_before, strict=False)
     ]
 
@@ -246,7 +246,7 @@ class TestCurve:
         If the image is a critical hypersurface after some step, the pattern of the latter gives the later orders.
         """
         step_count = self.limits.first_steps
-        max_steps = min(self.limits.max_steps, step_count + _FREE_STEPS)
+        max_steps = min(self.limits.max_steps, step_count + _STEPS_AFTER_FIRST)
         while True:
             run = self.all_steps(step_count)
             rows = self.tracked.rows(run)

@@ -175,11 +175,12 @@ def kernel(
     pivots: list[Pivot],
     check: Callable[[], None] = lambda: None,
 ) -> list[nmod_poly]:
-    """Return the kernel of an n x (n + 1) matrix of series, without a common power of t.
+    """Return the kernel of an n x (n + 1) matrix of series known below t^known_terms, without a common power of t.
 
     The minors are the kernel times t^s, with s the sum of the exponents of all `pivots`; missing pivots are chosen and
-    appended. A pivot has the least exponent of all remaining entries, so that only its power of t is divided out; its
-    exponent must be below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
+    appended. A pivot has the least exponent of all remaining entries, so that only its power of t is divided out. Its
+    exponent must be below `precision`: neighbours of a curve, which differ from it only from t^precision on, then have
+    the same pivots. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
     units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
@@ -190,9 +191,8 @@ def kernel(
         power, i, j = pivots[k]
         free_rows.remove(i)
         free_columns.remove(j)
-        count_work(
-            units_per_inversion + units_per_product * len(free_columns) * 2
-        )  # includes the products for the kernel
+        # The factor 2 counts the products for the kernel as well.
+        count_work(units_per_inversion + units_per_product * len(free_columns) * 2)
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known_terms - power)
         scaled_row = {c: rows[i][c].right_shift(power).mul_low(inverse, known_terms - power) for c in free_columns}
         for r in free_rows:

@@ -73,7 +73,7 @@ _LEAST_STEPS = 100  # in dimension 5 and 6
 _SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimension
 _LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
 _REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
-_MOST_SHOWN = 200
+_MAX_FIRST_STEPS = 200  # steps along series before only points are followed
 _DRAWS = 2  # the number of pairs of eps that are tried, as an eps may be special
 WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; they are slow in higher ones
 _POINTS = 3  # random points at which det dPhi is evaluated
@@ -396,8 +396,8 @@ class Patterns:
         return {**data, **fields, "maps_a_step": maps_per_step}
 
 
-def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
-    """Combine the patterns of runs at one eps, or at two that represent every eps; `at`: the map depends on eps."""
+def patterns_of(runs: Sequence[SingularityRun], has_eps: bool = True) -> Patterns:
+    """Combine the patterns of runs at one eps, or at two that represent every eps; `has_eps`: the map depends on it."""
     results = set()
     for run in runs:
         if not run.is_dominant:
@@ -405,7 +405,9 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
         elif run.stopped:
             result = _no_patterns(_STOPPED)
         else:
-            result = _merge_patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
+            result = _merge_patterns(
+                run.map_degree, run.hypersurfaces, format_number(run.eps) if has_eps else "", run.word
+            )
         results.add(result)
     return results.pop() if len(results) == 1 else _no_patterns(_DIFFERENT)
 
@@ -534,7 +536,7 @@ def steps_by_default(dim: int) -> int:
 def _step_limits(dim: int, steps: int | None, budget: Budget) -> StepLimits:
     total, series_steps = steps or steps_by_default(dim), steps or _SERIES_STEPS.get(dim, _LEAST_SERIES_STEPS)
     repeating_steps = steps or min(series_steps, _REPEATING_STEPS.get(dim, series_steps))
-    return StepLimits(min(total, steps or FIRST_STEPS, _MOST_SHOWN), total, series_steps, budget, repeating_steps)
+    return StepLimits(min(total, steps or FIRST_STEPS, _MAX_FIRST_STEPS), total, series_steps, budget, repeating_steps)
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:

@@ -237,6 +237,8 @@ def commuting_systems(
 
 @dataclass
 class _Search:
+    """A search for g in a `space` with [f, g] = 0; `points` and `families` are the solutions of equations so far."""
+
     f: QuadraticSystem
     settings: Settings
     budget: Budget
@@ -388,8 +390,8 @@ class _Search:
     def _build_field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
         matrix = combination_of(weights, self.space.matrices) if self.space.matrices else None
         g = field_at(self.space, weights)
-        names = [name for name, multiple in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(multiple)]
-        return CommutingField(g, matrix, names[0] if names else "", finding)
+        trivial_names = [name for name, multiple in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(multiple)]
+        return CommutingField(g, matrix, trivial_names[0] if trivial_names else "", finding)
 
 
 def find_commuting(

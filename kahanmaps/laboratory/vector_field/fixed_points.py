@@ -181,12 +181,15 @@ def _points_of(system: QuadraticSystem, component: SolutionComponent, basis: Seq
     # det(lambda I - f'), reduced modulo the equations of the points
     n = system.dim
     symbol = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
-    joint = ring([symbol, *names_of(component.values[0])])
-    eigenvalue, *x = joint.gens()
-    coordinates = [p.compose(*x, ctx=joint) for p in component.values]
+    joint_ring = ring([symbol, *names_of(component.values[0])])
+    eigenvalue, *x = joint_ring.gens()
+    coordinates = [p.compose(*x, ctx=joint_ring) for p in component.values]
     rows = [
-        [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*coordinates, ctx=joint) for j in range(n)), None]
+        [
+            *((eigenvalue if i == j else 0) - p.derivative(j).compose(*coordinates, ctx=joint_ring) for j in range(n)),
+            None,
+        ]
         for i, p in enumerate(system.rhs)
     ]
-    eigenvalues = normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])
+    eigenvalues = normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint_ring) for p in basis])
     return FixedPoints(component.values, tuple(basis), dimension, None if dimension else count, eigenvalues)

@@ -88,7 +88,7 @@ def composition(method: str) -> list[fmpq]:
 
     if method == "yoshida6":
         weights = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
-    else:  # k steps of 1/(k - k^(1/3)), one step back, and k steps again; with k halved on each side
+    else:  # k/2 steps of length 1/(k - k^(1/3)), one step back, and k/2 steps again
         k = 4 if method == "suzuki4" else 2
         weights = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
     return [*weights, 1 - 2 * sum(weights, fmpq(0)), *reversed(weights)]
@@ -226,7 +226,10 @@ def _sum(values: Any) -> Any:
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sum_i w_i z_i; the first z_i is on a parabola through a Kahan step."""
+    """Return the step x~ = x + sum_i w_i z_i, with z_i = h sum_j a_ij f(x + z_j) by Newton's method.
+
+    It starts from points z_i on a parabola that is determined by f(x) and a step of Kahan's method.
+    """
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
         n, stages = len(x), range(len(A))

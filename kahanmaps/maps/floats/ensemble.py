@@ -154,7 +154,7 @@ class FloatEnsemble(AttributeHints):
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = self.system.real_approximation
         map_over = map_.at(epsilon)
-        self._matrix = map_over.denominator_name(backward)
+        self._matrix_name = map_over.denominator_name(backward)
         self._blocks: PlanarBlocks | None = None
         state = self._starts.T
         if form is not None:
@@ -281,7 +281,7 @@ class FloatEnsemble(AttributeHints):
         if code == RUNNING:
             return OrbitEnd("completed", self.step, counted(self.step, "step"))
         if code == SINGULAR:
-            return OrbitEnd("singular", last, f"{self._matrix} is singular in floating point at step {last}")
+            return OrbitEnd("singular", last, f"{self._matrix_name} is singular in floating point at step {last}")
         return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of floating-point numbers")
 
     def interrupt(self) -> None:

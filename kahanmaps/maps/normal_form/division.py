@@ -1,9 +1,9 @@
 """Division polynomials of the translation T in gamma, whose roots are the levels on which all orbits are periodic.
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
-gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
-levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for 1 <= d < N. By Mazur's theorem the period at a rational gamma is
-neither 11 nor larger than 12. Sources: ward-1948 for the recurrence, mazur-1977.
+gamma = 1 - 64 eps^6 disc(h) c^2, c = h/(1 + eps^2 D) (docs/mathematics.md, "A translation, and tau functions"). So it
+has period N on the smooth levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for 1 <= d < N. By Mazur's theorem the
+period at a rational gamma is neither 11 nor larger than 12. Sources: ward-1948 for the recurrence, mazur-1977.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The level cubics of a plane as groups: the order of the translation Psi, and whether two points lie on one orbit.
 
-The field has q elements and characteristic at least 5 (over number fields only single sums are computed), and the
-levels are smooth. planar_block.py defines the cubic E, its Jacobian and T.
+The levels are smooth. Orders are computed in fields with q elements, of characteristic at least 5; over number fields
+points are added, but no orders are computed. planar_block.py defines the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations

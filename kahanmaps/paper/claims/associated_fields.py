@@ -160,7 +160,7 @@ def two_eigenvectors(o: PaperObjects) -> Pairs:
 def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation
     B_i = alpha_i I + beta_i A + gamma_i A^2"""
-    for i in o.free:
+    for i in o.tested_indices:
         # This side does not use Lagrange's formula: I - 2 E_i, E_i the projector onto the eigenspace of lambda_i.
         E = o.projector(i)
         yield o.B(i), o.I - E * o.number(2)
@@ -179,7 +179,7 @@ def independent_matrices(o: PaperObjects) -> Pairs:
 def involutions(o: PaperObjects) -> Pairs:
     """The matrices B_i are involutions
     B_i^2 = I"""
-    for i in o.free:
+    for i in o.tested_indices:
         yield o.B(i) * o.B(i), o.I
 
 
@@ -191,7 +191,7 @@ def characteristic_polynomial_of_B(o: PaperObjects) -> Pairs:
     right = (t + o.K.one) * (t + o.K.one)
     for _ in range(2 * o.m - 2):
         right = right * (t - o.K.one)
-    for i in o.free:
+    for i in o.tested_indices:
         yield o.det(o.B(i) - o.I * t), right
 
 
@@ -230,7 +230,7 @@ def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
 def interpolation(o: PaperObjects) -> Pairs:
     """The interpolation polynomials have these values
     B_i(lambda_i) = -1, B_i(lambda_j) = 1"""
-    for i in o.free:
+    for i in o.tested_indices:
         for j in o.each:
             value = o.K.zero
             for coefficient in reversed(o.lagrange(i)):
@@ -243,7 +243,7 @@ def lagrange_coefficients(o: PaperObjects) -> Pairs:
     """The eigenvalues determine the coefficients alpha, beta, gamma
     alpha_i = (lambda_i^2 - b)/((l_i - l_j)(l_i - l_k)), ..."""
     b = o.chi[1]
-    for i in o.free:
+    for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         li, lj, lk = o.lam[i], o.lam[j], o.lam[k]
         denominator = (li - lj) * (li - lk)
@@ -257,7 +257,7 @@ def lagrange_coefficients(o: PaperObjects) -> Pairs:
 def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
     """For every m the coefficients are given by Horner's polynomials C_k of chi
     coefficient k of B_i = delta_k0 - 2 C_k(lambda_i)/chi'(lambda_i)"""
-    for i in o.free:
+    for i in o.tested_indices:
         slope, C = o.K.zero, [o.K.zero] * o.m
         for k in range(o.m - 1, -1, -1):  # C_{m-1} = 1, C_{k-1} = t C_k + c_k
             C[k] = o.K.one if k == o.m - 1 else o.lam[i] * C[k + 1] + o.chi[k + 1]
@@ -280,7 +280,7 @@ def products_of_matrices(o: PaperObjects) -> Pairs:
 def products_of_matrices_for_every_m(o: PaperObjects) -> Pairs:
     """The B_i have these products for every m; for m = 3 the right-hand side is -B_k by (37)
     B_i B_j = B_i + B_j - I (i != j)"""
-    for i in o.free:
+    for i in o.tested_indices:
         for j in o.each:
             if i != j:
                 yield o.B(i) * o.B(j), o.B(i) + o.B(j) - o.I
@@ -311,7 +311,7 @@ def square_of_the_jacobian(o: PaperObjects) -> Pairs:
 def trace_part(o: PaperObjects) -> Pairs:
     """f_0'^2 is a multiple of the identity on each eigenspace of A^T; p_0 is (4-m)/4 times the sum of the factors
     p_0 = (4-m)/8 tr f_0'^2"""
-    for i in o.free:
+    for i in o.tested_indices:
         E = o.projector(i).transpose()
         yield o.df * o.df * E, E * o.eigenvalue_of_square(i, o.x)
     yield o.p0(o.x), o.sum([o.eigenvalue_of_square(i, o.x) for i in o.each]) * o.number(4 - o.m, 4)
@@ -321,7 +321,7 @@ def trace_part(o: PaperObjects) -> Pairs:
 def mixed_traces(o: PaperObjects) -> Pairs:
     """The two forms of q_i agree
     q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')"""
-    for i in o.free:
+    for i in o.tested_indices:
         yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_(i), o.x)) * o.number(1, 8)
 
 
@@ -330,7 +330,7 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
     """f_0' - g_i' has rank 2
     det(t I - (f_0'-g_i')) = t^{2m} - 1/2 t^{2m-2} tr (f_0'-g_i')^2"""
     t = o.scalar("t")
-    for i in o.free:
+    for i in o.tested_indices:
         difference = o.df - o.jac(o.g_(i), o.x)
         t_power = o.K.one
         for _ in range(2 * o.m - 2):
@@ -344,7 +344,7 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
 def cayley_hamilton(o: PaperObjects) -> Pairs:
     """f_0' - g_i' satisfies its characteristic equation (Cayley-Hamilton)
     (f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0"""
-    for i in o.free:
+    for i in o.tested_indices:
         difference = o.df - o.jac(o.g_(i), o.x)
         square = difference * difference
         power = o.power(square, o.m - 1)
@@ -357,7 +357,7 @@ def sixth_powers(o: PaperObjects) -> Pairs:
     32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0"""
     square = o.df * o.df
     fourth_power = square * square
-    for i in o.free:
+    for i in o.tested_indices:
         difference = o.I - o.B(i).transpose()
         traces = o.trace(square) - o.trace(o.B(i).transpose() * square)
         yield difference * (fourth_power * square) * o.number(32), difference * fourth_power * (o.number(8) * traces)

@@ -56,9 +56,9 @@ def linear_flows(o: PaperObjects) -> Pairs:
 
 @claim("Level varieties of the flow", "", "inhomogeneous", blockwise=True)
 def fermat_cubics(o: PaperObjects) -> Pairs:
-    """The curves close to Fermat cubics, whose points at infinity are flexes: j = 0
+    """The closures of the curves are Fermat cubics, whose points at infinity are flexes: j = 0
     S = 0, T = -disc(h) b^2/27, Hess(u, v, 0) = 0 for h(u, v) = b w^3"""
-    for i in o.free:
+    for i in o.tested_indices:
         x, e_prime, disc = _plane(o, i)
         cubic = _restriction(o, (x, e_prime))
         b = o.H(x)
@@ -83,9 +83,9 @@ def level_varieties_of_the_maps(o: PaperObjects) -> Pairs:
 
 @claim("Level varieties of the maps", "", "eps map", blockwise=True)
 def hesse_cubics(o: PaperObjects) -> Pairs:
-    """The curves are conserved and close to Hesse cubics X^3 + Y^3 + Z^3 = 3 k X Y Z, singular for k^3 = 1 only
+    """The curves are conserved; their closures are Hesse cubics X^3 + Y^3 + Z^3 = 3 k X Y Z, singular for k^3 = 1 only
     k^3 = 64 eps^6 disc(h) c^2, j = 27 k^3 (k^3 + 8)^3/(k^3 - 1)^3"""
-    for i in o.free:
+    for i in o.tested_indices:
         x, e_prime, disc = _plane(o, i)
         c, square = _level(o, i, x), o.eps * o.eps
         yield _level(o, i, o.step(o.f, x)), c
@@ -111,7 +111,7 @@ def translations(o: PaperObjects) -> Pairs:
         g = o.g(B)
         orbit = [o.step(g, o.x, times=-1), o.x, o.step(g, o.x)]
         orbit.append(o.step(g, orbit[-1]))
-        for i in o.free:
+        for i in o.tested_indices:
             E = o.projector(i).transpose()
             points = [E * point for point in orbit]
 

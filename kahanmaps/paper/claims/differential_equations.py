@@ -87,7 +87,7 @@ def functions_s(o: PaperObjects) -> Pairs:
     s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ..."""
     eps_squared = o.eps * o.eps
     q = [o.q(i, o.x) for i in o.each]
-    for i in o.free:
+    for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         yield (
             o.s(i, o.x),
@@ -100,7 +100,7 @@ def functions_s(o: PaperObjects) -> Pairs:
 def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
     """The s_i are the eigenvalues of I - eps^2 f'^2
     s_i = 1 - eps^2 (eigenvalue of f'^2 on the eigenspace of lambda_i)"""
-    for i in o.free:
+    for i in o.tested_indices:
         yield o.s(i, o.x), o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
 
 
@@ -128,7 +128,7 @@ def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
     factor = o.number(6) * o.eps * o.eps
     K = [o.Kf(o.B(i), o.x) for i in o.each]
     Q = [o.Q(i, o.x) for i in o.each]
-    for i in o.free:
+    for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         right = P_times(o, K[i]) - factor * Q[i] * o.H(o.x) + factor * Q[j] * K[k] + factor * Q[k] * K[j]
         yield o.integral(o.g_(i), o.x), right
@@ -139,7 +139,7 @@ def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
     """K~_i has this form for every m
     K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H"""
     factor = o.number(6) * o.eps * o.eps
-    for i in o.free:
+    for i in o.tested_indices:
         right = P_times(o, o.Kf(o.B(i), o.x))
         for j in o.each:
             right = right - factor * o.Q(j, o.x) * o.Kf(o.B(i) * o.B(j), o.x)
@@ -153,7 +153,7 @@ def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     left = o.slope(lambda o, x: o.P0(x), o.x, v)
     reciprocals = o.slope(lambda o, x: o.reciprocals(x), o.x, v) * o.number(1, 4)
-    for i in o.free:
+    for i in o.tested_indices:
         right = o.slope(lambda o, x: o.Q(i, x), o.x, o.B(i).transpose() * v) * o.eps * o.eps
         yield left, right * o.number(4 - o.m)
         yield reciprocals, right  # for m = 4 the previous pair is 0 = 0
@@ -180,7 +180,7 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
     dQ = [o.slope(lambda o, x: o.Q(i, x), o.x, v) for i in o.each]
     dP = o.slope(lambda o, x: o.P0(x), o.x, v)
     dH = o.dot(v, o.grad(o.x))
-    for i in o.free:
+    for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         direction = o.B(i).transpose() * v
         left = o.slope(lambda o, x: o.H_tilde(x), o.x, direction) * o.number(-1, 6)
@@ -206,7 +206,7 @@ def relations_of_gradients(o: PaperObjects) -> Pairs:
 def products_with_J(o: PaperObjects) -> Pairs:
     """The matrices of the ansatz have these products
     B_i^T J B_i J = B_i^T B_i^T J^2 = -I, B_i^T J B_j J = B_i^T B_j^T J^2 = B_k^T"""
-    for i in o.free:
+    for i in o.tested_indices:
         B = o.B(i).transpose()
         yield B * o.J * o.B(i) * o.J, B * B * o.J * o.J
         yield B * B * o.J * o.J, -o.I
@@ -291,7 +291,7 @@ def gradients_through_s(o: PaperObjects) -> Pairs:
         scaled_slopes.append(slope / (o.s(i, o.x) * o.s(i, o.x)))
     total = o.sum(scaled_slopes)
     yield o.slope(lambda o, x: o.P0(x), o.x, v), total * o.number(o.m - 4, 4)
-    for i in o.free:
+    for i in o.tested_indices:
         right = (scaled_slopes[i] + scaled_slopes[i] - total) / (o.number(4) * o.eps * o.eps)
         yield o.slope(lambda o, x: o.Q(i, x), o.x, v), right
 
@@ -301,7 +301,7 @@ def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
     """B_i changes the sign of nabla s_i and fixes the other nabla s_j
     B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ..."""
     v = o.vector("v")
-    for i in o.free:
+    for i in o.tested_indices:
         direction = o.B(i).transpose() * v
         for j in o.each:
             left = o.slope(lambda o, x: o.s(j, x), o.x, direction)

@@ -157,7 +157,7 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
 def division_polynomials(o: PaperObjects) -> Pairs:
     """T has order 5 where g = 32/27, and 6 where g = 28/27 ([ijk] are determinants of points of a planar orbit)
     32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]"""
-    for i in o.free:
+    for i in o.tested_indices:
         E = o.projector(i).transpose()
         points = [E * o.x]
         for _ in range(6):

@@ -192,7 +192,7 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     left = o.slope(lambda o, x: o.p0(x), o.x, v)
     trace = o.slope(lambda o, x: o.eighth_of_trace(x), o.x, v)
-    for i in o.free:
+    for i in o.tested_indices:
         right = o.slope(lambda o, x: o.q(i, x), o.x, o.B(i).transpose() * v)
         yield left, right * o.number(4 - o.m)
         yield trace, right  # for m = 4 the previous pair is 0 = 0
@@ -232,7 +232,7 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
     """The same at the eigenvalues, and the equivalent forms beta_i = (lambda_i - a) gamma_i, alpha_i - 1 = ...
     beta_j + beta_k - beta_i = (lambda_i - a)(gamma_j + gamma_k - gamma_i), 1 + alpha_j + alpha_k - alpha_i = ..."""
     a, b = -o.chi[2], o.chi[1]
-    for i in o.free:
+    for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         (ai, bi, ci), (aj, bj, cj), (ak, bk, ck) = o.lagrange(i), o.lagrange(j), o.lagrange(k)
         root = o.lam[i]
@@ -253,7 +253,7 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
 def components(o: PaperObjects) -> Pairs:
     """B^T f' = f' B^T and its derivative by x_l hold in components
     sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative"""
-    for i in o.free:
+    for i in o.tested_indices:
         B = o.B(i)
         yield B.transpose() * o.df, o.df * B.transpose()
         for l in range(o.n):
@@ -265,7 +265,7 @@ def components(o: PaperObjects) -> Pairs:
 def gradient_of_q(o: PaperObjects) -> Pairs:
     """The gradient of q_i has these two terms in components
     dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8"""
-    for i in o.free:
+    for i in o.tested_indices:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
         for l in range(o.n):
             trace_1, trace_2 = _two_traces(o, o.B(i), l)
@@ -277,7 +277,7 @@ def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
     """Both contributions to B nabla q have this form, and their sum is nabla tr f'^2/8
     (B nabla q)_n = sum_l (B^T)_ln dq/dx_l = sum d_n d_m f_j d_j f_m/8 + sum d_j f_k d_j d_n f_k/8"""
     trace = o.gradient(lambda o, x: o.eighth_of_trace(x), o.x)
-    for i in o.free:
+    for i in o.tested_indices:
         B = o.B(i)
         sums = [_two_traces(o, B, l) for l in range(o.n)]
         for k in range(o.n):

@@ -323,7 +323,10 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Draw the orbits in this order as dots or, with `lines`, as joined points, colored by the values."""
+    """Draw the orbits in this order as dots or, with `lines`, as segments, colored by the values.
+
+    A segment has the color of its first point; `limits` are the least and the largest value of the color bar.
+    """
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
@@ -335,24 +338,24 @@ def _draw_colored(
     in_space = points.shape[2] == 3
     if not lines:
         orbit_indices = list(order)
-        ordered_points, levels = points[:, orbit_indices].swapaxes(0, 1), values[:, orbit_indices].swapaxes(0, 1)
-        is_defined = ~np.isnan(ordered_points).any(axis=2)
+        dots, dot_values = points[:, orbit_indices].swapaxes(0, 1), values[:, orbit_indices].swapaxes(0, 1)
+        is_defined = ~np.isnan(dots).any(axis=2)
         options |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
-        return axes.scatter(*ordered_points[is_defined].T, c=levels[is_defined], **options)
+        return axes.scatter(*dots[is_defined].T, c=dot_values[is_defined], **options)
     pairs_by_orbit = [(portrait.pairs(int(k)), k) for k in order]
-    ends = np.concatenate([points[pairs, k] for pairs, k in pairs_by_orbit])
-    levels = np.concatenate([values[pairs[:, 0], k] for pairs, k in pairs_by_orbit])
-    is_defined = ~np.isnan(ends).any(axis=(1, 2))
+    segments = np.concatenate([points[pairs, k] for pairs, k in pairs_by_orbit])
+    segment_values = np.concatenate([values[pairs[:, 0], k] for pairs, k in pairs_by_orbit])
+    is_defined = ~np.isnan(segments).any(axis=(1, 2))
     if in_space:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         del options["zorder"]
-        collection: Any = Line3DCollection(ends[is_defined], linewidths=0.6, **options)
+        collection: Any = Line3DCollection(segments[is_defined], linewidths=0.6, **options)
         axes.add_collection3d(collection, autolim=False)
     else:
-        collection = LineCollection(list(ends[is_defined]), linewidths=0.6, **options)
+        collection = LineCollection(list(segments[is_defined]), linewidths=0.6, **options)
         axes.add_collection(collection, autolim=False)
-    collection.set_array(levels[is_defined])
+    collection.set_array(segment_values[is_defined])
     return collection
 
 

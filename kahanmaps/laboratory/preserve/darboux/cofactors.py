@@ -53,7 +53,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 _SPARE = 8  # points beyond the number of unknowns
 _DETERMINANT_BUDGET = 20_000_000
 _DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
-_MAX_WORK = 4_000_000  # entries of matrices, about two seconds
+_MAX_WORK = 4_000_000  # entries of matrices in one search, about two seconds
 _MAX_DIMENSION = 16  # in higher dimension even a sparse determinant takes too long to expand
 
 
@@ -386,7 +386,7 @@ class SpaceSearch:
 def search_cofactors(
     map_: ModularMap,
     cofactors: Sequence[Cofactor],
-    denominators: Sequence[Cofactor],
+    denominator_cofactors: Sequence[Cofactor],
     known_spaces: Sequence[DarbouxSpace],
     required: int,
     max_degree: int,
@@ -396,23 +396,26 @@ def search_cofactors(
 
     The search ends when `required` independent integrals are known, when it takes too much work, or when the `budget`
     is spent. A space is added only if it gives an integral independent of the integrals of the `known_spaces` and of
-    earlier spaces. The cofactors that are tried are products of the `cofactors`, then products of the `denominators`.
+    earlier spaces.
+
+    The cofactors that are tried are products of the `cofactors`, then products of the `denominator_cofactors`. The
+    latter have the form g(x~)/g(x) with known polynomials g, so they lead to integrals P/Q with a product Q of the g.
     If the `cofactors` are known only up to a numerical factor, their products times any number come last.
 
-    Two observations save unknowns. If P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its
-    coordinates in a basis of these relations are unknown. And Q is, up to a factor, the difference of relations along
-    two orbits, which excludes most products as denominators.
+    Two observations save work. If P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its
+    coordinates in a basis of these relations are unknown. If P/Q = d on a second orbit, then P - d Q is a relation
+    along that one, so (d - c) Q is a sum of relations along the two orbits. This excludes most products Q of the g.
     """
-    prime, dim, all_cofactors, work = map_.prime, map_.dim, [*cofactors, *denominators], 0
+    prime, dim, all_cofactors, work = map_.prime, map_.dim, [*cofactors, *denominator_cofactors], 0
     result = SpaceSearch(cofactors=all_cofactors)
     spaces = list(known_spaces)
     independent_count = gradient_rank(map_, spaces)
     context, field = nmod_mpoly_ctx.get([f"x{k}" for k in range(dim)], modulus=prime), GF(prime)
     arguments = [*context.gens(), *(context.constant(c) for c in (*map_.values, map_.eps))]
-    polynomials = [
-        modulo(denominator.polynomial, field).compose(*arguments, ctx=context)
-        for denominator in denominators
-        if denominator.polynomial is not None
+    denominator_factors = [
+        modulo(cofactor.polynomial, field).compose(*arguments, ctx=context)
+        for cofactor in denominator_cofactors
+        if cofactor.polynomial is not None
     ]
     for degree in range(1, max_degree + 1):
         if independent_count >= required:
@@ -426,18 +429,18 @@ def search_cofactors(
             joint_relations = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
             rows_by_pivot = dict(zip(pivots(joint_relations), joint_relations, strict=True))
             candidates = [
-                replace(product, powers=(*product.powers, *[0] * len(denominators)))
+                replace(product, powers=(*product.powers, *[0] * len(denominator_cofactors)))
                 for product in products(cofactors, min(degree + 1, max_degree))
             ]
-            for product in products(denominators, degree)[1:]:
-                denominator = prod(map(pow, polynomials, product.powers), start=context.constant(1))
+            for product in products(denominator_cofactors, degree)[1:]:
+                denominator = prod(map(pow, denominator_factors, product.powers), start=context.constant(1))
                 if _is_spanned(denominator, indices, rows_by_pivot, prime):
                     candidates.append(replace(product, powers=(*[0] * len(cofactors), *product.powers)))
-            count = len(relations) + _SPARE
+            point_count = len(relations) + _SPARE
             sample = Sample.of(map_, all_cofactors, points_needed(dim, degree))
             basis = matrix(relations, prime).transpose()
             pairs_of_values = zip(
-                *(map_.monomials_at_both(x, image, degree) for x, image in sample.pairs[:count]), strict=True
+                *(map_.monomials_at_both(x, image, degree) for x, image in sample.pairs[:point_count]), strict=True
             )
             x_values, image_values = (
                 multiply(matrix(list(values), prime), basis).tolist() for values in pairs_of_values
@@ -445,13 +448,15 @@ def search_cofactors(
         for product in candidates if relations else ():
             if independent_count >= required:
                 break
-            work += count**2
+            work += point_count**2
             if work > _MAX_WORK or budget.is_spent:
                 return replace(result, cut=message) if budget.is_spent else result
-            count_work(count * len(relations) / 3)
+            count_work(point_count * len(relations) / 3)
+            # P(x~) = a P(x)/b at each point, with the cofactor a/b there.
+            fractions = sample.values(product, point_count)
             equations = [
                 [b * v - a * u for u, v in zip(row, image_row, strict=True)]
-                for (a, b), row, image_row in zip(sample.values(product, count), x_values, image_values, strict=True)
+                for (a, b), row, image_row in zip(fractions, x_values, image_values, strict=True)
             ]
             coordinates = null_space(equations, len(relations), prime)
             # At a point of the orbit P = c Q, so the gradients of P/Q and of P - c Q are proportional.
@@ -484,7 +489,7 @@ def search_cofactors(
             return replace(result, cut=f"{message}: {SPENT}")
         if work > 2 * _MAX_WORK:
             break
-        product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
+        product = replace(product, powers=(*product.powers, *[0] * len(denominator_cofactors)))
         new_spaces = [space for _, space in cofactor_spaces(sample, product, degree) if len(space.basis) > 1]
         new_rank = gradient_rank(map_, [*spaces, *new_spaces]) if new_spaces else independent_count
         if new_rank > independent_count:

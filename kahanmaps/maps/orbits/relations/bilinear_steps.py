@@ -45,7 +45,7 @@ class BilinearForms:
         # Only B_ij for the last j are known, so f_n may have a denominator; this number is a multiple of those so far.
         self._multiple = fmpz(1)
 
-    def skip(self, number: int) -> bool:
+    def may_skip(self, number: int) -> bool:
         """Return False: every point is needed for the points after it."""
         return False
 

@@ -24,9 +24,11 @@ _PRIME = 2**61 - 1
 class EllipticSteps:
     """The steps of an orbit by Somos sequences.
 
-    `groups` has one row for each of the alternating curves: the Coordinates of each group, or for a copy of a group at
-    the previous step the index of that group. The forms are used after `first` steps of factors. The sequences begin
-    after the first `skipped` points of the orbit.
+    A step of a composition consists of one step of each factor. After these steps of factors the point lies in turn on
+    several curves, and `groups` has a row for each curve. The row has for each group of coordinates its Coordinates, or
+    an index if the group is copied from the point one step of a factor before: the index of the group there. The
+    sequences begin at the point with the number `skipped` of the orbit, and the forms are used from the point on that
+    is `first` steps of factors later.
     """
 
     name = "Somos sequences along the orbit"
@@ -35,7 +37,7 @@ class EllipticSteps:
         self, map_over: Map, groups: Sequence[Sequence[Coordinates | int]], first: int, skipped: int = 0
     ) -> None:
         self._map, self._groups, self._first, self._skipped = map_over, groups, first, skipped
-        self._residue: list[int] | None = None
+        self._residues: list[int] | None = None  # the last point modulo _PRIME
         self._values: dict[tuple[int, int], list[fmpz]] = {}
 
     @property
@@ -57,16 +59,23 @@ class EllipticSteps:
 
     def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, after the previous one was computed or skipped; None if undetermined."""
-        return self.point(number) if self.skip(number) else None
+        return self.point(number) if self._has_point(number) else None
 
-    def skip(self, number: int) -> bool:
-        """Return whether the orbit modulo a prime proves that the previous point has an image."""
-        if self._residue is None:
+    def may_skip(self, number: int) -> bool:
+        """Return whether the point with this number is known to exist, so that it need not be computed."""
+        return self._has_point(number)
+
+    def _has_point(self, number: int) -> bool:
+        """Return whether the orbit modulo a prime proves that there is a point with this number.
+
+        The numbers of successive calls must increase by 1 as long as the answer is True.
+        """
+        if self._residues is None:
             previous_point = self.point(number - 1)
-            self._residue = None if previous_point is None else previous_point.residues(_PRIME)
+            self._residues = None if previous_point is None else previous_point.residues(_PRIME)
         for factor in self._map.factors:
-            self._residue = self._residue and factor.integer_steps.image_modulo(self._residue, _PRIME)
-        return self._residue is not None
+            self._residues = self._residues and factor.integer_steps.image_modulo(self._residues, _PRIME)
+        return self._residues is not None
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return the point with this number; None if the forms do not give it. Terms no longer needed are discarded."""

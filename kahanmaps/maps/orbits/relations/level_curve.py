@@ -43,8 +43,8 @@ def level_curve(
         eps: the value of eps.
         points: at least three successive points of the orbit.
 
-    Returns None if the orbit meets several components of the level curve or a singular point, or if no projection of
-    this kind is found.
+    Returns None if the orbit meets several components of the level curve or a singular point, or if no rational point
+    of the curve is found whose multiplicity is the degree minus 2.
     """
     level = integral.value(QQ, (*points[0], eps))
     if level is None:

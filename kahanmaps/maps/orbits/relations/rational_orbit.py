@@ -32,7 +32,7 @@ class Relations(Protocol):
     def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, given the last points; None if the relations do not determine it."""
 
-    def skip(self, number: int) -> bool:
+    def may_skip(self, number: int) -> bool:
         """Return whether the point with this number certainly exists and can be skipped, as no later point needs it."""
 
     def point(self, number: int) -> IntegerPoint | None:
@@ -70,7 +70,7 @@ class RationalOrbit:
                 is_short = (
                     self.max_bits is None or 2 * last_points[-1].bits * number**2 < self.max_bits * last_number**2
                 )
-                if is_short and self.relations.skip(number):
+                if is_short and self.relations.may_skip(number):
                     yield None
                     continue
             image = None if self.relations is None else self.relations.step(last_points, number)
