@@ -127,7 +127,7 @@ HTML = {  # a value, and what its text contains
         lambda: km.find_integrals(TOP),
         [
             r"\displaystyle I_1 = ",
-            "2 found; in all 2 independent (measured: relations of degree up to 2 along orbits show 2)",
+            "2 found; there are 2 in all (measured: relations of degree up to 2 along orbits show 2)",
         ],
     ),
     "Darboux polynomials": (lambda: km.darboux_polynomials(km.load("lotka_volterra"), 1), ["cofactor"]),

@@ -158,16 +158,16 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
 
 UP_TO_2 = "relations of degree up to 2 along orbits"
 COUNTS = [  # dimension, codimensions by degree, period, with the known ones, by theorems, formulas; what is concluded
-    (3, (0, 2), None, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
+    (3, (0, 2), None, 0, 0, 0, (2, True, False), f"there are 2 in all (measured: {UP_TO_2} show 2)"),
     (3, (0, 1), None, 0, 1, 1, (1, False, True),
-     f"in all at least 1 independent (1 by theorems: T; measured: {UP_TO_2} show no more)"),
-    (3, (0, 1), None, 0, 0, 2, (2, True, True), f"in all 2 independent (measured: {UP_TO_2} show 1; 2 have formulas)"),
-    (4, (0, 1), None, 2, 0, 1, (2, False, False), f"in all at least 2 independent (measured: {UP_TO_2} show 2)"),
+     f"there is at least 1 in all (1 by theorems: T; measured: {UP_TO_2} show no more)"),
+    (3, (0, 1), None, 0, 0, 2, (2, True, True), f"there are 2 in all (measured: {UP_TO_2} show 1; 2 have formulas)"),
+    (4, (0, 1), None, 2, 0, 1, (2, False, False), f"there are at least 2 in all (measured: {UP_TO_2} show 2)"),
     (3, (0, 0), None, 0, 0, 0, (0, False, True), f"none shows in {UP_TO_2} (measured)"),
     (1, (0, 0), None, 0, 0, 0, (0, True, True), f"there is no integral (measured, {UP_TO_2})"),
     (3, (), None, 0, 0, 0, (0, False, True), "orbits were not measured"),
-    (3, (), None, 0, 3, 3, (3, True, True), "in all 3 independent (3 by theorems: T)"),
-    (2, (1, 1), 4, 0, 0, 0, (1, False, False), f"in all at least 1 independent (measured: {UP_TO_2} show 1)"),
+    (3, (), None, 0, 3, 3, (3, True, True), "there are 3 in all (3 by theorems: T)"),
+    (2, (1, 1), 4, 0, 0, 0, (1, False, False), f"there is at least 1 in all (measured: {UP_TO_2} show 1)"),
 ]  # fmt: skip
 
 

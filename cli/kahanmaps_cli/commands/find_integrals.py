@@ -138,7 +138,7 @@ def command(system: str | None, **options: Any) -> int:
 def _count_line(result: Any) -> str:
     if not result.profile.nullities and not result.codimension:
         return "orbits\tnot measured"
-    return f"found\t{result.formula_count} functionally independent; {result.count_text}"
+    return f"found\t{lib.counted(result.formula_count, 'functionally independent integral')}; {result.count_text}"
 
 
 def _search_darboux(system: str | None, options: dict[str, Any]) -> int:

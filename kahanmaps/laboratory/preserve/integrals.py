@@ -203,7 +203,8 @@ class IntegralSearch(Search):
             if self.formula_count > count:
                 phrases.append(f"{self.formula_count} have formulas")
         at_least = "" if self.is_exact else "at least "
-        return f"in all {at_least}{self.codimension} independent ({'; '.join(phrases)})"
+        verb = "is" if self.codimension == 1 else "are"
+        return f"there {verb} {at_least}{self.codimension} in all ({'; '.join(phrases)})"
 
     @property
     def is_complete(self) -> bool:
