@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction
 
-PRIME_BITS = 62
+PRIME_BITS = 62  # random primes are at least 2^62 and below 2^63
 
 
 def derive_seed(seed: int, *data: Any) -> int:

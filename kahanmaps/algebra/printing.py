@@ -119,7 +119,7 @@ def format_factored(function: RationalFunction) -> str:
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
-    """Factor a function: return primitive polynomials with exponents, and a number; None if the text is not shorter.
+    """Factor a function: return primitive polynomials with exponents, and a number; None if that is no shorter text.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
     Common factors of numerator and denominator are canceled.

@@ -128,7 +128,7 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
 def from_residues(
     modulo: Callable[[int], Sequence[Sequence[int]] | None], max_primes: int
 ) -> list[tuple[fmpq, ...]] | None:
-    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with a further prime.
+    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with one more prime.
 
     The residues come in groups of numbers that probably share a denominator. Returns None if `modulo` returns None, or
     if `max_primes` primes do not suffice. Every call uses the same primes: since the result is checked, an unsuitable

@@ -27,7 +27,7 @@ from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 MAX_DEGREE = 12
 _ROOT_TEXT = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
 _SQUARE_ROOT_TEXT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
-_GUARD_BITS = 64
+_GUARD_BITS = 64  # bits of working precision beyond the requested ones
 
 
 class Root:

@@ -34,7 +34,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns in dimension n
 _DRAWS = 24  # small combinations that are tried besides the basis vectors
-_TRIAL_DIVISION = 1000
+_TRIAL_DIVISION = 1000  # limit of the trial divisions of a gcd
 _T = fmpq_poly([0, 1])
 
 

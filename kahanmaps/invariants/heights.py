@@ -1,14 +1,14 @@
 """Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
 
-The height of a rational point x = (p_1 : ... : p_d : q), with integers without a common factor, is here the bit length
-of the largest of these integers, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: within one bit of the logarithmic
+The height of a rational point x = (p_1 : ... : p_k : q), with integers without a common factor, is here the bit length
+of the largest of these integers, floor(log2 max(|p_1|, ..., |p_k|, |q|)) + 1: within one bit of the logarithmic
 projective height.
 
-Over a number field Q[t]/g of degree m, it is the height of the rational point that consists of all coefficients of
-1, t, t^2, ... Up to a constant, it lies between the height of the point and m times this height (denominators are
+Over a number field Q[t]/g of degree r, it is the height of the rational point that consists of all coefficients of
+1, t, t^2, ... Up to a constant, it lies between the height of the point and r times this height (denominators are
 ideals, and the least positive integer in an ideal is at most its norm), so that the kind of growth is the same.
 
-Theory. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): growth is at most exponential. If an
+Theory. One step is a rational map of some degree e, so h(Phi(x)) <= e h(x) + O(1): growth is at most exponential. If an
 orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a component. On a rational
 curve, this is a Moebius map: heights grow linearly, or logarithmically if it has one fixed point, or the orbit is
 periodic. On an elliptic curve of degree d in projective space, on which the map is a translation by T,

@@ -1,4 +1,4 @@
-"""The equation of a map over a field: the matrix (M | -r), whose entries are forms of the same degree in (X : Z).
+"""The equation M x~ = r of a map over a field, as the matrix (M | -r) of forms of one degree in (X : Z), x = X/Z.
 
 All evaluators use this equation: for integer points (orbits/integer_steps.py), for floating-point numbers
 (floats/steps.py), and for curves and forms in projective space (projective.py).

@@ -1,8 +1,8 @@
 """Birational maps given by an equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
 
-M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' and r = (I + eps B) x + 2 eps c; for a
-map given by rational functions, M is the diagonal matrix of their denominators. Other discretizations that are linear
-in the new point have this form as well. There are three kinds of objects:
+M is a matrix and r a vector of polynomials. For Kahan's method and f(x) = Q(x, x) + B x + c, M = I - eps f' and r =
+(I + eps B) x + 2 eps c; for a map given by rational functions, M is the diagonal matrix of their denominators. Other
+discretizations that are linear in the new point have this form as well. There are three kinds of objects:
 
 * `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
   `ImplicitMap`.

@@ -2,9 +2,9 @@
 
 The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
 numpy code, or compiled. The equations of implicit methods are quadratic. They are solved by Newton's method from the
-step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), so that the program
-can test whether it has converged up to rounding. The fast step takes a few iterations. If these do not suffice, the
-careful step takes more iterations, and if it does not converge either, the orbit ends.
+step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), with the quadratic
+part Q of f and the matrix (a_ij) of the method, so that convergence up to rounding can be tested. The fast step takes
+two iterations. If these do not suffice, the careful step takes eight; if it does not converge either, the orbit ends.
 Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
@@ -31,7 +31,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROUNDING = 2.0**-52  # relative size of a residual below which the equations count as solved
 _STALLED = 1e-10  # relative size below which the last correction of a careful step counts as round-off
-_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8
+_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # of Newton's method, in the fast and in the careful step
 
 
 class Method(NamedTuple):
@@ -226,7 +226,7 @@ def _sum(values: Any) -> Any:
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """Return the step x~ = x + sum_i w_i z_i, with z_i = h sum_j a_ij f(x + z_j) by Newton's method.
+    """Return the step x~ = x + sum_i w_i z_i, `weights` w, with z_i = h sum_j A_ij f(x + z_j) by Newton's method.
 
     It starts from points z_i on a parabola that is determined by f(x) and a step of Kahan's method.
     """

@@ -1,9 +1,9 @@
 """Ensembles of float orbits, which are advanced together.
 
-There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py), and "generic" for any
-map; steps.py defines a step. There are two kernels: "numpy", which is always available, and "numba", machine code (the
-extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but not on the number of
-threads or the size of the portions.
+There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py, also for h, D and chi),
+and "generic" for any map; steps.py defines a step. There are two kernels: "numpy", which is always available, and
+"numba", machine code (the extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but
+not on the number of threads, or on the number of steps computed in one portion.
 """
 
 from __future__ import annotations

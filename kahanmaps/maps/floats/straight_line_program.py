@@ -291,7 +291,7 @@ class StepChecks:
                 self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """Return the truth values of a step: `good`; or whether it was near-singular, singular, an overflow."""
+        """Return `good` of a fast step; of a careful step, whether it was near-singular, singular, an overflow."""
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
         singular = self.zero

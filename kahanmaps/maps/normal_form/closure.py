@@ -3,7 +3,7 @@
 Let rho_i be the coordinates of the translation on the circles whose products the components are. The orbit is dense if
 and only if sum n_i rho_i = n_0 has no integer solution except n_i = 0 for all i (Kronecker). On one circle it is enough
 that the translation has infinite order. For several circles no theorem is known that excludes all such relations; balls
-exclude those with small coefficients. The orbit is Zariski dense if no two of the curves are isogenous, which one prime
+exclude those with small coefficients. The orbit is Zariski dense if no two level curves are isogenous, which one prime
 may prove. See docs/mathematics.md, "Geometry of the level sets".
 """
 
@@ -20,8 +20,8 @@ from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 from kahanmaps.algebra.fields import RR
 
 _SCALE = 10**15  # the inverse of the accuracy of rotation numbers
-_SUPPORT = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
-_MAX_PRIME = 4000
+_MIN_EXCLUDED_SIZE = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
+_MAX_PRIME = 4000  # largest prime modulo which curves are compared
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
     if len(numbers) == 1:
         return Closure(True, "the translation of a circle has infinite order")
     bound, prime = excluded_relations(numbers), separating_prime(gamma_polynomial)
-    if bound < _SUPPORT:
+    if bound < _MIN_EXCLUDED_SIZE:
         return Closure(None, "the rotation numbers may be dependent", None, prime)
     return Closure(None, f"no integer relation of the rotation numbers has coefficients up to {bound}", bound, prime)
 

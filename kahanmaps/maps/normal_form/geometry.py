@@ -40,7 +40,7 @@ _ACCURACY = 1e-15  # accuracy of rotation numbers
 _RELATIVE_ACCURACY = 1e-12  # relative accuracy of phase errors
 _HEIGHT_ACCURACY = 1e-12  # accuracy of heights that are printed without an error
 _MAX_HEIGHT_DEGREE = 4  # largest degree of fields over which heights are computed
-_LONGEST_HEIGHT = 4000  # largest number of bits of gamma for which a height is computed
+_MAX_GAMMA_BITS = 4000  # largest number of bits of gamma for which a height is computed
 
 
 @dataclass(frozen=True)
@@ -284,10 +284,10 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
         bits = gamma.height_bits() if is_rational else max(x.height_bits() for x in gamma.coefficients)
         if order is not None:
             height_ball = arb(0)
-        elif bits <= _LONGEST_HEIGHT and is_rational:
+        elif bits <= _MAX_GAMMA_BITS and is_rational:
             curve = Jacobian(gamma)
             height_ball = canonical_height(curve, curve.T)
-        elif bits <= _LONGEST_HEIGHT and plane.degree <= _MAX_HEIGHT_DEGREE:
+        elif bits <= _MAX_GAMMA_BITS and plane.degree <= _MAX_HEIGHT_DEGREE:
             height_ball = plane_height(plane.block, triple)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
         height_value = None if height_ball is None else float(height_ball.mid())
@@ -321,7 +321,7 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Yield for each plane the point, the kind of its level curve, gamma, and the rotations if the level is smooth."""
+    """Yield each plane with the start in it, the kind of its level curve, gamma, and, if smooth, the rotations."""
     form: Any = getattr(normal_form, "form", normal_form)
     splitting = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):

@@ -40,11 +40,11 @@ from kahanmaps.systems.quadratic import as_system
 
 LARGEST_FIELD = 1 << 192  # number of elements; a period over such a field takes a minute or two
 _MAX_WALK = 1 << 16  # number of steps taken if no theorem gives the answer
-_AGREEMENTS = 8  # if T has the same order modulo this number of primes, the order is tested over the field itself
+_MAX_AGREEING_PRIMES = 8  # if T has the same order modulo this number of primes, the order is tested over Q or Q[t]/g
 
 
 class PeriodKind(StrEnum):
-    """The type of the level cubic of a plane, which determines how the period is computed (p is not 2 or 3)."""
+    """The type of the level cubic of a plane, which determines how the period modulo p > 3 is computed."""
 
     FIXED = "a fixed point"  # period 1
     SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite; the period is the order of T
@@ -81,7 +81,7 @@ class PlanePeriod:
 
 @dataclass(frozen=True)
 class OrbitPeriod(PrintableResult):
-    """The period of an orbit that is continued through poles: the least common multiple over the planes.
+    """The period of an orbit that is continued through poles: the least common multiple of those in the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (in some plane the map is not defined at the initial
     point and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the
@@ -397,7 +397,7 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
         (first_order, first_prime), (last_order, last_prime) = orders[0], orders[-1]
         if first_order != last_order:
             return None, f"T has the orders {first_order} and {last_order} modulo {first_prime} and {last_prime}"
-        if len(orders) == _AGREEMENTS:
+        if len(orders) == _MAX_AGREEING_PRIMES:
             curve = Jacobian(gamma)
             if curve.multiple(first_order, curve.T) is None:
                 return first_order, f"{first_order} T = 0"

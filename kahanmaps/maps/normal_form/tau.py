@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences, a third as long.
+"""Tau functions: points of an orbit in a plane from terms of two Somos sequences, which have a third of their digits.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -30,7 +30,7 @@ from typing import Any
 from kahanmaps.maps.normal_form.planar_block import Triple, determinant
 from kahanmaps.maps.somos import Terms
 
-_MAX_BASES = 3
+_MAX_BASES = 3  # number of base points that are tried
 _MIN_INDEX = 2  # the least n: for smaller n, psi_{n-1} would be 0
 _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then holds about ten times the digits of a point
 

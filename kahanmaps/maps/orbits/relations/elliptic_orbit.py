@@ -32,9 +32,9 @@ from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
 _MAX_PRIMES = 100
 _BITS_PER_PRIME = 100  # bits of the points for each prime: the coefficients must be shorter than the points
-_MAX_FACTORS = 8
+_MAX_FACTORS = 8  # of the shortest sequence of factors that a composition repeats
 _SKIPPED_STEPS = 3  # for a special initial point: terms of U near the beginning may be 0, like W(0)
-_FIRST = 2  # the least n for which the forms are used
+_MIN_INDEX = 2  # the least n for which the forms are used
 
 Groups = Sequence[tuple[int, ...]]  # groups of coordinates with a common denominator
 
@@ -86,7 +86,7 @@ def elliptic_steps(
 
 
 class Numbers(NamedTuple):
-    """The numbers that determine the forms of a group: H, y(2), y(3), and the coefficients, row by row."""
+    """What determines the forms of a group: H, y = y(2), z = y(3) (elliptic_search.py); coefficients, row by row."""
 
     H: fmpq
     y: fmpq
@@ -145,7 +145,7 @@ class _Search:
     @property
     def first(self) -> int:
         """The number of steps of factors after which the forms are used, since W(0) = 0."""
-        return (_FIRST + self.factors[0].dim) * self.stride
+        return (_MIN_INDEX + self.factors[0].dim) * self.stride
 
     def degree(self, k: int, group: int) -> int:
         """Return the degree of a group of coordinates on a curve."""
