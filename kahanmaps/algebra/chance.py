@@ -67,7 +67,7 @@ def _encode(value: Any) -> str:
 
 
 def random_prime_field(rng: random.Random) -> PrimeField:
-    """Return GF(p) for a prime p drawn uniformly from [2^62, 2^63), the largest primes that fit into FLINT's nmod."""
+    """Return GF(p) for a prime p drawn uniformly from [2^62, 2^63): for larger p, `PrimeField` is slower."""
     while True:
         candidate = rng.getrandbits(PRIME_BITS) | (1 << PRIME_BITS)
         if candidate % 2 and fmpz(candidate).is_prime():

@@ -67,7 +67,7 @@ class Samples:
     length: int | None = None
 
     def check(self, needed: int = 0) -> None:
-        """Raise Stop if `needed` further values exceed the limit or the budget is spent."""
+        """Raise Stop if `needed` values, added to those so far, exceed the limit, or if the budget is spent."""
         if self.calls + needed > self.max_samples:
             raise Stop(f"{self.calls} values requested and {needed} more needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
@@ -110,7 +110,7 @@ class SampledValues:
     def random_points(
         self, nvars: int, rng: random.Random, fixed: Mapping[int, int] = NONE_FIXED
     ) -> Callable[[], Point]:
-        """Return a function that draws random points with some coordinates fixed."""
+        """Return a function that draws random points; `fixed` maps indices of coordinates to fixed values."""
         return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(nvars))
 
     def monomials(self, k: int, exponents: Sequence[Exponents]) -> list[int]:
@@ -344,7 +344,7 @@ def _interpolate_on_line(
         nodes.append(t)
         return tuple((a + (t - t0) * d) % p for a, d in zip(anchor, direction, strict=True))
 
-    # Newton's form: a further point adds one term to each polynomial. The degrees are not known in advance, so points
+    # Newton's form: each new point adds one term to each polynomial. The degrees are not known in advance, so points
     # are taken one by one until all fractions are determined.
     entries = range(len(values.values[0]))
     node_polynomial = nmod_poly([-t0, 1], p)
@@ -412,7 +412,7 @@ def fit(
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
-    """Fit fractions of these shapes to all values but the last, which must agree; compute further values as needed.
+    """Fit fractions of these shapes to all values but the last, which must agree; compute missing values first.
 
     With `fixed` coordinates only points with these coordinates are used.
     """
@@ -447,7 +447,7 @@ def _solve(
 ) -> int:
     """Solve for the fractions of entries that share one denominator, and store them in `quotients`.
 
-    Returns the number of further values needed, 0 on success. Raises Unlucky if there is no solution.
+    Returns the number of missing values, 0 on success. Raises Unlucky if there is no solution.
     """
     p = values.prime
     values.samples.check()
@@ -505,7 +505,7 @@ def _solve(
     return 0
 
 
-# -- modulo further primes ---------------------------------------------------------------------------------------------
+# -- modulo the next primes --------------------------------------------------------------------------------------------
 
 
 def _lift(
@@ -515,7 +515,7 @@ def _lift(
     primes: list[int],
     rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
-    """Lift the functions to Q. Raises Unlucky if values modulo other primes disagree."""
+    """Lift the functions to Q. Raises Unlucky if values modulo the next primes disagree with them."""
     modulus, context = primes[-1], ring(names)
     shapes = {i: quotient.shape for i, quotient in enumerate(quotients)}
     residues = [[*quotient.numerator, *quotient.denominator] for quotient in quotients]

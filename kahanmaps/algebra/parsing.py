@@ -226,7 +226,7 @@ def parse_polynomial(
     *,
     limits: ExpressionLimits = LIMITS,
 ) -> fmpq_mpoly:
-    """Parse a polynomial in `ring(variables)`; `constants` maps further names to their values.
+    """Parse a polynomial in `ring(variables)`; `constants` maps names other than variables to values.
 
     Division by a nonconstant polynomial is an error, even if it would leave no remainder (`x^2/x`).
     Raises `ExpressionError` with the column of the mistake; `InputError` for invalid names or inexact constants.

@@ -1,6 +1,6 @@
 """Primes of bad reduction of elliptic curves over Q, and of the curves in the planes of a member of the family.
 
-The curves in the planes may be over number fields. Integers are factored within a bound; other cofactors are reported.
+Those in the planes may be over number fields. Integers are factored within a bound; unfactored cofactors are reported.
 """
 
 from __future__ import annotations

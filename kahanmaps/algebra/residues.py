@@ -78,10 +78,10 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
 
 
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
-    """Return the simplest fractions with these residues, computed together; None if they are not simple enough.
+    """Return the simplest fractions with these residues, computed together; None if a residue has no simple one.
 
-    Fractions with a common denominator may be longer than single ones: k of them may have heights up to about
-    modulus^(k/(k+1)). They are found as a short vector of a lattice (LLL). The result is a guess that must be checked.
+    If k fractions have a common denominator, they are also found if their heights are longer than sqrt(modulus), up to
+    about modulus^(k/(k+1)), as a short vector of a lattice (LLL). The result is a guess that must be checked.
 
     >>> m = 2**61 - 1
     >>> numbers = [fmpq(n, 10**10 + 19) for n in (10**10, -3141592653)]

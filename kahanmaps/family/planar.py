@@ -301,7 +301,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """Yield for each unit vector its sum with few small multiples of other unit vectors that generates a free K-module.
+    """Yield for each unit vector its sum with few small multiples of the others that generates a free K-module.
 
     For all but at most m values of c, adding c times a unit vector gives the largest module that both vectors allow: on
     the part that belongs to an irreducible factor of chi, K is a field, and at most one c fails.

@@ -220,7 +220,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^, as in the paper: H~ is also conserved by maps of other associated systems, which are not the map x -> x^.
+        # x^, as in the paper: H~ is also conserved by the maps of associated systems, which are not the map x -> x^.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"

@@ -126,7 +126,7 @@ class ComposedMap(MapFamily):
 
     @property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names. Raises InputError if they are too long."""
+        """The coordinates of x~ as functions of `names`. Raises InputError if they are too long."""
         return self.multiplied_out.image
 
     @property

@@ -140,7 +140,7 @@ class Map(LatexDisplay):
         return self.time_step
 
     def __matmul__(self, other: Map) -> Map:
-        """Return the composition: first `other`, then this map. Raises InputError if dimension or field differ."""
+        """Return the composition: first `other`, then this map. Raises InputError if dimensions or fields differ."""
         if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
@@ -245,7 +245,7 @@ class Map(LatexDisplay):
 
 
 class ElementaryMap(Map):
-    """The map of a single equation M(x) x~ = r(x) over a field.
+    """The map of one equation M(x) x~ = r(x) over a field.
 
     `backward` returns the equation of the inverse. If it is None, the inverse exchanges the two points, which needs an
     equation of degree 1. Subclasses that compute the matrices faster (KahanMap) override these methods.
@@ -536,7 +536,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names, if M is diagonal, otherwise None."""
+        """The coordinates of x~ as functions of `names`, if M is diagonal, otherwise None."""
         if any(not entry.is_zero() for i, row in enumerate(self.rows) for j, entry in enumerate(row[:-1]) if i != j):
             return None
         return tuple(RationalFunction(-row[-1], row[i]) for i, row in enumerate(self.rows))

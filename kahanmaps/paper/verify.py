@@ -14,7 +14,7 @@ The methods of verification:
 * *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
 * *exact*: claims without x, and claims about dimensions and ranks, are evaluated over Q.
 
-In addition, claims about single blocks are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
+In addition, claims about one block are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
 over complex balls.
 """
 
@@ -131,7 +131,7 @@ def verify(
         A `Report` with one `Finding` for each claim, in the order of the paper. All but `supported` claims are exact.
 
     Raises:
-        InputError: if the system is not of kind [family], and for other m.
+        InputError: if the system is not of kind [family], and if m is not between 1 and 8.
 
     Source: petrera-suris-2016; schwartz-1980 for the bounds.
 
@@ -255,7 +255,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # At least one prime in m! splits chi, so that this fails with probability at most e^-40.
+                        # At least 1/m! of all primes split chi, so that this fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
@@ -438,7 +438,7 @@ class Verifier:
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
     def further_evidence(self, claim: Claim) -> Iterable[Evidence]:
-        """Return further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
+        """Yield additional evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
         if self.member is None or not self.member.is_generic:
             return
         rng = random.Random(f"also {self._seed} {claim.key}")

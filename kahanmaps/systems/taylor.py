@@ -24,7 +24,7 @@ def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int
     """Return balls that contain the solution x(time) with x(0) = start, of radius at most 2^-bits max |x_i(time)|.
 
     `start` and `time` are exact numbers; the time may be negative. Returns None if there is no such solution, or if it
-    comes too close to a pole. Raises InputError if the point has another dimension.
+    comes too close to a pole. Raises InputError if `start` has a wrong length.
 
     >>> [ball] = solution(QuadraticSystem.from_text(["x"], ["x^2"]), [1], "1/2")  # x = 1/(1 - t)
     >>> ball.contains(2), bool(ball.rad() < 1e-18)

@@ -109,8 +109,8 @@ class MethodEnsemble(FloatEnsemble):
     """The orbits of many initial points under a method of `METHODS` except "normal-form", with time step 2 eps.
 
     `eps` is exact. `halves` are the two groups of variables of a separable system (see `separated`), for the methods
-    that need them. All further arguments are as in FloatEnsemble. The steps of an orbit in which an implicit method
-    needed more iterations than usual count as near-singular.
+    that need them. The remaining arguments are as in FloatEnsemble. The steps of an orbit in which an implicit method
+    needed more than two iterations count as near-singular.
 
     >>> growth = QuadraticSystem.from_text(["x"], ["x"])
     >>> ensemble = MethodEnsemble(growth, "1/20", [[1]], "midpoint", kernel="numpy")

@@ -43,7 +43,7 @@ from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SAMPLED = 1000  # steps from one sample of the integrals of the planes to the next
+SAMPLE_INTERVAL = 1000  # steps from one sample of the integrals of the planes to the next
 _MAX_SCALAR_ORBITS = 4  # up to this number, machine code advances one orbit after the other
 _CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
 _RECORDED_NUMBERS = 1_000_000  # numbers in a portion of recorded points
@@ -126,7 +126,7 @@ class FloatEnsemble(AttributeHints):
         kernel: str | None = None,
         threads: int | None = None,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLED,
+        sampled: int = SAMPLE_INTERVAL,
         radius: float | None = None,
     ) -> None:
         epsilon = rational(eps)
@@ -458,7 +458,7 @@ def ensemble(
     kernel: str | None = None,
     threads: int | None = None,
     integrals: Mapping[str, Function] | None = None,
-    sampled: int = SAMPLED,
+    sampled: int = SAMPLE_INTERVAL,
     radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.

@@ -17,7 +17,7 @@ import numpy as np
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.ensemble import (
-    SAMPLED,
+    SAMPLE_INTERVAL,
     Drift,
     FloatEnsemble,
     Function,
@@ -79,7 +79,7 @@ class FloatOrbit:
         kernel: str | None = None,
         every: int = 1,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLED,
+        sampled: int = SAMPLE_INTERVAL,
     ) -> None:
         require_steps(steps)
         require_every(every)

@@ -52,7 +52,7 @@ class IntegerPoint:
     def lowest_terms(self) -> list[Fraction]:
         """Return the reduced numerator and denominator of each coordinate, with a single gcd of large numbers.
 
-        A common factor of some numerator and W is also a factor of W and the product of all numerators modulo W.
+        A common factor of a numerator and the denominator W divides W and the product of all numerators modulo W.
         """
         return _lowest_terms(self.numerators, self.denominator, _gcd_with_product(self.numerators, self.denominator))
 

@@ -107,7 +107,7 @@ class _Search:
         self.groups: Groups = [tuple(range(n))]
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(factor.integer_steps.is_triangular for factor in factors):
-            # Each coordinate must be a copy of a new coordinate some steps before; coordinates must not only permute.
+            # Each coordinate must be new, or equal to one that was new at an earlier step; they must not only permute.
             earlier: list[list[int | None]] = [[None] * n for _ in range(stride)]
             for k, copied_coordinates in enumerate(earlier):
                 # The index of the equal coordinate of the point, for each coordinate of the image that is a copy.
@@ -132,7 +132,7 @@ class _Search:
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
-        """Return the numbers of all new groups; None if no curves exist or the numbers are too long."""
+        """Return the numbers of all new groups; None if no curves exist or `max_primes` primes do not suffice."""
         residues = from_residues(self._numbers_modulo, max_primes)
         if residues is None:
             return None

@@ -116,7 +116,7 @@ def _section_basis(points: Rows, sections: Sections, prime: int) -> Rows | None:
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
     # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
-    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g.
+    # factors 1 (the last coordinate) and a linear form without zeros in common with it suffice for g.
     all_products = _products_of_coordinates(points, coordinates, count, lag, prime)
     values = [[row[k] for k in sections.products] for row in all_products]
     product_matrix = matrix(values[: sections.rows], prime)

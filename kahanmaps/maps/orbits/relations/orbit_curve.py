@@ -200,7 +200,7 @@ def orbit_curve(
         map_over: the map.
         start: the initial point, exact.
         family, integrals: the map for every eps, and its claimed integrals. In the plane, the level curves of proved
-            integrals are used for orbits that are periodic or special.
+            integrals are used for orbits whose points determine no curve.
 
     Raises UnknownCurve if no curve is found, InputError if the orbit is finite or the map is not over Q.
 
@@ -323,7 +323,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return enough points to recognize a period, which ends them, or a rational curve; None follows if too long."""
+    """Return the points that show a period (which ends them) or a rational curve; None follows if too long."""
     dim = map_over.dim
     map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
