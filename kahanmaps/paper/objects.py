@@ -63,7 +63,7 @@ class PaperObjects:
     step_eps: Any = None
     method: str = "kahan"
     error_of_second: Any = None
-    used: set[str] = field(default_factory=set)
+    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if these are
     _cache: dict[Any, Any] = field(default_factory=dict)
     A: Any
     d3H: Any

@@ -207,7 +207,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
+        """Return a finding for each claim; or with controls, one for each control of each claim, and one for all."""
         sections = self.options.sections
         applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]

@@ -149,7 +149,7 @@ class LevelCubic:
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
         """Return whether P is a multiple of T, whose order is `order`; None if this is not decided.
 
-        If `order` P is not zero, it is not. Otherwise, for every prime l that divides both the order of T and the index
+        If `order` P is not zero, P is none. Otherwise, for every prime l that divides both the order of T and the index
         of its multiples in the group, one discrete logarithm compares the parts of P and T of l-power order; for other
         primes no comparison is needed.
         """

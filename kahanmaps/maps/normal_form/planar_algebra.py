@@ -44,7 +44,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer divisible by small primes, and by those modulo which the start or image may have only zeros."""
+        """An integer divisible by small primes, and by those modulo which the start or its image may be (0, 0, 0)."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant

@@ -172,7 +172,7 @@ class OrbitInPlanes:
 
 
 def _halve_above(n: int, step: int) -> int:
-    """Return the least of n, n/2, n/4, ..., rounded down, that is above `step`: a table for n contains its value."""
+    """Return the least of n, n/2, n/4, ..., rounded down, above `step`: a tau table for n contains its value."""
     while n >> 1 > step:
         n >>= 1
     return n

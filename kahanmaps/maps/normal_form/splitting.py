@@ -1,4 +1,4 @@
-"""The planes into which the normal form splits over a field, and the conversion of points to planes and back.
+"""The planes into which the normal form over K = Q[t]/chi splits over a field, and the conversion of points.
 
 Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g. Over GF(p) there is one for
 each factor of chi modulo p, with coordinates in GF(p^deg g). Over real balls there is one for each real root, and one,

@@ -38,7 +38,7 @@ _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then hold
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    The points between n/2 and n would need more memory.
+    After P_n the terms of both sequences are kept from the index n/2 - 4 on.
     """
     table = table_near(block)
     if table is None:

@@ -22,7 +22,7 @@ class _Row:
     """A row of the equation: the exponents of p_k and q_k in each monomial, and the coefficients of the entries."""
 
     unknown: int
-    earlier_unknowns: tuple[int, ...]
+    earlier_unknowns: tuple[int, ...]  # the unknowns in the row that are solved before
     powers: tuple[tuple[tuple[int, int, int], ...], ...]
     entries: fmpz_mat  # rows: coefficients of the unknown and of the solved coordinates, then the right-hand side
     divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row

@@ -120,7 +120,7 @@ class Family:
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
     def coefficients(self, members: Members, eps: fmpq | None, numpy_rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return the coefficients of the equation, an array (members, 2, places)."""
+        """Return the coefficients of the equation in GF(p^2), an array (members, 2, coefficients)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):
             eps_values = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
