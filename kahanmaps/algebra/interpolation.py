@@ -97,8 +97,8 @@ class SampledValues:
                 if self.samples.length is None:
                     self.samples.length = len(values)
                 if len(values) != self.samples.length:
-                    lengths = f"{self.samples.length} and {len(values)}"
-                    raise InputError(f"found values of lengths {lengths}, expected equally many at all points")
+                    lengths_text = f"{self.samples.length} and {len(values)}"
+                    raise InputError(f"found values of lengths {lengths_text}, expected equally many at all points")
                 self.points.append(point)
                 self.values.append(values)
                 self._monomial_values.append({})

@@ -484,7 +484,7 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
 class _Arithmetic:
     """The operations in one expression; each raises an error before its result would exceed a limit.
 
-    The argument `pieces` alternates between operands and the tokens of the operators between them.
+    `pieces` alternates between operands and tokens of operators; `quotients` says whether divisors may have variables.
     """
 
     def __init__(

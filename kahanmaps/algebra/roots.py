@@ -145,8 +145,8 @@ class Root:
         return hash(str(self))
 
     def __repr__(self) -> str:
-        near = f" near {self._near_text}" if self._near_text else ""
-        return f"root of {format_univariate(self.polynomial)}{near}"
+        near_text = f" near {self._near_text}" if self._near_text else ""
+        return f"root of {format_univariate(self.polynomial)}{near_text}"
 
 
 class AlgebraicPoint(NamedTuple):

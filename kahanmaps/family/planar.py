@@ -371,7 +371,7 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
         terms = [c for c in coefficient.coeffs() if c != 0]
         is_negative = all(c < 0 for c in terms)
         element = format_univariate(-coefficient if is_negative else coefficient)
-        factor = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
+        factor_text = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
         sign = "-" if is_negative else "+"
-        text += f" {sign} {factor}{monomial}" if text else f"{'-' if is_negative else ''}{factor}{monomial}"
+        text += f" {sign} {factor_text}{monomial}" if text else f"{'-' if is_negative else ''}{factor_text}{monomial}"
     return text or "0"

@@ -379,8 +379,8 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     if numerator.is_zero():
         text = format_rational_function(phi)
         value_text = "0/0" if denominator.is_zero() else "identically 0"
-        eps_and_root = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
-        explanation = f", which is {value_text} at {eps_and_root}" if text != "0" else ""
+        eps_and_root_text = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        explanation = f", which is {value_text} at {eps_and_root_text}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if explanation else text}{explanation}, "
             "expected a function that is not zero: the measure is dx/phi"

@@ -82,9 +82,9 @@ class Map(LatexDisplay):
             return known_flows[0][0], sum((time for _, time in known_flows), self.field.zero)
 
     def __repr__(self) -> str:
-        eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
-        step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
-        return f"Map({', '.join(self.variables)}; {eps}{step}, over {self.field})"
+        eps_text = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
+        time_step_text = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
+        return f"Map({', '.join(self.variables)}; {eps_text}{time_step_text}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
         """Return the map as plain data; eps is None for factors with different eps, time_step if there is no flow."""
@@ -235,9 +235,9 @@ class Map(LatexDisplay):
         coordinates_text = ",".join(self.field.format(entry) for entry in point)
         if len(coordinates_text) > 200:
             coordinates_text = f"{coordinates_text[:100]}...{coordinates_text[-80:]}"
-        at_eps = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
+        eps_text = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{at_eps}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{eps_text}: "
             "the map is not defined there",
             point,
             self.eps,
@@ -337,8 +337,8 @@ class ElementaryMap(Map):
         return IntegerSteps(equation.exponents, equation.terms)
 
     def __repr__(self) -> str:
-        eps = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
-        return f"{type(self).__name__}({', '.join(self.variables)}; {eps}over {self.field})"
+        eps_text = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
+        return f"{type(self).__name__}({', '.join(self.variables)}; {eps_text}over {self.field})"
 
 
 def det_of(name: str) -> str:

@@ -92,7 +92,7 @@ class VerifyOptions:
     sections: tuple[int, ...] | None = None
     order: int = 3
     ball_bits: int | None = None
-    controls: bool = False
+    controls: bool = False  # whether the controls of the claims are evaluated instead of the claims
     beyond: bool = False  # only the statements of section 10 about variations
 
     def __post_init__(self) -> None:
@@ -380,14 +380,14 @@ class Verifier:
             point_count += 1
             if outcome.holds and outcome.pairs:
                 point_text = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
-                method = "exact rational point" if objects.K is QQ else "point over GF(p)"
+                method_text = "exact rational point" if objects.K is QQ else "point over GF(p)"
                 text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {point_text}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
-                return self._finding(claim, verdict, Evidence(method, text, {"points": point_count}))
+                return self._finding(claim, verdict, Evidence(method_text, text, {"points": point_count}))
             if point_count >= _POINT_COUNT:
                 break
         if outcome is None or not outcome.pairs:
@@ -434,8 +434,8 @@ class Verifier:
         if not outcome.holds:
             text = f"{claim.place}: {claim.title}: the two sides are different functions for this member"
             raise Contradiction(text, witness_of(outcome))
-        scope = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
-        return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
+        scope_text = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
+        return Evidence("symbolic", f"both sides are the same function of {scope_text}, multiplied out for this member")
 
     def further_evidence(self, claim: Claim) -> Iterable[Evidence]:
         """Yield additional evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""

@@ -46,11 +46,11 @@ class Closure:
     @property
     def text(self) -> str:
         """The result as one line."""
-        answer = "not dense" if self.is_dense is False else "dense"
+        answer_text = "not dense" if self.is_dense is False else "dense"
         zariski_text = (
             f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
         )
-        return f"{answer} in the real components that it visits ({self.status}: {self.reason}){zariski_text}"
+        return f"{answer_text} in the real components that it visits ({self.status}: {self.reason}){zariski_text}"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

@@ -199,19 +199,19 @@ class LevelGeometry(PrintableResult):
     def text(self) -> str:
         lines = [line for plane in self.planes for line in plane.lines()]
         if self.rank is not None:
-            where = "over the splitting field of chi they " if any(p.degree > 1 for p in self.planes) else ""
-            lines.append(f"commuting maps\t{where}generate a group of translations of rank {self.rank} (proved)")
+            field_text = "over the splitting field of chi they " if any(p.degree > 1 for p in self.planes) else ""
+            lines.append(f"commuting maps\t{field_text}generate a group of translations of rank {self.rank} (proved)")
         if self.components is not None:
-            visits = {1: "", 2: ", the orbit visits both in turn"}
-            in_turn = visits.get(self.components, ", the orbit visits two of them in turn")
-            lines.append(f"real components\t{self.components}{in_turn}")
+            visits_texts = {1: "", 2: ", the orbit visits both in turn"}
+            visits_text = visits_texts.get(self.components, ", the orbit visits two of them in turn")
+            lines.append(f"real components\t{self.components}{visits_text}")
         if self.closure is not None:
             lines.append(f"orbit\t{self.closure.text}")
         if self.height_constant is not None:
-            reason = (
+            condition_text = (
                 "" if sum(plane.degree for plane in self.planes) == 1 else ", if planes have no long common factors"
             )
-            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically{reason}")
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically{condition_text}")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:

@@ -75,8 +75,8 @@ class PlanePeriod:
     @property
     def text(self) -> str:
         """The result as one line."""
-        result = f"period {self.period}" if self.period is not None else self.status
-        return f"{self.name}: {result} ({self.kind}{'; ' + self.reason if self.reason else ''})"
+        result_text = f"period {self.period}" if self.period is not None else self.status
+        return f"{self.name}: {result_text} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
 
 @dataclass(frozen=True)

@@ -190,8 +190,8 @@ class Orbit(HtmlDisplay):
         self._rational_orbit: RationalOrbit | None = None
 
     def __repr__(self) -> str:
-        state = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
-        return f"<Orbit: {state if self.end is None else self.end.text}>"
+        state_text = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
+        return f"<Orbit: {state_text if self.end is None else self.end.text}>"
 
     @property
     def relations(self) -> str | None:
@@ -353,11 +353,11 @@ def _bits_of_digits(max_digits: int | None) -> int | None:
 
 def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
     """Return a sentence saying that a step, perhaps one before the requested step, exceeds the budget."""
-    limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
+    limit_text = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
     size_text = "would have longer numbers"
     if bits is not None:
         size_text = f"has numbers of {counted(_digits_of_bits(bits), 'digit')}, more"
-    text = f"step {step} {size_text} than {limit}"
+    text = f"step {step} {size_text} than {limit_text}"
     return text if requested is None or requested == step else f"step {requested} cannot be reached: {text}"
 
 

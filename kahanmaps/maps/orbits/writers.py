@@ -261,8 +261,8 @@ class Npz(Writer):
             self._rows.close()
             return
         # The numbers of iterates computed directly may exceed 64 bits.
-        fits_int64 = max(self._steps, default=0) < 2**63
-        steps: list[Any] = self._steps if fits_int64 else [str(step).encode() for step in self._steps]
+        has_int64_steps = max(self._steps, default=0) < 2**63
+        steps: list[Any] = self._steps if has_int64_steps else [str(step).encode() for step in self._steps]
         n = len(self._x)
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:

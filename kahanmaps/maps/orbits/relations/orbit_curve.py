@@ -150,12 +150,12 @@ class OrbitCurve(PrintableResult):
                 f"  canonical height\t{self.height.str(12)}",
             ]
             visits = {1: "", 2: ", the orbit stays on one" if self.steps == 1 else ", the orbit visits both in turn"}
-            side = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
+            side_texts = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
             n = self.components or 1
-            lines.append(f"  real components\t{n}{visits[n]}{side[n]}")
+            lines.append(f"  real components\t{n}{visits[n]}{side_texts[n]}")
         if self.trace is not None:
-            kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
-            lines.append(f"  multiplier\t{kind}, infinite order (proved)")
+            multiplier = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
+            lines.append(f"  multiplier\t{multiplier}, infinite order (proved)")
         if self.rotation is not None:
             note = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
             lines.append(f"  rotation number\t{self.rotation.str(12)}{note}")
