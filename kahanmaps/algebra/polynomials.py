@@ -40,7 +40,7 @@ from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 
-_MAX_FACTORED_TERMS = 100_000
+_MAX_FACTORED_TERMS = 100_000  # polynomials with more terms are not factored
 
 
 def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:

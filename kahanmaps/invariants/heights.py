@@ -58,10 +58,10 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd,
 from kahanmaps.maps.orbits.methods import choose_method
 
 MIN_HEIGHTS = 9  # needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
-_MIN_EXPONENTIAL_HEIGHTS = 6
-_MIN_LOGARITHMIC_HEIGHTS = 32
+_MIN_EXPONENTIAL_HEIGHTS = 6  # number of heights needed for exponential growth
+_MIN_LOGARITHMIC_HEIGHTS = 32  # number of heights needed for logarithmic growth
 _MAX_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
-_MAX_SHOWN_HEIGHTS = 20
+_MAX_SHOWN_HEIGHTS = 20  # number of heights in the plain data of a result
 _NO_NORMAL_FORM = NoNormalForm("none was given")
 
 

@@ -67,7 +67,7 @@ from kahanmaps.paper.registry import (
 )
 from kahanmaps.version import __version__
 
-MAX_M = 8
+MAX_M = 8  # largest m, half the dimension
 # Maximal number of products of terms in a proof: enough for all claims up to m = 6; at m = 8 a few claims exceed it.
 PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # in a proof for one member

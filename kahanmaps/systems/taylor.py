@@ -17,7 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _MAX_STEPS = 200  # if more steps are needed, the solution is close to a pole
-_MAX_BITS = 2048
+_MAX_BITS = 2048  # largest working precision
 
 
 def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int = 64) -> list[arb] | None:

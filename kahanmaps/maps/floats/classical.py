@@ -60,7 +60,7 @@ METHODS = {
     "suzuki4": Method("Kahan, Suzuki 4", 4, 5, 5),
     "yoshida6": Method("Kahan, Yoshida 6", 6, 7, 7),
 }
-SEPARABLE = {"symplectic-euler", "stormer-verlet"}
+SEPARABLE = {"symplectic-euler", "stormer-verlet"}  # methods for systems with positions and momenta only
 
 _TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods
     "euler": ([[]], [1.0]),
@@ -72,7 +72,7 @@ _IMPLICIT: dict[str, tuple[list[list[float]], list[float]]] = {
     "midpoint": ([[0.5]], [2.0]),
     "gauss4": ([[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]], [-_ROOT3, _ROOT3]),
 }
-IMPLICIT = set(_IMPLICIT)
+IMPLICIT = set(_IMPLICIT)  # names of the implicit methods
 # The coefficients of solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
 _YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
 

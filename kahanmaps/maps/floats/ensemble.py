@@ -50,7 +50,7 @@ _RECORDED_NUMBERS = 1_000_000  # numbers in a portion of recorded points
 
 # A function of a point; if it has a true attribute `of_arrays`, it is a function of many points (n, dim).
 Function = Callable[[Any], Any]
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # probabilities of the quantiles in `distribution`
 
 
 @dataclass(frozen=True, eq=False)

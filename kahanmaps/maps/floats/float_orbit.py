@@ -161,7 +161,7 @@ class FloatOrbit:
 
 
 _MIN_COMPILED_STEPS = 20_000  # for fewer steps, compiling takes longer than it saves
-_NO_LIMIT = 1 << 62
+_NO_LIMIT = 1 << 62  # the number of steps of an orbit without a limit
 
 
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:

@@ -11,7 +11,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # If a common divisor has fewer bits than this, dividing every entry by it takes longer than it saves.
 _USEFUL_BITS = 64
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which a determinant is shown not to be 0
 
 
 def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz) -> IntegerPoint | None:

@@ -18,7 +18,7 @@ _LONG_BITS = 3000
 _SHORT_BITS, _SHORT_PART = 64, 64
 # ... until the numbers have become this many times as long as at the last division.
 _MAX_RATIO = 8
-_SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8
+_SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8  # the primes below 50, each with the exponent 8
 
 
 class IntegerPoint:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
-DEFAULT_MAX_DIGITS = 200_000
+DEFAULT_MAX_DIGITS = 200_000  # decimal digits of the integers of a point over one common denominator
 LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits is larger
 FIRST_POINTS = 3  # number of points at the beginning that an orbit stores
 _DIGITS_PER_BIT = 0.30103

@@ -25,7 +25,7 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
-MAX_DIMENSION = 6
+MAX_DIMENSION = 6  # largest number of variables of a map
 NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
 _CHUNK_SIZE = 128  # members measured in one call of the kernel
 LONG = 200  # number of members from which on compiling saves time

@@ -23,7 +23,7 @@ from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, cla
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
-_MAX_ONES = 7
+_MAX_ONES = 7  # numbers that are 1 in a counterexample
 _NEGATION = "not "
 
 Slot = tuple[str, tuple[int, ...]]  # a number that may be 1: "H", exponents; "J", index pair; "x", one index

@@ -30,7 +30,7 @@ from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, Elliptic
 from kahanmaps.maps.orbits.relations.sections import common_primes
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
-_MAX_PRIMES = 100
+_MAX_PRIMES = 100  # number of primes from which the coefficients are computed
 _BITS_PER_PRIME = 100  # bits of the points for each prime: the coefficients must be shorter than the points
 _MAX_FACTORS = 8  # of the shortest sequence of factors that a composition repeats
 _SKIPPED_STEPS = 3  # for a special initial point: terms of U near the beginning may be 0, like W(0)

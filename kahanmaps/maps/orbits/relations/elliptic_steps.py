@@ -18,7 +18,7 @@ from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.sections import exponents
 from kahanmaps.maps.somos import Terms
 
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which skipped points are shown to exist
 
 
 class EllipticSteps:

@@ -15,7 +15,7 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.maps.somos import around
 
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which independent products are chosen
 
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
