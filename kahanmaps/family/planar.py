@@ -350,7 +350,7 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
 
 
 def _krylov_matrix(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
-    """Return the matrix with the columns v, t v, ..., t^{m-1} v."""
+    """Return the matrix with the columns v, t v, ..., t^{m-1} v for v = `vector`."""
     columns = [vector]
     for _ in range(t.nrows() // 2 - 1):
         columns.append(t * columns[-1])

@@ -148,7 +148,7 @@ class Equation:
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """Return the equation of (M | -r) over a field, at the values `point` of the symbols and eps.
+    """Return the equation with the `rows` of (M | -r) over a field, at the values `point` of the symbols and eps.
 
     Raises BadPrime if a coefficient has no reduction.
     """

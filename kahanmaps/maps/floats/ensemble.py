@@ -262,7 +262,7 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
+        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
             current_drift = self._blocks.distances(self._batch.z, self._initial_values)

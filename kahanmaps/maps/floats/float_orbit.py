@@ -125,7 +125,7 @@ class FloatOrbit:
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
+        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
         return tuple(drift.of(0) for drift in self._ensemble.drift)
 
     def interrupt(self) -> None:

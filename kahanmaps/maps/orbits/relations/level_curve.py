@@ -36,7 +36,7 @@ def is_conserved(family: MapFamily, eps: fmpq, integral: RationalFunction) -> bo
 def level_curve(
     integral: RationalFunction, eps: fmpq, points: Sequence[tuple[fmpq, ...]]
 ) -> tuple[EllipticCurve, AffinePoint, fmpq_mpoly] | None:
-    """Return the curve on which an orbit lies, the difference of successive points, and F.
+    """Return the curve on which an orbit lies, the difference of successive points, and its polynomial F.
 
     Args:
         integral: a function of two variables and eps that the map conserves.
