@@ -115,7 +115,7 @@ class BoundField(Field):
         return owner_and_index[1]
 
     def product(self, powers: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of a product of denominators."""
+        """Return the size of the product of D_i^k over the pairs i: k of `powers`, D_i the i-th denominator."""
         total = ONE
         for index, power in powers.items():
             total = total * self._denominators[index] ** power
@@ -177,7 +177,7 @@ class Bound(Element):
         self.is_common = False
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of the numerator over a larger denominator, a multiple of the present one."""
+        """Return the size of the numerator if the fraction is expanded to this multiple of its denominator."""
         missing_exponents = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
         return self.numerator * self.field.product(missing_exponents) * CoefficientSize(0, log2(scale // self.scale))
 
@@ -282,10 +282,10 @@ def log2(value: fmpz | int) -> float:
 
 
 def _lcm_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the least common multiple of two products of powers of denominators, as exponents by denominator."""
+    """Return the least common multiple of two products of powers, given as {index of a denominator: exponent}."""
     return {index: max(left.get(index, 0), right.get(index, 0)) for index in {*left, *right}}
 
 
 def _product_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the product of two products of powers of denominators, as exponents by denominator."""
+    """Return the product of two products of powers, given as {index of a denominator: exponent}."""
     return {index: left.get(index, 0) + right.get(index, 0) for index in {*left, *right}}

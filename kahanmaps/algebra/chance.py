@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction
 
-PRIME_BITS = 62
+PRIME_BITS = 62  # random primes are at least 2^62 and below 2^63
 
 
 def derive_seed(seed: int, *data: Any) -> int:
@@ -67,7 +67,7 @@ def _encode(value: Any) -> str:
 
 
 def random_prime_field(rng: random.Random) -> PrimeField:
-    """Return GF(p) for a prime p drawn uniformly from [2^62, 2^63), the largest primes that fit into FLINT's nmod."""
+    """Return GF(p) for a prime p drawn uniformly from [2^62, 2^63): for larger p, `PrimeField` is slower."""
     while True:
         candidate = rng.getrandbits(PRIME_BITS) | (1 << PRIME_BITS)
         if candidate % 2 and fmpz(candidate).is_prime():

@@ -1,7 +1,7 @@
 """Dual numbers K[d]/(d^2) over any field K: exact derivatives of computations with field operations.
 
 f(x + d v) = f(x) + d f'(x) v, so the slope (the coefficient of d) is the derivative at x in direction v. K may itself
-be a ring of dual numbers: the slope of the slope of f((x + v d) + (w + 0 d) e) is then the second derivative. A matrix
+be a ring of dual numbers: if e^2 = 0, the coefficient of d e in f(x + d v + e w) is the second derivative. A matrix
 M0 + d M1 is stored as two matrices over K; FLINT computes products and linear systems if K has FLINT matrices.
 """
 

@@ -19,9 +19,9 @@ AffinePoint = tuple[Any, Any]
 MAX_BITS = 1 << 15  # maximal precision of the balls in which heights and rotation numbers are computed
 _ACCURACY = 1e-15  # requested accuracy of rotation numbers and heights
 _HEIGHT_TERMS = 40  # terms of the series for a height; they decrease like 4^-n
-_EXACT_TERMS = 4
+_EXACT_TERMS = 4  # the first terms of this series, computed without a modulus
 _MAX_TORSION = 12  # the largest order of a rational torsion point (mazur-1977)
-_MAX_PRIME_BITS = 20  # maximal size of the primes by which the coefficients of a model are reduced
+_MAX_PRIME_BITS = 20  # maximal size of the primes whose powers are removed from the coefficients of a model
 
 
 class EllipticCurve:
@@ -120,9 +120,9 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     """Return the canonical height of a point over Q as a ball, normalized to half the height of its x-coordinate.
 
     The height is computed by Tate's series. In a doubling, the height of x differs from 4 times its former value by a
-    bounded amount. The archimedean part of this amount is a real number, the other parts come from the common factor of
-    two forms of degree 4. This factor divides the resultant R of the forms, so that coordinates modulo a power of R
-    determine it. The remainder of the series is bounded by the sizes of the forms and of R.
+    bounded amount. Its archimedean part is computed in balls; the other parts come from the common factor of the values
+    of the two forms of degree 4 that double a point (X : Z). This factor divides the resultant R of the forms, so that
+    X and Z modulo a power of R determine it. The remainder of the series is bounded by the sizes of the forms and of R.
 
     Raises PrecisionLost if 32768 bits do not suffice.
 

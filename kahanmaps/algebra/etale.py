@@ -149,8 +149,8 @@ class EtaleElement(Element):
             return EtaleElement(self.field, fmpq_poly(solution.entries()))
         gcd, inverse, _ = other.polynomial.xgcd(self.field.chi)
         if gcd.degree() != 0:
-            divisor = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
-            raise ZeroDivisionError(f"division by {divisor}")
+            divisor_text = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
+            raise ZeroDivisionError(f"division by {divisor_text}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
 
     def _equals(self, other: EtaleElement) -> bool:

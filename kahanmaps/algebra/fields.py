@@ -28,7 +28,7 @@ from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
 # FLINT proves primality of 512 bits in about 0.1 s; for more bits the cost grows steeply.
 MAX_PRIME_BITS = 512
-MAX_BALL_BITS = 1_000_000
+MAX_BALL_BITS = 1_000_000  # largest precision of balls
 
 
 def rational(value: Any) -> fmpq:

@@ -43,7 +43,7 @@ def coprime_part(number: fmpz, power: fmpz) -> fmpz:
 
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
-    """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 is (0, 1)."""
+    """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 into (0, 1)."""
     prime_part = fmpz(1)
     if number == 0:
         return number, prime_part
@@ -70,7 +70,7 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
-    """Whether a gcd with `power` has the full multiplicity of its primes: `power` contains each one more often."""
+    """Whether gcd(n, `power`) contains its primes as often as n: `power` contains each more often than the gcd."""
     cofactor = power // gcd
     while gcd != 1:
         common_factor = gcd.gcd(cofactor)

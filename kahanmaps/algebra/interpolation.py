@@ -1,14 +1,14 @@
 """Interpolation of rational functions over Q from few values modulo primes.
 
-A black box is a function that returns, for a prime p and a point of GF(p)^s, a vector of numbers modulo p. The aim is
-to find the rational functions of s symbols that have these values. Modulo one prime:
+A black box is a function that returns, for a prime p and a point of GF(p)^n, a vector of numbers modulo p. The aim is
+to find the rational functions of n symbols that have these values. Modulo one prime:
 
-    axes    On each axis through a random point (the anchor), every entry is a fraction of two polynomials. The
+    axes    On each axis through a random point (the anchor), every entry is a fraction N/D of two polynomials. The
             fraction of least degree that fits the values is computed; one value more than needed is a check. The
             exponents of each symbol are read off, so that functions of eps^2 are recognized early.
     stages  Symbols are added one by one, while the remaining ones stay at the anchor. The possible monomials are those
     of the previous stage times the exponents of the new symbol, up to a total degree known from a random line. The
-    linear system N(s_k) - v_k D(s_k) = 0 gives the coefficients, hence the monomials. One further value must agree.
+    linear system N(s_k) - v_k D(s_k) = 0 for values v_k at points s_k gives the coefficients. One value is a check.
 
 All values computed so far are reused as equations, and entries with the same denominator share its unknowns. Modulo
 further primes the monomials are known. The coefficients follow by the Chinese remainder theorem, and the functions must
@@ -37,7 +37,7 @@ __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reco
 
 _MAX_UNLUCKY_PRIMES = 3  # after this number of failures the black box is declared not rational
 # One value modulo each of these new primes; a black box like the Legendre symbol passes each with probability 1/2.
-_CONFIRMATIONS = 5
+_CONFIRMING_PRIMES = 5
 
 
 Point = tuple[int, ...]
@@ -67,7 +67,7 @@ class Samples:
     length: int | None = None
 
     def check(self, needed: int = 0) -> None:
-        """Raise Stop if `needed` further values exceed the limit or the budget is spent."""
+        """Raise Stop if `needed` values, added to those so far, exceed the limit, or if the budget is spent."""
         if self.calls + needed > self.max_samples:
             raise Stop(f"{self.calls} values requested and {needed} more needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
@@ -97,8 +97,8 @@ class SampledValues:
                 if self.samples.length is None:
                     self.samples.length = len(values)
                 if len(values) != self.samples.length:
-                    lengths = f"{self.samples.length} and {len(values)}"
-                    raise InputError(f"found values of lengths {lengths}, expected equally many at all points")
+                    lengths_text = f"{self.samples.length} and {len(values)}"
+                    raise InputError(f"found values of lengths {lengths_text}, expected equally many at all points")
                 self.points.append(point)
                 self.values.append(values)
                 self._monomial_values.append({})
@@ -110,7 +110,7 @@ class SampledValues:
     def random_points(
         self, nvars: int, rng: random.Random, fixed: Mapping[int, int] = NONE_FIXED
     ) -> Callable[[], Point]:
-        """Return a function that draws random points with some coordinates fixed."""
+        """Return a function that draws random points; `fixed` maps indices of coordinates to fixed values."""
         return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(nvars))
 
     def monomials(self, k: int, exponents: Sequence[Exponents]) -> list[int]:
@@ -200,7 +200,7 @@ def reconstruct(
         names: the symbols. Without symbols, the numbers themselves are reconstructed from their residues.
         seed: the random seed of primes (of 61 bits) and points.
         max_degree: the sum of the degrees of numerator and denominator on any line is at most twice this number.
-        max_samples: the maximal number of calls.
+        max_samples: the maximal number of calls of the black box.
         budget: the work limit, checked between calls; None means no limit.
         draw: a function that draws a random prime, for black boxes that accept only some primes.
 
@@ -344,7 +344,7 @@ def _interpolate_on_line(
         nodes.append(t)
         return tuple((a + (t - t0) * d) % p for a, d in zip(anchor, direction, strict=True))
 
-    # Newton's form: a further point adds one term to each polynomial. The degrees are not known in advance, so points
+    # Newton's form: each new point adds one term to each polynomial. The degrees are not known in advance, so points
     # are taken one by one until all fractions are determined.
     entries = range(len(values.values[0]))
     node_polynomial = nmod_poly([-t0, 1], p)
@@ -412,7 +412,7 @@ def fit(
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
-    """Fit fractions of these shapes to all values but the last, which must agree; compute further values as needed.
+    """Fit fractions of these shapes to all values but the last, which must agree; compute missing values first.
 
     With `fixed` coordinates only points with these coordinates are used.
     """
@@ -445,9 +445,9 @@ def _solve(
     known_denominator: Quotient | None,
     quotients: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of entries with one denominator (known or not), and store them in `quotients`.
+    """Solve for the fractions of entries that share one denominator, and store them in `quotients`.
 
-    Returns the number of further values needed, 0 on success. Raises Unlucky if there is no solution.
+    Returns the number of missing values, 0 on success. Raises Unlucky if there is no solution.
     """
     p = values.prime
     values.samples.check()
@@ -505,7 +505,7 @@ def _solve(
     return 0
 
 
-# -- modulo further primes ---------------------------------------------------------------------------------------------
+# -- modulo the next primes --------------------------------------------------------------------------------------------
 
 
 def _lift(
@@ -515,7 +515,7 @@ def _lift(
     primes: list[int],
     rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
-    """Lift the functions to Q. Raises Unlucky if values modulo other primes disagree."""
+    """Lift the functions to Q. Raises Unlucky if values modulo the next primes disagree with them."""
     modulus, context = primes[-1], ring(names)
     shapes = {i: quotient.shape for i, quotient in enumerate(quotients)}
     residues = [[*quotient.numerator, *quotient.denominator] for quotient in quotients]
@@ -568,7 +568,7 @@ def _find_counterexample(
     functions: Sequence[RationalFunction], sample_new_prime: Callable[[], SampledValues], rng: random.Random
 ) -> SampledValues | None:
     """Compare the functions with the black box modulo new primes; return the values modulo the first that disagrees."""
-    for _ in range(_CONFIRMATIONS):
+    for _ in range(_CONFIRMING_PRIMES):
         values = sample_new_prime()
         values.take(values.random_points(len(functions[0].names) if functions else 0, rng))
         field = GF(values.prime)

@@ -88,7 +88,7 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
 
 
 def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLimits) -> fmpq:
-    """Parse the number in `text[start:end]`; errors give the column in the complete text."""
+    """Parse the number in `text[start:end]`, of at most `digits` digits; errors give the column in all of `text`."""
     while start < end and text[start] in BLANKS:
         start += 1
     while start < end and text[end - 1] in BLANKS:
@@ -226,7 +226,7 @@ def parse_polynomial(
     *,
     limits: ExpressionLimits = LIMITS,
 ) -> fmpq_mpoly:
-    """Parse a polynomial in `ring(variables)`; `constants` maps further names to their values.
+    """Parse a polynomial in `ring(variables)`; `constants` maps names other than variables to values.
 
     Division by a nonconstant polynomial is an error, even if it would leave no remainder (`x^2/x`).
     Raises `ExpressionError` with the column of the mistake; `InputError` for invalid names or inexact constants.
@@ -484,7 +484,7 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
 class _Arithmetic:
     """The operations in one expression; each raises an error before its result would exceed a limit.
 
-    The argument `pieces` alternates between operands and the tokens of the operators between them.
+    `pieces` alternates between operands and tokens of operators; `quotients` says whether divisors may have variables.
     """
 
     def __init__(
@@ -704,7 +704,7 @@ class _Arithmetic:
             raise self.error_at(f"found {operation} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend_words(self, terms: int, bits: int, column: int) -> None:
-        """Count the machine words of `terms` terms whose coefficients have this number of bits."""
+        """Count the machine words of `terms` terms whose coefficients have `bits` bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
             raise self.error_at("found an expression that takes too much work to expand: simplify or split it", column)

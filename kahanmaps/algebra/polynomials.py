@@ -40,7 +40,7 @@ from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 
-_MAX_FACTORED_TERMS = 100_000
+_MAX_FACTORED_TERMS = 100_000  # polynomials with more terms are not factored
 
 
 def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
@@ -337,7 +337,7 @@ class RationalFunction(LatexDisplay):
     def __call__(self, *point: Any, **named: Any) -> Any:
         """Return the value at a point: exact for exact numbers, rounded if a coordinate is a float, None at a pole.
 
-        The arguments are the values of `names`, in this order. The variables may be given as one point, I(x, eps) or
+        The arguments are the values of `names`, in order. For a function I the variables may be one point, I(x, eps) or
         I("1,2", eps), and each name as a keyword: I(x, eps="1/10"), I(x, h="1/5"), I({"x": 1, "y": 2}, eps).
         For several points, such as an orbit, the result is the array of values; for float points, NaN marks a pole.
         """

@@ -94,16 +94,16 @@ def format_rational_function(function: RationalFunction) -> str:
     """
     if not isinstance(function, RationalFunction):
         raise wrong_kind(function, "a RationalFunction", "make one with parse_rational_function")
-    numerator = format_polynomial(function.numerator)
+    numerator_text = format_polynomial(function.numerator)
     if function.numerator.is_zero() or function.denominator.is_one():
-        return numerator
-    denominator = format_polynomial(function.denominator)
+        return numerator_text
+    denominator_text = format_polynomial(function.denominator)
     if len(function.numerator) > 1:
-        numerator = f"({numerator})"
+        numerator_text = f"({numerator_text})"
     # Brackets are needed unless the denominator is a name or a power of one; a/2*y would be read as a*y/2.
-    if any(sign in denominator for sign in "*+- "):
-        denominator = f"({denominator})"
-    return f"{numerator}/{denominator}"
+    if any(sign in denominator_text for sign in "*+- "):
+        denominator_text = f"({denominator_text})"
+    return f"{numerator_text}/{denominator_text}"
 
 
 def format_factored(function: RationalFunction) -> str:
@@ -119,7 +119,7 @@ def format_factored(function: RationalFunction) -> str:
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
-    """Factor a function: return primitive polynomials with exponents, and a number; None if the text is not shorter.
+    """Factor a function: return primitive polynomials with exponents, and a number; None if that is no shorter text.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
     Common factors of numerator and denominator are canceled.
@@ -346,13 +346,13 @@ def json_float(value: Any) -> float | str:
 
 def all_fields(value: Any) -> dict[str, Any]:
     """Return all fields of a dataclass as plain data, nested dataclasses included."""
-    return {f.name: _deep(getattr(value, f.name)) for f in fields(value) if f.name[0] != "_"}
+    return {f.name: _field_data(getattr(value, f.name)) for f in fields(value) if f.name[0] != "_"}
 
 
-def _deep(value: Any) -> Any:
+def _field_data(value: Any) -> Any:
     if is_dataclass(value) and not hasattr(value, "to_json"):
         return all_fields(value)
-    return [_deep(entry) for entry in value] if isinstance(value, list | tuple) else plain(value)
+    return [_field_data(entry) for entry in value] if isinstance(value, list | tuple) else plain(value)
 
 
 def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Primes of bad reduction of elliptic curves over Q, and of the curves in the planes of a member of the family.
 
-The curves in the planes may be over number fields. Integers are factored within a bound; other cofactors are reported.
+Those in the planes may be over number fields. Integers are factored within a bound; unfactored cofactors are reported.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
 
 
 def bad_primes_of_plane(gamma: Any) -> BadPrimes:
-    """Return the primes of Q below the bad primes of the Jacobian of a level curve (level_curves.py).
+    """Return the primes of Q below the bad primes of the curve `Jacobian(gamma)` (level_curves.py).
 
     Let delta = 1 - gamma. At a prime not above 2 or 3 the reduction is bad if and only if the valuation of gamma is not
     0, or the valuation of delta is not a multiple of 6: docs/mathematics.md, "Geometry of the level sets".

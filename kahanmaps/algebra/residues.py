@@ -78,10 +78,10 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
 
 
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
-    """Return the simplest fractions with these residues, computed together; None if they are not simple enough.
+    """Return the simplest fractions with these residues, computed together; None if a residue has no simple one.
 
-    Fractions with a common denominator may be longer than single ones: k of them may have heights up to about
-    modulus^(k/(k+1)). They are found as a short vector of a lattice (LLL). The result is a guess that must be checked.
+    If k fractions have a common denominator, they are also found if their heights are longer than sqrt(modulus), up to
+    about modulus^(k/(k+1)), as a short vector of a lattice (LLL). The result is a guess that must be checked.
 
     >>> m = 2**61 - 1
     >>> numbers = [fmpq(n, 10**10 + 19) for n in (10**10, -3141592653)]
@@ -128,7 +128,7 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
 def from_residues(
     modulo: Callable[[int], Sequence[Sequence[int]] | None], max_primes: int
 ) -> list[tuple[fmpq, ...]] | None:
-    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with a further prime.
+    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with one more prime.
 
     The residues come in groups of numbers that probably share a denominator. Returns None if `modulo` returns None, or
     if `max_primes` primes do not suffice. Every call uses the same primes: since the result is checked, an unsuitable

@@ -24,10 +24,10 @@ from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
-MAX_DEGREE = 12
+MAX_DEGREE = 12  # of the minimal polynomial of an algebraic number
 _ROOT_TEXT = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
 _SQUARE_ROOT_TEXT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
-_GUARD_BITS = 64
+_GUARD_BITS = 64  # bits of working precision beyond the requested ones
 
 
 class Root:
@@ -145,8 +145,8 @@ class Root:
         return hash(str(self))
 
     def __repr__(self) -> str:
-        near = f" near {self._near_text}" if self._near_text else ""
-        return f"root of {format_univariate(self.polynomial)}{near}"
+        near_text = f" near {self._near_text}" if self._near_text else ""
+        return f"root of {format_univariate(self.polynomial)}{near_text}"
 
 
 class AlgebraicPoint(NamedTuple):

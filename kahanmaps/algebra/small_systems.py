@@ -6,7 +6,7 @@ linear form in the quotient ring, whose rational eigenvalues are the values of t
 result also contains linear families with free variables, equations that could not be solved, and descriptions of the
 solutions that are not rational. No step discards a rational solution.
 
-FLINT cannot be interrupted, so single operations are bounded in size: Groebner bases are computed one S-polynomial
+FLINT cannot be interrupted, so each operation is bounded in size: Groebner bases are computed one S-polynomial
 after the other, and polynomials in several variables are factored only up to a bounded number of terms. All operations
 count as work, in units fitted to measurements.
 """
@@ -167,7 +167,7 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
 
 
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
-    """Find coordinates in which cubic forms may decouple: a matrix whose columns are the new basis, or None.
+    """Find coordinates in which cubic forms in `count` variables may decouple: a matrix with the new basis, or None.
 
     If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all its
     elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic
@@ -201,7 +201,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
             power = power * ratio
         blocks.append(nullspace(QQ, annihilator))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
-    # Return None unless the forms decouple: other coordinates would only make the coefficients longer.
+    # Return None unless the forms decouple: new coordinates would only make the coefficients longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
     T_hessian = T.transpose() * hessian() * T
     is_decoupled = all(T_hessian[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])

@@ -5,7 +5,7 @@ in advance, with an estimate from the sizes of their arguments. A `Budget` is a 
 counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
 Trap: a result from a module-level cache would cost no work the second time, so the outcome would depend on earlier
-calls. `counted_cache` counts the work of a cached result again. Caches within a single search need no such care.
+calls. `counted_cache` counts the work of a cached result again. Caches that end with a search need no such care.
 """
 
 from __future__ import annotations

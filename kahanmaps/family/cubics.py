@@ -23,7 +23,7 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 class CubicSpace:
     """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    `basis` has coprime integer coefficients, `unknowns` is the number of monomials, `rank` that of the linear system.
+    `basis` has coprime integer coefficients, `unknowns` counts monomials, `rank` is that of the system, `expected` 4m.
     """
 
     basis: tuple[fmpq_mpoly, ...]

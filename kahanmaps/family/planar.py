@@ -301,7 +301,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """Yield for each unit vector its sum with few small multiples of other unit vectors that generates a free K-module.
+    """Yield for each unit vector its sum with few small multiples of the others that generates a free K-module.
 
     For all but at most m values of c, adding c times a unit vector gives the largest module that both vectors allow: on
     the part that belongs to an irreducible factor of chi, K is a field, and at most one c fails.
@@ -350,7 +350,7 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
 
 
 def _krylov_matrix(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
-    """Return the matrix with the columns v, t v, ..., t^{m-1} v."""
+    """Return the matrix with the columns v, t v, ..., t^{m-1} v for v = `vector`."""
     columns = [vector]
     for _ in range(t.nrows() // 2 - 1):
         columns.append(t * columns[-1])
@@ -371,7 +371,7 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
         terms = [c for c in coefficient.coeffs() if c != 0]
         is_negative = all(c < 0 for c in terms)
         element = format_univariate(-coefficient if is_negative else coefficient)
-        factor = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
+        factor_text = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
         sign = "-" if is_negative else "+"
-        text += f" {sign} {factor}{monomial}" if text else f"{'-' if is_negative else ''}{factor}{monomial}"
+        text += f" {sign} {factor_text}{monomial}" if text else f"{'-' if is_negative else ''}{factor_text}{monomial}"
     return text or "0"

@@ -34,7 +34,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns in dimension n
 _DRAWS = 24  # small combinations that are tried besides the basis vectors
-_TRIAL_DIVISION = 1000
+_TRIAL_DIVISION = 1000  # limit of the trial divisions of a gcd
 _T = fmpq_poly([0, 1])
 
 
@@ -85,15 +85,15 @@ class FamilyStructure(ResultPart):
         if self.member.m == 1:
             sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi_text}"
         else:
-            beginning = "H splits: A"
+            beginning_text = "H splits: A"
             if len(factors) == 1:
                 is_nonlinear = factors[0].degree > 1
-                beginning = (
+                beginning_text = (
                     "H splits over the splitting field of chi: A"
                     if is_nonlinear
                     else "H does not split: A, not scalar,"
                 )
-            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi_text}"
+            sentence = f"{beginning_text} with A Hess(H) = Hess(H) A^T has chi = {chi_text}"
         return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 

@@ -62,9 +62,9 @@ def defects(A: fmpq_mat) -> list[str]:
                 row, column = top_row + j, left_column + i
                 expected_entry = fmpq(0) if top_row != left_column and i == j else expected_matrix[row, column]
                 if A[row, column] != expected_entry:
-                    position = f"entry ({row + 1},{column + 1})"
+                    position_text = f"entry ({row + 1},{column + 1})"
                     texts = _short_text(A[row, column]), _short_text(expected_entry)
-                    messages.append(f"{position} is {texts[0]}, expected {texts[1]}: the {rule}")
+                    messages.append(f"{position_text} is {texts[0]}, expected {texts[1]}: the {rule}")
     return messages
 
 
@@ -118,25 +118,25 @@ def diagnosis(A: fmpq_mat) -> str:
     )
     if not repeated_factors:
         if all(factor.degree == 1 for factor in factors):
-            splitting = "all roots rational"
+            splitting_text = "all roots rational"
         elif len(factors) == 1:
-            splitting = "irreducible over Q"
+            splitting_text = "irreducible over Q"
         else:
-            splitting = f"{len(factors)} irreducible factors over Q"
-        return f"A is generic: chi = {chi_text}, without repeated roots, {splitting}"
+            splitting_text = f"{len(factors)} irreducible factors over Q"
+        return f"A is generic: chi = {chi_text}, without repeated roots, {splitting_text}"
     repeated_text = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated_factors)
-    beginning = f"A is not generic: chi = {chi_text} has repeated roots, {repeated_text}"
+    beginning_text = f"A is not generic: chi = {chi_text} has repeated roots, {repeated_text}"
     degree = minimal_degree(A)
     m = sum(factor.degree * factor.multiplicity for factor in factors)
     if degree == m:
         return (
-            f"{beginning}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has "
+            f"{beginning_text}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has "
             "dimension 4m, and the invariant Poisson structure and m independent integrals are there as for distinct "
             "roots"
         )
     is_diagonalisable = degree == sum(factor.degree for factor in factors)
     return (
-        f"{beginning}; A is {'still' if is_diagonalisable else 'not'} diagonalisable and derogatory: its minimal "
+        f"{beginning_text}; A is {'still' if is_diagonalisable else 'not'} diagonalisable and derogatory: its minimal "
         f"polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the "
         "theorems on the invariant Poisson structure and m independent integrals do not apply; commutativity of "
         "associated maps does"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
     from kahanmaps.family.planar import NormalForm
 
-_MAX_DIMENSION = 32
+_MAX_DIMENSION = 32  # largest dimension in which a normal form is searched for
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_syste
 
 GENERATOR = "t"
 _MAX_DIMENSION = 12  # maximal dimension n in which commuting matrices, with n^2 entries, are computed
-_DRAWS = 40
+_DRAWS = 40  # random combinations of commuting matrices that are tried
 
 
 def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:

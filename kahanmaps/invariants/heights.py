@@ -1,14 +1,14 @@
 """Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
 
-The height of a rational point x = (p_1 : ... : p_d : q), with integers without a common factor, is here the bit length
-of the largest of these integers, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: within one bit of the logarithmic
+The height of a rational point x = (p_1 : ... : p_k : q), with integers without a common factor, is here the bit length
+of the largest of these integers, floor(log2 max(|p_1|, ..., |p_k|, |q|)) + 1: within one bit of the logarithmic
 projective height.
 
-Over a number field Q[t]/g of degree m, it is the height of the rational point that consists of all coefficients of
-1, t, t^2, ... Up to a constant, it lies between the height of the point and m times this height (denominators are
+Over a number field Q[t]/g of degree r, it is the height of the rational point that consists of all coefficients of
+1, t, t^2, ... Up to a constant, it lies between the height of the point and r times this height (denominators are
 ideals, and the least positive integer in an ideal is at most its norm), so that the kind of growth is the same.
 
-Theory. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): growth is at most exponential. If an
+Theory. One step is a rational map of some degree e, so h(Phi(x)) <= e h(x) + O(1): growth is at most exponential. If an
 orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a component. On a rational
 curve, this is a Moebius map: heights grow linearly, or logarithmically if it has one fixed point, or the orbit is
 periodic. On an elliptic curve of degree d in projective space, on which the map is a translation by T,
@@ -58,10 +58,10 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd,
 from kahanmaps.maps.orbits.methods import choose_method
 
 MIN_HEIGHTS = 9  # needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
-_MIN_FOR_EXPONENTIAL = 6
-_MIN_FOR_LOGARITHMIC = 32
-_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
-_MAX_SHOWN = 20
+_MIN_EXPONENTIAL_HEIGHTS = 6  # number of heights needed for exponential growth
+_MIN_LOGARITHMIC_HEIGHTS = 32  # number of heights needed for logarithmic growth
+_MAX_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
+_MAX_SHOWN_HEIGHTS = 20  # number of heights in the plain data of a result
 _NO_NORMAL_FORM = NoNormalForm("none was given")
 
 
@@ -71,7 +71,7 @@ class HeightGrowth(ResultPart):
 
     The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
     increases over the last four intervals of w steps. Each r_j is w times the slope of a least-squares line, since
-    single heights fluctuate by a few bits or by the logarithm of n. Let e_j = r_{j+1} - r_j. The first rule that holds:
+    the heights fluctuate by a few bits or by the logarithm of n. Let e_j = r_{j+1} - r_j. The first rule that holds:
 
     * periodic: the orbit returned to its initial point; * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2,
       and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 = e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is
@@ -148,7 +148,7 @@ class HeightGrowth(ResultPart):
     def to_json(self) -> dict[str, Any]:
         """Return plain data: the heights at 0, 1, 2, 4, 8, ... times `every` and the last; rounded numbers as text."""
         last = len(self.heights) - 1
-        shown_indices = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN:]
+        shown_indices = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN_HEIGHTS:]
         return {
             "steps": self.every * last,
             "every": self.every,
@@ -241,7 +241,7 @@ def height_growth(
     start_height = height(kahan_map.point(start))
     bits = start_height if kahan_map.eps is None else max(start_height, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
-        # A single step could take minutes, and its numbers would usually exceed the budget as well.
+        # One step could take minutes, and its numbers would usually exceed the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((start_height,), end, every)
     normal_form = _NO_NORMAL_FORM if normal_form is None else normal_form
@@ -301,7 +301,7 @@ def _points_with_heights(orbit: Orbit, every: int, budget: Budget | None) -> Ite
 
 def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     """Apply the rules stated in the docstring of HeightGrowth."""
-    if len(heights) < _MIN_FOR_EXPONENTIAL:
+    if len(heights) < _MIN_EXPONENTIAL_HEIGHTS:
         return Growth.UNDECIDED, _too_few_heights(heights)
     width = (len(heights) - 1) // 4
     offset = len(heights) - 1 - 4 * width
@@ -310,7 +310,7 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     ]
     differences = [later - earlier for earlier, later in pairwise(increases)]
     text = f"four quarters raise them by {', '.join(decimal_text(increase, 4) for increase in increases)} bits"
-    if min(differences) > 0 and sum(differences) >= 2 * _NOISE:
+    if min(differences) > 0 and sum(differences) >= 2 * _MAX_NOISE:
         e1, e2, e3 = differences
         if e2 >= 2 * e1 and 10 * e1 * e3 >= 9 * e2 * e2:
             return Growth.EXPONENTIAL, f"{text}, and the increases multiply"
@@ -319,14 +319,14 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     if len(heights) < MIN_HEIGHTS:
         return Growth.UNDECIDED, _too_few_heights(heights)
     has_increased = max(heights[: width + 1]) < max(heights[-width - 1 :])
-    if has_increased and -3 * width < 8 * sum(increases[1:]) < 3 * width and len(heights) >= _MIN_FOR_LOGARITHMIC:
+    if has_increased and -3 * width < 8 * sum(increases[1:]) < 3 * width and len(heights) >= _MIN_LOGARITHMIC_HEIGHTS:
         return Growth.LOGARITHMIC, f"{text}: less than linear growth would"
     middle = len(heights) // 2
     low, high = min(heights[:middle]), max(heights[:middle])
     if low <= min(heights[middle:]) and max(heights[middle:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
     least_increase, spread = min(increases), max(increases) - min(increases)
-    if least_increase > 0 and spread <= least_increase / 4 and (spread <= _NOISE or spread <= least_increase / 32):
+    if least_increase > 0 and spread <= least_increase / 4 and (spread <= _MAX_NOISE or spread <= least_increase / 32):
         return Growth.LINEAR, f"{text}, about the same each time"
     return Growth.UNDECIDED, f"{text}, which fits no rule; more steps may decide"
 

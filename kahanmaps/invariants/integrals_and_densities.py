@@ -220,7 +220,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^, as in the paper: H~ is also conserved by maps of other associated systems, which are not the map x -> x^.
+        # x^, as in the paper: H~ is also conserved by the maps of associated systems, which are not the map x -> x^.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -379,8 +379,8 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     if numerator.is_zero():
         text = format_rational_function(phi)
         value_text = "0/0" if denominator.is_zero() else "identically 0"
-        eps_and_root = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
-        explanation = f", which is {value_text} at {eps_and_root}" if text != "0" else ""
+        eps_and_root_text = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        explanation = f", which is {value_text} at {eps_and_root_text}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if explanation else text}{explanation}, "
             "expected a function that is not zero: the measure is dx/phi"

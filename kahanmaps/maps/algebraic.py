@@ -57,7 +57,7 @@ class AlgebraicMap(MapFamily):
         raise InputError(self.unsupported_reason)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """Return the map over a field that contains a root of g. Raises BadPrime if GF(p) contains none."""
+        """Return the map over a field that contains a root of g, the minimal polynomial of `root`. Raises BadPrime."""
         over = self.root.number_field if over is QQ else over
         if self._cached_root is None or self._cached_root[0] is not over:
             self._cached_root = over, self.root.over(over)

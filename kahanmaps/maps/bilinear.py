@@ -1,7 +1,7 @@
 """Discretizations given by equations that are linear in the old point x and linear in the new point x~.
 
 Among them are Kahan's method, and its adjusted and pseudo-Kahan variants with other coefficients or with skew terms
-like x Y - X y. The inverse map has the same equations with x and x~ exchanged.
+like x y~ - x~ y. The inverse map has the same equations with x and x~ exchanged.
 """
 
 from __future__ import annotations

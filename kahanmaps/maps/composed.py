@@ -24,7 +24,7 @@ from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms in an expansion
-_TRIES = 20
+_TRIES = 20  # random points at which `is_involution` tests a map
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum over the factors, if they are powers of one map; otherwise 0, since they have no common flow."""
+        """The sum of those of the factors, if these are powers of one map; otherwise 0: they have no common flow."""
         factors = self._elementary_factors
         return sum(steps for _, steps in factors) if all(factor == factors[0][0] for factor, _ in factors) else 0
 
@@ -126,7 +126,7 @@ class ComposedMap(MapFamily):
 
     @property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names. Raises InputError if they are too long."""
+        """The coordinates of x~ as functions of `names`. Raises InputError if they are too long."""
         return self.multiplied_out.image
 
     @property
@@ -273,7 +273,7 @@ def is_involution(map_: MapFamily) -> bool:
 
 
 def _expand_image(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
-    """Return the image of (x_1, ..., x_n) as functions of the names (eps is the last), in lowest terms.
+    """Return the image of the variables as functions of `names` (variables, symbols, eps), in lowest terms.
 
     Returns None if the expansion takes too many products of terms.
     """

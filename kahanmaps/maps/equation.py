@@ -1,4 +1,4 @@
-"""The equation of a map over a field: the matrix (M | -r), whose entries are forms of the same degree in (X : Z).
+"""The equation M x~ = r of a map over a field, as the matrix (M | -r) of forms of one degree in (X : Z), x = X/Z.
 
 All evaluators use this equation: for integer points (orbits/integer_steps.py), for floating-point numbers
 (floats/steps.py), and for curves and forms in projective space (projective.py).
@@ -148,7 +148,7 @@ class Equation:
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """Return the equation of (M | -r) over a field, at the values `point` of the symbols and eps.
+    """Return the equation with the `rows` of (M | -r) over a field, at the values `point` of the symbols and eps.
 
     Raises BadPrime if a coefficient has no reduction.
     """

@@ -1,8 +1,8 @@
 """Birational maps given by an equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
 
-M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' and r = (I + eps B) x + 2 eps c; for a
-map given by rational functions, M is the diagonal matrix of their denominators. Other discretizations that are linear
-in the new point have this form as well. There are three kinds of objects:
+M is a matrix and r a vector of polynomials. For Kahan's method and f(x) = Q(x, x) + B x + c, M = I - eps f' and r =
+(I + eps B) x + 2 eps c; for a map given by rational functions, M is the diagonal matrix of their denominators. Other
+discretizations that are linear in the new point have this form as well. There are three kinds of objects:
 
 * `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
   `ImplicitMap`.
@@ -82,9 +82,9 @@ class Map(LatexDisplay):
             return known_flows[0][0], sum((time for _, time in known_flows), self.field.zero)
 
     def __repr__(self) -> str:
-        eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
-        step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
-        return f"Map({', '.join(self.variables)}; {eps}{step}, over {self.field})"
+        eps_text = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
+        time_step_text = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
+        return f"Map({', '.join(self.variables)}; {eps_text}{time_step_text}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
         """Return the map as plain data; eps is None for factors with different eps, time_step if there is no flow."""
@@ -140,7 +140,7 @@ class Map(LatexDisplay):
         return self.time_step
 
     def __matmul__(self, other: Map) -> Map:
-        """Return the composition: first `other`, then this map. Raises InputError if dimension or field differ."""
+        """Return the composition: first `other`, then this map. Raises InputError if dimensions or fields differ."""
         if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
@@ -235,9 +235,9 @@ class Map(LatexDisplay):
         coordinates_text = ",".join(self.field.format(entry) for entry in point)
         if len(coordinates_text) > 200:
             coordinates_text = f"{coordinates_text[:100]}...{coordinates_text[-80:]}"
-        at_eps = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
+        eps_text = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{at_eps}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{eps_text}: "
             "the map is not defined there",
             point,
             self.eps,
@@ -245,7 +245,7 @@ class Map(LatexDisplay):
 
 
 class ElementaryMap(Map):
-    """The map of a single equation M(x) x~ = r(x) over a field.
+    """The map of one equation M(x) x~ = r(x) over a field.
 
     `backward` returns the equation of the inverse. If it is None, the inverse exchanges the two points, which needs an
     equation of degree 1. Subclasses that compute the matrices faster (KahanMap) override these methods.
@@ -337,8 +337,8 @@ class ElementaryMap(Map):
         return IntegerSteps(equation.exponents, equation.terms)
 
     def __repr__(self) -> str:
-        eps = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
-        return f"{type(self).__name__}({', '.join(self.variables)}; {eps}over {self.field})"
+        eps_text = f"eps={self.field.format(self.eps)}, " if self.has_eps else ""
+        return f"{type(self).__name__}({', '.join(self.variables)}; {eps_text}over {self.field})"
 
 
 def det_of(name: str) -> str:
@@ -536,7 +536,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names, if M is diagonal, otherwise None."""
+        """The coordinates of x~ as functions of `names`, if M is diagonal, otherwise None."""
         if any(not entry.is_zero() for i, row in enumerate(self.rows) for j, entry in enumerate(row[:-1]) if i != j):
             return None
         return tuple(RationalFunction(-row[-1], row[i]) for i, row in enumerate(self.rows))

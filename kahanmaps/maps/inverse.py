@@ -30,7 +30,7 @@ Solution = dict[int, Quotient]  # for each unknown, given by its index among the
 
 _MAX_TERMS = 3000  # terms of a polynomial
 _PRIME_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, which must be C integers
-_MAX_RESULTANT = 60_000  # product of the numbers of terms, times the sum of the degrees
+_MAX_RESULTANT = 60_000  # product of the numbers of terms of two polynomials, times the sum of their degrees
 
 
 class NotBirational(InputError):

@@ -1,6 +1,6 @@
 """The Kahan (Hirota-Kimura) map of a quadratic system, over any field.
 
-Conventions, for the whole library: `eps` is the paper's epsilon and the time step is 2 eps. The map x -> x~ solves
+For the whole library: eps is the paper's epsilon, the time step is 2 eps. For f(x) = Q(x, x) + B x + c, x -> x~ solves
 
     (x~ - x) / (2 eps) = Q(x, x~) + B (x + x~)/2 + c,
 

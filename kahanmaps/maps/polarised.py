@@ -23,7 +23,7 @@ from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.systems.polynomial import PolynomialField
 
 TITLE = "polarised map"
-MAX_DEGREE = 6
+MAX_DEGREE = 6  # largest d
 
 
 def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:

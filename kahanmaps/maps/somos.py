@@ -62,7 +62,7 @@ class Integers:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return integer and scale of a nonzero value. Raises ArithmeticError for other primes in the denominator."""
+        """Return integer and scale of a nonzero value. ArithmeticError if its denominator has primes not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)
@@ -91,7 +91,7 @@ class Terms:
 
         t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
 
-    The scales s(n) are long, but certain quotients of them stay short: `own_quotient(n)` is s(n + 1) s(n - 1)/s(n)^2,
+    The scales s(n) are long, but two quotients of them stay short: `own_quotient(n)` is s(n + 1) s(n - 1)/s(n)^2,
     and `mixed_quotient(n)` is S(n - 1) s(n + 1)/(S(n) s(n)), where S denotes the scales of W.
 
     `numbers` (Integers, or its equivalent over a number field) splits terms into integer and scale. If `gamma` is

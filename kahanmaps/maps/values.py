@@ -28,7 +28,7 @@ def is_float_array(value: Any) -> bool:
 def as_point(value: Any, variables: Sequence[str]) -> Any:
     """Return the coordinates of a point in order: from a sequence, an array, {variable: value}, or text such as "1,2".
 
-    The caller converts the coordinates. Raises InputError for other names, for several points, and for other values.
+    The caller converts the coordinates. Raises InputError for unknown names, several points, and values of other kinds.
 
     >>> as_point("1/2, 3", ["x", "y"]), as_point({"y": 3, "x": "1/2"}, ["x", "y"])
     ((1/2, 3), ['1/2', 3])

@@ -53,7 +53,7 @@ def broken_B(objects: PaperObjects) -> PaperObjects:
 
 
 def repeated_root(objects: PaperObjects) -> PaperObjects:
-    """Replace A by A + (lambda_2 - lambda_1) E_1: A stays skew-Hamiltonian, H stays in its space."""
+    """Replace A by A + (lambda_2 - lambda_1) E_1: A stays skew-Hamiltonian, and H one of its cubics."""
     A = objects.A + objects.projector(0) * (objects.lam[1] - objects.lam[0])
     return objects.replace(A=A, roots=(objects.lam[1], *objects.lam[1:]), known_chi=None)
 

@@ -50,7 +50,7 @@ class PaperObjects:
     """The paper's objects over the field `K`.
 
     `d3H` are the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw` gives
-    further vectors by name (random vectors at a point, indeterminates in a proof). `step_eps` is the eps of the maps,
+    x and the other vectors by name (random at a point, indeterminate in a proof). `step_eps` is the eps of the maps,
     and `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
     and `error_of_second`, an error of the tensor f''.
 
@@ -63,7 +63,7 @@ class PaperObjects:
     step_eps: Any = None
     method: str = "kahan"
     error_of_second: Any = None
-    used: set[str] = field(default_factory=set)
+    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if these are
     _cache: dict[Any, Any] = field(default_factory=dict)
     A: Any
     d3H: Any

@@ -43,7 +43,7 @@ MAX_SIGN_VECTORS = 32
 class MemberObjects(PaperObjects):
     """A given member at a point: if the library has its own code for a value, this code computes it.
 
-    Over dual numbers (for derivatives) and in variations, values are computed as for other objects.
+    Over dual numbers (for derivatives) and in variations, values are computed as in `PaperObjects`.
     """
 
     member: FamilyMember
@@ -196,7 +196,7 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
 
 
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
-    """Return the normal form with indeterminate roots, planar cubics and eps; `vectors` names further vectors.
+    """Return the normal form with indeterminate roots, planar cubics and eps; `vectors` are the names of vectors.
 
     A change of determinant 1 of each block moves the point to (u, v) = (1, 0) and makes the coefficient of u^2 v in h
     vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated, since the system stands for

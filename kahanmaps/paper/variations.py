@@ -42,7 +42,7 @@ def different_steps(o: PaperObjects) -> PaperObjects:
 
 
 def jordan_block(o: PaperObjects) -> PaperObjects:
-    """A has a double root and is not diagonalizable: chi is its minimal polynomial. H is random in the space of A."""
+    """A has a double root and is not diagonalizable: chi is its minimal polynomial. H is a random cubic of A."""
     roots = (o.lam[0], o.lam[0], *o.lam[2:])
     chi = tuple(o.replace(roots=roots).chi_of_roots)
     S, _ = o.symplectic_normal_form()

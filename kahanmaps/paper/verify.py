@@ -14,7 +14,7 @@ The methods of verification:
 * *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
 * *exact*: claims without x, and claims about dimensions and ranks, are evaluated over Q.
 
-In addition, claims about single blocks are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
+In addition, claims about one block are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
 over complex balls.
 """
 
@@ -67,11 +67,11 @@ from kahanmaps.paper.registry import (
 )
 from kahanmaps.version import __version__
 
-MAX_M = 8
+MAX_M = 8  # largest m, half the dimension
 # Maximal number of products of terms in a proof: enough for all claims up to m = 6; at m = 8 a few claims exceed it.
 PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # in a proof for one member
-_MAX_UNDEFINED = 40
+_MAX_UNDEFINED = 40  # points at which a claim is undefined, before it is given up
 _POINT_COUNT = 4  # number of points for statements that objects differ or have full rank
 _MIN_LARGE_M = 5  # for m >= 5, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
@@ -92,7 +92,7 @@ class VerifyOptions:
     sections: tuple[int, ...] | None = None
     order: int = 3
     ball_bits: int | None = None
-    controls: bool = False
+    controls: bool = False  # whether the controls of the claims are evaluated instead of the claims
     beyond: bool = False  # only the statements of section 10 about variations
 
     def __post_init__(self) -> None:
@@ -131,7 +131,7 @@ def verify(
         A `Report` with one `Finding` for each claim, in the order of the paper. All but `supported` claims are exact.
 
     Raises:
-        InputError: if the system is not of kind [family], and for other m.
+        InputError: if the system is not of kind [family], and if m is not between 1 and 8.
 
     Source: petrera-suris-2016; schwartz-1980 for the bounds.
 
@@ -207,7 +207,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return a finding for each claim; with controls also one for each claim and control, and one for all."""
+        """Return a finding for each claim; or with controls, one for each control of each claim, and one for all."""
         sections = self.options.sections
         applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]
@@ -255,7 +255,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # At least one prime in m! splits chi, so that this fails with probability at most e^-40.
+                        # At least 1/m! of all primes split chi, so that this fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
@@ -380,14 +380,14 @@ class Verifier:
             point_count += 1
             if outcome.holds and outcome.pairs:
                 point_text = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
-                method = "exact rational point" if objects.K is QQ else "point over GF(p)"
+                method_text = "exact rational point" if objects.K is QQ else "point over GF(p)"
                 text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {point_text}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
-                return self._finding(claim, verdict, Evidence(method, text, {"points": point_count}))
+                return self._finding(claim, verdict, Evidence(method_text, text, {"points": point_count}))
             if point_count >= _POINT_COUNT:
                 break
         if outcome is None or not outcome.pairs:
@@ -434,11 +434,11 @@ class Verifier:
         if not outcome.holds:
             text = f"{claim.place}: {claim.title}: the two sides are different functions for this member"
             raise Contradiction(text, witness_of(outcome))
-        scope = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
-        return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
+        scope_text = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
+        return Evidence("symbolic", f"both sides are the same function of {scope_text}, multiplied out for this member")
 
     def further_evidence(self, claim: Claim) -> Iterable[Evidence]:
-        """Return further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
+        """Yield additional evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
         if self.member is None or not self.member.is_generic:
             return
         rng = random.Random(f"also {self._seed} {claim.key}")

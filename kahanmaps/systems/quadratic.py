@@ -128,7 +128,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
     def renamed(self, variables: Sequence[str]) -> QuadraticSystem:
-        """Return the system with other names of its variables; only for systems without symbols."""
+        """Return the system with new names of its variables; only for systems without symbols."""
         context = ring(variables)
         return QuadraticSystem(tuple(p.compose(*context.gens(), ctx=context) for p in self.rhs))
 
@@ -295,7 +295,7 @@ class SystemOver:
 
 
 def as_system(value: Any) -> QuadraticSystem:
-    """Convert a value to a quadratic system: any value that `maps.kahan.as_map` accepts, except maps of other kinds."""
+    """Convert a value to a quadratic system: whatever `maps.kahan.as_map` accepts, but no maps except Kahan maps."""
     if isinstance(value, QuadraticSystem):
         return value
     system: QuadraticSystem = (

@@ -17,14 +17,14 @@ from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _MAX_STEPS = 200  # if more steps are needed, the solution is close to a pole
-_MAX_BITS = 2048
+_MAX_BITS = 2048  # largest working precision
 
 
 def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int = 64) -> list[arb] | None:
     """Return balls that contain the solution x(time) with x(0) = start, of radius at most 2^-bits max |x_i(time)|.
 
     `start` and `time` are exact numbers; the time may be negative. Returns None if there is no such solution, or if it
-    comes too close to a pole. Raises InputError if the point has another dimension.
+    comes too close to a pole. Raises InputError if `start` has a wrong length.
 
     >>> [ball] = solution(QuadraticSystem.from_text(["x"], ["x^2"]), [1], "1/2")  # x = 1/(1 - t)
     >>> ball.contains(2), bool(ball.rad() < 1e-18)

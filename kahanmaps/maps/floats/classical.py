@@ -2,9 +2,9 @@
 
 The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
 numpy code, or compiled. The equations of implicit methods are quadratic. They are solved by Newton's method from the
-step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), so that the program
-can test whether it has converged up to rounding. The fast step takes a few iterations. If these do not suffice, the
-careful step takes more iterations, and if it does not converge either, the orbit ends.
+step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), with the quadratic
+part Q of f and the matrix (a_ij) of the method, so that convergence up to rounding can be tested. The fast step takes
+two iterations. If these do not suffice, the careful step takes eight; if it does not converge either, the orbit ends.
 Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
@@ -31,7 +31,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROUNDING = 2.0**-52  # relative size of a residual below which the equations count as solved
 _STALLED = 1e-10  # relative size below which the last correction of a careful step counts as round-off
-_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8
+_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # of Newton's method, in the fast and in the careful step
 
 
 class Method(NamedTuple):
@@ -60,7 +60,7 @@ METHODS = {
     "suzuki4": Method("Kahan, Suzuki 4", 4, 5, 5),
     "yoshida6": Method("Kahan, Yoshida 6", 6, 7, 7),
 }
-SEPARABLE = {"symplectic-euler", "stormer-verlet"}
+SEPARABLE = {"symplectic-euler", "stormer-verlet"}  # methods for systems with positions and momenta only
 
 _TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods
     "euler": ([[]], [1.0]),
@@ -72,7 +72,7 @@ _IMPLICIT: dict[str, tuple[list[list[float]], list[float]]] = {
     "midpoint": ([[0.5]], [2.0]),
     "gauss4": ([[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]], [-_ROOT3, _ROOT3]),
 }
-IMPLICIT = set(_IMPLICIT)
+IMPLICIT = set(_IMPLICIT)  # names of the implicit methods
 # The coefficients of solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
 _YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
 
@@ -109,8 +109,8 @@ class MethodEnsemble(FloatEnsemble):
     """The orbits of many initial points under a method of `METHODS` except "normal-form", with time step 2 eps.
 
     `eps` is exact. `halves` are the two groups of variables of a separable system (see `separated`), for the methods
-    that need them. All further arguments are as in FloatEnsemble. The steps of an orbit in which an implicit method
-    needed more iterations than usual count as near-singular.
+    that need them. The remaining arguments are as in FloatEnsemble. The steps of an orbit in which an implicit method
+    needed more than two iterations count as near-singular.
 
     >>> growth = QuadraticSystem.from_text(["x"], ["x"])
     >>> ensemble = MethodEnsemble(growth, "1/20", [[1]], "midpoint", kernel="numpy")
@@ -226,7 +226,7 @@ def _sum(values: Any) -> Any:
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """Return the step x~ = x + sum_i w_i z_i, with z_i = h sum_j a_ij f(x + z_j) by Newton's method.
+    """Return the step x~ = x + sum_i w_i z_i, `weights` w, with z_i = h sum_j A_ij f(x + z_j) by Newton's method.
 
     It starts from points z_i on a parabola that is determined by f(x) and a step of Kahan's method.
     """

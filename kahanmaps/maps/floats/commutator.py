@@ -18,7 +18,7 @@ from kahanmaps.maps.floats.float_conversion import to_floats
 from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.maps.implicit import MapFamily
 
-_HALVINGS = 6
+_HALVINGS = 6  # number of values eps, eps/2, eps/4, ... at which the commutator is measured
 _ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, counts as rounding error
 
 
@@ -27,7 +27,7 @@ class Commutator:
     """Measured sizes of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)), relative to the largest coordinate (at least 1).
 
     `by_step` contains pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the maximum over all steps.
-    `by_eps` contains pairs (eps, size) at n = 1 for eps and its halves; `slope` is the slope of log size against log
+    `by_eps` has pairs (eps, size) at n = 1 for eps, eps/2, eps/4, ...; `slope` is the slope of log size against log
     eps for the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
     """
 

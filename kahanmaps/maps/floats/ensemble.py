@@ -1,9 +1,9 @@
 """Ensembles of float orbits, which are advanced together.
 
-There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py), and "generic" for any
-map; steps.py defines a step. There are two kernels: "numpy", which is always available, and "numba", machine code (the
-extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but not on the number of
-threads or the size of the portions.
+There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py, also for h, D and chi),
+and "generic" for any map; steps.py defines a step. There are two kernels: "numpy", which is always available, and
+"numba", machine code (the extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but
+not on the number of threads, or on the number of steps computed in one portion.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SAMPLED = 1000  # steps from one sample of the integrals of the planes to the next
+SAMPLE_INTERVAL = 1000  # steps from one sample of the integrals of the planes to the next
 _MAX_SCALAR_ORBITS = 4  # up to this number, machine code advances one orbit after the other
 _CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
 _RECORDED_NUMBERS = 1_000_000  # numbers in a portion of recorded points
 
 # A function of a point; if it has a true attribute `of_arrays`, it is a function of many points (n, dim).
 Function = Callable[[Any], Any]
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # probabilities of the quantiles in `distribution`
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class FloatEnsemble(AttributeHints):
         kernel: str | None = None,
         threads: int | None = None,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLED,
+        sampled: int = SAMPLE_INTERVAL,
         radius: float | None = None,
     ) -> None:
         epsilon = rational(eps)
@@ -262,7 +262,7 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
+        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
             current_drift = self._blocks.distances(self._batch.z, self._initial_values)
@@ -458,7 +458,7 @@ def ensemble(
     kernel: str | None = None,
     threads: int | None = None,
     integrals: Mapping[str, Function] | None = None,
-    sampled: int = SAMPLED,
+    sampled: int = SAMPLE_INTERVAL,
     radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.

@@ -17,7 +17,7 @@ import numpy as np
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.ensemble import (
-    SAMPLED,
+    SAMPLE_INTERVAL,
     Drift,
     FloatEnsemble,
     Function,
@@ -79,7 +79,7 @@ class FloatOrbit:
         kernel: str | None = None,
         every: int = 1,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLED,
+        sampled: int = SAMPLE_INTERVAL,
     ) -> None:
         require_steps(steps)
         require_every(every)
@@ -125,7 +125,7 @@ class FloatOrbit:
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
+        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
         return tuple(drift.of(0) for drift in self._ensemble.drift)
 
     def interrupt(self) -> None:
@@ -161,7 +161,7 @@ class FloatOrbit:
 
 
 _MIN_COMPILED_STEPS = 20_000  # for fewer steps, compiling takes longer than it saves
-_NO_LIMIT = 1 << 62
+_NO_LIMIT = 1 << 62  # the number of steps of an orbit without a limit
 
 
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:

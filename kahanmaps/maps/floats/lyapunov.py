@@ -36,8 +36,8 @@ from kahanmaps.maps.values import start_rows
 MAX_NUMBERS = 20_000_000  # entries of the frames of all orbits together
 _PORTION_ENTRIES = 200_000  # entries of the tangent maps in a portion
 _MAX_PORTION_STEPS = 512
-_MAX_CONDITION = 16.0  # logarithm of the condition number of a product; larger products would lose digits
-_MAX_NORM = 300.0  # logarithm of the norm of a tangent map, whose square must not overflow
+_MAX_LOG_CONDITION = 16.0  # logarithm of the condition number of a product; larger products would lose digits
+_MAX_LOG_NORM = 300.0  # logarithm of the norm of a tangent map, whose square must not overflow
 _MIN_COMPILED_WORK = 10_000  # orbits times steps; for less work, compiling takes longer than it saves
 
 
@@ -136,7 +136,7 @@ def lyapunov_exponents(
 
     Args:
         system: the map; a quadratic system stands for its Kahan map.
-        starts, x0: the initial points, an array (orbits, dim) of floats, or a single point.
+        starts, x0: the initial points, an array (orbits, dim) of floats, or one point.
         eps: an exact number of either sign, half the time step if there is one; `time_step` or `h` give 2 eps instead.
         steps, n: the number of counted steps, at least 2.
         transient: the number of uncounted steps before the counted ones.
@@ -194,18 +194,18 @@ def lyapunov_exponents(
                 maps, log_dets = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
                 maps, log_dets = maps.reshape(count, -1, n, n), log_dets.reshape(count, -1)
                 norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
-            is_valid = np.isfinite(log_dets).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
+            is_valid = np.isfinite(log_dets).all(axis=0) & (norms < _MAX_LOG_NORM).all(axis=0)
             is_running[is_running] = is_valid
             maps, log_dets, norms, Q = maps[:, is_valid], log_dets[:, is_valid], norms[:, is_valid], frames[is_running]
             log_volumes[is_running] += log_dets.sum(axis=0)
             # Logarithms of bounds: the condition number of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, and the
             # condition number of a product is at most the product of the condition numbers.
             log_conditions = np.maximum(
-                np.log(2.0) + n * (norms - np.log(n) / 2) - log_dets, norms * _MAX_CONDITION / _MAX_NORM
+                np.log(2.0) + n * (norms - np.log(n) / 2) - log_dets, norms * _MAX_LOG_CONDITION / _MAX_LOG_NORM
             )
             first_factor, log_condition_sum = 0, 0.0
             for k, log_condition in enumerate([*log_conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
-                if k and log_condition_sum + log_condition > _MAX_CONDITION:
+                if k and log_condition_sum + log_condition > _MAX_LOG_CONDITION:
                     Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first_factor:k], Q))
                     log_sums[is_running] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
                     first_factor, log_condition_sum = k, 0.0

@@ -33,7 +33,7 @@ _INSTRUCTIONS = {  # $v: type of a vector of numbers; $m: of truth values; $s: s
     "not": "xor $m {0}, $true",
     "select": "select $m {0}, $v {1}, $v {2}",
 }
-_NEVER = 1 << 62
+_NEVER = 1 << 62  # a step that no orbit reaches
 
 # The loops over vectors of orbits and over steps. The last vector is padded with orbits that count as ended. Up to two
 # tables are filled, each for the first time after `until` steps, then after every `every` steps.

@@ -14,7 +14,7 @@ A linear change of U and V (h is divided by its determinant) makes h one of
 
 so that most maps have no coefficients except 0 and 1, and take five or six multiplications and a division. The linear
 factors U and V are those two whose forms in x are closest to orthogonal. The integral h_r/(1 + eps^2 D) of the block is
-kappa (A U^2 + 2 B U V + C V^2)/w.
+kappa (A U^2 + 2 B U V + C V^2)/w, with a constant kappa for each block.
 
 A real root gives a real block (two rows: U, V), a pair of complex roots a complex block (four rows: Re U, Im U, Re V,
 Im V). Roots, coefficients and the linear maps between x and the rows are computed in balls and rounded once, so each of
@@ -44,7 +44,7 @@ LINES, CUBES, GENERAL = "lines", "cubes", "general"
 _CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
 _ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # at least one gives a nonzero form a nonzero leading coefficient
 _MIN_SINE = 0.02  # sine of the angle between the forms U and V; smaller angles would lose too many digits
-_BITS = (192, 384, 768, 1536, 3072)
+_BITS = (192, 384, 768, 1536, 3072)  # working precisions, tried in this order
 _MIN_ACCURACY = 60  # accurate bits that an entry needs before it is rounded
 _NEGLIGIBLE = 120  # an entry smaller than 2^-120 times the largest entry of its row is rounded to 0
 
@@ -248,7 +248,7 @@ class _BallBlocks:
         return [one / length, zero], [-projection / height, one / height]
 
     def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
-        """Return whether an element of K is exactly 0 at the root."""
+        """Return whether an element of K = Q[t]/chi is exactly 0 at the root."""
         value = _evaluate(element, root)
         if not value.contains(acb(0)):
             return False

@@ -56,8 +56,8 @@ def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
     for assignment in text.split(","):
         name, _, value = (piece.strip() for piece in assignment.partition("="))
         if name not in values or name in assigned_names:
-            problem = f"{name} twice" if name in assigned_names else quoted(assignment.strip())
-            raise InputError(f"found {problem}, expected NAME=LOW:HIGH:N or NAME=VALUE, with {', '.join(variables)}")
+            found_text = f"{name} twice" if name in assigned_names else quoted(assignment.strip())
+            raise InputError(f"found {found_text}, expected NAME=LOW:HIGH:N or NAME=VALUE, with {', '.join(variables)}")
         assigned_names.add(name)
         pieces = value.split(":")
         if len(pieces) not in (1, 3):

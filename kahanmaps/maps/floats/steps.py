@@ -24,9 +24,9 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
 from kahanmaps.maps.floats.straight_line_program import (
-    LARGEST,
+    LARGEST_DOUBLE,
     MAX_OPERATIONS,
-    NEAR,
+    MIN_PIVOT_RATIO,
     ComplexPair,
     StepChecks,
     StraightLineProgram,
@@ -223,18 +223,18 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
                     M[i, j] += c * y[k]
         M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # the sizes of the rows
         pivots = eliminate(M, n, 1)
-        is_near_singular |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+        is_near_singular |= ~(pivots > MIN_PIVOT_RATIO * M[:, n + 1]).all(axis=0)
         is_singular |= is_finite & (pivots == 0.0).any(axis=0)
         image = M[:, n]
-        is_finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
+        is_finite &= (pivots <= LARGEST_DOUBLE).all(axis=0) & (np.abs(image) <= LARGEST_DOUBLE).all(axis=0)
     return *image, is_near_singular & is_finite & ~is_singular, is_singular, ~is_finite & ~is_singular
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
     """Gaussian elimination with partial pivoting for a batch of matrices (n, n + count + ..., batch), in place.
 
-    The `count` columns after the first n are right-hand sides, which the solutions replace; in further columns only the
-    rows are permuted. Returns the absolute values of the pivots, an array (n, batch).
+    The `count` columns after the first n are right-hand sides, which the solutions replace; in all later columns the
+    rows are only permuted. Returns the absolute values of the pivots, an array (n, batch).
     """
     columns, last_column = np.arange(M.shape[2]), n + count
     pivots = np.empty((n, len(columns)))

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-NEAR = 2.0**-40
+MIN_PIVOT_RATIO = 2.0**-40  # of a pivot to the numbers from which it was computed, in steps that are not near-singular
 MAX_FACTOR = 8.0  # maximal factor by which a pivot row is multiplied when it is subtracted from another row
-LARGEST = float(np.finfo(np.float64).max)
+LARGEST_DOUBLE = float(np.finfo(np.float64).max)
 MAX_OPERATIONS = 4000  # operations of a fast step; longer programs take too long to compile
 
 _SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=", "eq": "==", "and": "&", "or": "|"}
@@ -286,14 +286,14 @@ class StepChecks:
         """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each number."""
         if isinstance(x, Value):
             if self.careful:
-                self.finite = self.finite & (abs(x) <= LARGEST)
+                self.finite = self.finite & (abs(x) <= LARGEST_DOUBLE)
             else:
                 self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """Return the truth values of a step: `good`; or whether it was near-singular, singular, an overflow."""
+        """Return `good` of a fast step; of a careful step, whether it was near-singular, singular, an overflow."""
         if not self.careful:
-            return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
+            return [self.good & (abs(self._sum) <= LARGEST_DOUBLE) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
         has_failed = singular | _negation(self.finite)
         return [self.near & _negation(has_failed), singular, has_failed & _negation(singular)]
@@ -318,7 +318,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
         if single_row is not None:
             remaining.remove(single_row)
             ((j, pivot),) = matrix[single_row].items()
-            checks.pivot(pivot, NEAR)
+            checks.pivot(pivot, MIN_PIVOT_RATIO)
             solution[j] = rhs[single_row] / pivot
             for k in remaining:
                 if j in matrix[k]:
@@ -342,14 +342,14 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
         remaining -= block
         unknown_list = sorted(unknowns)
         if len(unknown_list) != len(block):  # the matrix is singular at all points
-            checks.pivot(0.0, NEAR)
+            checks.pivot(0.0, MIN_PIVOT_RATIO)
             continue
         block_rows = [[*(matrix[i].get(j, 0.0) for j in unknown_list), rhs[i]] for i in sorted(block)]
         values = solve_two(block_rows, checks) if len(block_rows) == 2 else _eliminate(block_rows, bound, checks)
         for j, value in zip(unknown_list, values, strict=True):
             solution[j] = value
     for i, j in reversed(solved_last):
-        checks.pivot(matrix[i][j], NEAR)
+        checks.pivot(matrix[i][j], MIN_PIVOT_RATIO)
         total = rhs[i]
         for k, entry in matrix[i].items():
             total = total if k == j else total - entry * solution[k]
@@ -365,11 +365,11 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     det = a * d - bc
     if isinstance(det, ComplexPair):
         norm = det.norm()
-        checks.pivot(norm, NEAR**2 + NEAR**2 * bc.norm())
+        checks.pivot(norm, MIN_PIVOT_RATIO**2 + MIN_PIVOT_RATIO**2 * bc.norm())
         inverse_norm = _inverse(norm)
         inverse: Any = ComplexPair(det.x * inverse_norm, -(det.y * inverse_norm))
     else:
-        checks.pivot(det, NEAR + NEAR * abs(bc))
+        checks.pivot(det, MIN_PIVOT_RATIO + MIN_PIVOT_RATIO * abs(bc))
         inverse = _inverse(det)
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
@@ -379,7 +379,7 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
     n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
     pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(pivots) < n:  # the matrix is singular at all points
-        checks.pivot(0.0, NEAR)
+        checks.pivot(0.0, MIN_PIVOT_RATIO)
         return [0.0] * n
     for row in M if checks.careful else ():
         for x in row[:n]:
@@ -396,7 +396,7 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
                 M[i][c], M[k][c] = select(is_swapped, entry_below, entry), select(is_swapped, entry, entry_below)
         inverses.append(_inverse(M[i][j]))
         if checks.careful:
-            checks.pivot(M[i][j], NEAR * M[i][n + 1])
+            checks.pivot(M[i][j], MIN_PIVOT_RATIO * M[i][n + 1])
         else:
             checks.number(M[i][j])
             smallest_pivot = extreme("min", smallest_pivot, abs(M[i][j]))
@@ -407,7 +407,7 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
     if not checks.careful:
-        checks.good = checks.good & (smallest_pivot > NEAR * bound()) & (largest_factor <= MAX_FACTOR)
+        checks.good = checks.good & (smallest_pivot > MIN_PIVOT_RATIO * bound()) & (largest_factor <= MAX_FACTOR)
     solution: list[Any] = [0.0] * n
     for (i, j), inverse in zip(reversed(pivots), reversed(inverses), strict=True):
         solution[j] = M[i][n] * inverse

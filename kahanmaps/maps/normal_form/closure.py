@@ -3,7 +3,7 @@
 Let rho_i be the coordinates of the translation on the circles whose products the components are. The orbit is dense if
 and only if sum n_i rho_i = n_0 has no integer solution except n_i = 0 for all i (Kronecker). On one circle it is enough
 that the translation has infinite order. For several circles no theorem is known that excludes all such relations; balls
-exclude those with small coefficients. The orbit is Zariski dense if no two of the curves are isogenous, which one prime
+exclude those with small coefficients. The orbit is Zariski dense if no two level curves are isogenous, which one prime
 may prove. See docs/mathematics.md, "Geometry of the level sets".
 """
 
@@ -20,8 +20,8 @@ from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 from kahanmaps.algebra.fields import RR
 
 _SCALE = 10**15  # the inverse of the accuracy of rotation numbers
-_SUPPORT = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
-_MAX_PRIME = 4000
+_MIN_EXCLUDED_SIZE = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
+_MAX_PRIME = 4000  # largest prime modulo which curves are compared
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Closure:
 
     `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if only
     this is known. If `prime` is given, no two of the curves are isogenous modulo this prime, so that the orbit is
-    Zariski dense (proved), and the map has no further integral on the level set; None: no prime was found or needed.
+    Zariski dense (proved), and on the level set all integrals are constant; None: no prime was found or needed.
     """
 
     is_dense: bool | None
@@ -46,11 +46,11 @@ class Closure:
     @property
     def text(self) -> str:
         """The result as one line."""
-        answer = "not dense" if self.is_dense is False else "dense"
+        answer_text = "not dense" if self.is_dense is False else "dense"
         zariski_text = (
             f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
         )
-        return f"{answer} in the real components that it visits ({self.status}: {self.reason}){zariski_text}"
+        return f"{answer_text} in the real components that it visits ({self.status}: {self.reason}){zariski_text}"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -82,26 +82,26 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
     if len(numbers) == 1:
         return Closure(True, "the translation of a circle has infinite order")
     bound, prime = excluded_relations(numbers), separating_prime(gamma_polynomial)
-    if bound < _SUPPORT:
+    if bound < _MIN_EXCLUDED_SIZE:
         return Closure(None, "the rotation numbers may be dependent", None, prime)
     return Closure(None, f"no integer relation of the rotation numbers has coefficients up to {bound}", bound, prime)
 
 
-def separating_prime(values: fmpq_poly) -> int | None:
-    """Return a prime modulo which the curves of all roots gamma of a polynomial are good and no two are isogenous.
+def separating_prime(gamma_polynomial: fmpq_poly) -> int | None:
+    """Return a prime modulo which the curves of all roots of `gamma_polynomial` are good and no two are isogenous.
 
     All roots must lie in GF(p). Two curves are not isogenous over any extension of GF(p) if the product of the
-    discriminants a^2 - 4p of their Frobenius maps is not a square. Returns None if no prime below 4000 is suitable.
+    discriminants a^2 - 4p of their Frobenius maps is not a square. Returns None if no prime below 4000 shows this.
 
     >>> separating_prime(fmpq_poly([6, -5, 1])), separating_prime(fmpq_poly([9, -6, 1]))
     (7, None)
     """
-    numerator, denominator = values.numer(), values.denom()
+    numerator, denominator = gamma_polynomial.numer(), gamma_polynomial.denom()
     for p in range(5, _MAX_PRIME):
         if not fmpz(p).is_prime() or denominator % p == 0:
             continue
         roots = [-int(f[0]) for f, _ in nmod_poly(numerator, p).factor()[1] if f.degree() == 1]
-        if len(roots) < values.degree() or any(root % p in (0, 1) for root in roots):
+        if len(roots) < gamma_polynomial.degree() or any(root % p in (0, 1) for root in roots):
             continue
         squares, discriminants = {x * x % p for x in range(1, p)}, []
         for gamma in roots:
@@ -115,7 +115,7 @@ def separating_prime(values: fmpq_poly) -> int | None:
 
 
 def excluded_relations(numbers: Sequence[arb]) -> int:
-    """Return some N such that sum n_i rho_i is not an integer for integers n_i, not all 0, of size at most N.
+    """Return an N such that sum n_i rho_i is not an integer for integers n_i, not all 0, of size at most N.
 
     The numbers rho_i are balls of radius at most 1e-15.
 

@@ -1,4 +1,4 @@
-"""Division polynomials of the translation T in gamma, whose roots are the levels on which all orbits are periodic.
+"""Division polynomials psi_N of the translation T, in gamma; their roots are the levels with periodic orbits.
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
 gamma = 1 - 64 eps^6 disc(h) c^2, c = h/(1 + eps^2 D) (docs/mathematics.md, "A translation, and tau functions"). So it
@@ -50,7 +50,7 @@ class PeriodicLevels:
 
     @cached_property
     def gammas(self) -> tuple[fmpq, ...]:
-        """The rational gamma with exact period N in increasing order, except 0 and 1, at which E is not smooth."""
+        """The rational gamma with exact period N in increasing order, except 0 and 1, where the cubic is singular."""
         roots = (-fmpq(f[0], f[1]) for f, _ in self.primitive.factor()[1] if f.degree() == 1)
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
@@ -68,7 +68,7 @@ class PeriodicLevels:
 
 
 def division_polynomials(largest: int) -> list[fmpz_poly]:
-    """Return psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of psi_n with n divisible by 3.
+    """Return psi_0, ..., psi_N in gamma, N = `largest`, without the factor gamma^(1/3) of psi_n if 3 divides n.
 
     >>> division_polynomials(6)[5:]
     [(-27)*x + 32, (-162)*x + 168]
@@ -76,7 +76,7 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
     def term(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """Return the product of psi at these indices; three superfluous cube roots give a factor gamma."""
+        """Return the product of psi at these indices; three cube roots more than in psi_n give a factor gamma."""
         cube_root_count = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
         value = _GAMMA ** (cube_root_count // 3)
         for k in indices:

@@ -40,7 +40,7 @@ _ACCURACY = 1e-15  # accuracy of rotation numbers
 _RELATIVE_ACCURACY = 1e-12  # relative accuracy of phase errors
 _HEIGHT_ACCURACY = 1e-12  # accuracy of heights that are printed without an error
 _MAX_HEIGHT_DEGREE = 4  # largest degree of fields over which heights are computed
-_LONGEST_HEIGHT = 4000  # largest number of bits of gamma for which a height is computed
+_MAX_GAMMA_BITS = 4000  # largest number of bits of gamma for which a height is computed
 
 
 @dataclass(frozen=True)
@@ -199,19 +199,19 @@ class LevelGeometry(PrintableResult):
     def text(self) -> str:
         lines = [line for plane in self.planes for line in plane.lines()]
         if self.rank is not None:
-            where = "over the splitting field of chi they " if any(p.degree > 1 for p in self.planes) else ""
-            lines.append(f"commuting maps\t{where}generate a group of translations of rank {self.rank} (proved)")
+            field_text = "over the splitting field of chi they " if any(p.degree > 1 for p in self.planes) else ""
+            lines.append(f"commuting maps\t{field_text}generate a group of translations of rank {self.rank} (proved)")
         if self.components is not None:
-            visits = {1: "", 2: ", the orbit visits both in turn"}
-            in_turn = visits.get(self.components, ", the orbit visits two of them in turn")
-            lines.append(f"real components\t{self.components}{in_turn}")
+            visits_texts = {1: "", 2: ", the orbit visits both in turn"}
+            visits_text = visits_texts.get(self.components, ", the orbit visits two of them in turn")
+            lines.append(f"real components\t{self.components}{visits_text}")
         if self.closure is not None:
             lines.append(f"orbit\t{self.closure.text}")
         if self.height_constant is not None:
-            reason = (
+            condition_text = (
                 "" if sum(plane.degree for plane in self.planes) == 1 else ", if planes have no long common factors"
             )
-            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically{reason}")
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically{condition_text}")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
@@ -284,10 +284,10 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
         bits = gamma.height_bits() if is_rational else max(x.height_bits() for x in gamma.coefficients)
         if order is not None:
             height_ball = arb(0)
-        elif bits <= _LONGEST_HEIGHT and is_rational:
+        elif bits <= _MAX_GAMMA_BITS and is_rational:
             curve = Jacobian(gamma)
             height_ball = canonical_height(curve, curve.T)
-        elif bits <= _LONGEST_HEIGHT and plane.degree <= _MAX_HEIGHT_DEGREE:
+        elif bits <= _MAX_GAMMA_BITS and plane.degree <= _MAX_HEIGHT_DEGREE:
             height_ball = plane_height(plane.block, triple)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
         height_value = None if height_ball is None else float(height_ball.mid())
@@ -321,7 +321,7 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Yield for each plane the point, the kind of its level curve, gamma, and the rotations if the level is smooth."""
+    """Yield each plane with the start in it, the kind of its level curve, gamma, and, if smooth, the rotations."""
     form: Any = getattr(normal_form, "form", normal_form)
     splitting = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):

@@ -71,7 +71,7 @@ class NthIterate:
             return self.splitting.point(triples)
 
     def _point_in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
-        """Return P_n over a field other than Q."""
+        """Return the n-th point P_n of the orbit of `start` in the plane, over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):

@@ -1,7 +1,7 @@
 """The level cubics of a plane as groups: the order of the translation Psi, and whether two points lie on one orbit.
 
 The levels are smooth. Orders are computed in fields with q elements, of characteristic at least 5; over number fields
-points are added, but no orders are computed. planar_block.py defines the cubic E, its Jacobian and T.
+points are added, but no orders are computed. planar_block.py defines Psi, the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from kahanmaps.algebra.elliptic_curves import AffinePoint, EllipticCurve, by_dou
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 
-_MAX_DIGIT = 2000
+_MAX_DIGIT = 2000  # largest prime l whose parts are compared: a digit to base l is found by counting
 _MAX_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm; this takes about 2^17 steps
 
 
@@ -149,7 +149,7 @@ class LevelCubic:
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
         """Return whether P is a multiple of T, whose order is `order`; None if this is not decided.
 
-        If `order` P is not zero, it is not. Otherwise, for every prime l that divides both the order of T and the index
+        If `order` P is not zero, P is none. Otherwise, for every prime l that divides both the order of T and the index
         of its multiples in the group, one discrete logarithm compares the parts of P and T of l-power order; for other
         primes no comparison is needed.
         """

@@ -39,12 +39,12 @@ from kahanmaps.maps.values import coordinates
 from kahanmaps.systems.quadratic import as_system
 
 LARGEST_FIELD = 1 << 192  # number of elements; a period over such a field takes a minute or two
-_MAX_WALK = 1 << 16  # number of steps taken if no theorem gives the answer
-_AGREEMENTS = 8  # if T has the same order modulo this number of primes, the order is tested over the field itself
+_MAX_STEPS = 1 << 16  # number of steps taken if no theorem gives the answer
+_MAX_AGREEING_PRIMES = 8  # if T has the same order modulo this number of primes, the order is tested over Q or Q[t]/g
 
 
 class PeriodKind(StrEnum):
-    """The type of the level cubic of a plane, which determines how the period is computed (p is not 2 or 3)."""
+    """The type of the level cubic of a plane, which determines how the period modulo p > 3 is computed."""
 
     FIXED = "a fixed point"  # period 1
     SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite; the period is the order of T
@@ -75,13 +75,13 @@ class PlanePeriod:
     @property
     def text(self) -> str:
         """The result as one line."""
-        result = f"period {self.period}" if self.period is not None else self.status
-        return f"{self.name}: {result} ({self.kind}{'; ' + self.reason if self.reason else ''})"
+        result_text = f"period {self.period}" if self.period is not None else self.status
+        return f"{self.name}: {result_text} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
 
 @dataclass(frozen=True)
 class OrbitPeriod(PrintableResult):
-    """The period of an orbit that is continued through poles: the least common multiple over the planes.
+    """The period of an orbit that is continued through poles: the least common multiple of those in the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (in some plane the map is not defined at the initial
     point and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the
@@ -164,14 +164,14 @@ def plane_period(
     q = prime if context is None else int(context.order())
     if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate homogeneous coordinates, through poles
         kind, image, has_met_pole = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
-        for step in range(1, min(q * q + q + 1, _MAX_WALK) + 1):
+        for step in range(1, min(q * q + q + 1, _MAX_STEPS) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
                 return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
             has_met_pole = has_met_pole or bool(image[2] == 0)
             if same_point(image, point):
                 return PlanePeriod(name, q, kind, "periodic", step, has_met_pole)
-        reason = f"no return to the initial point within {_MAX_WALK} steps"
+        reason = f"no return to the initial point within {_MAX_STEPS} steps"
         return PlanePeriod(name, q, kind, "undecided", None, has_met_pole or None, reason)
     kind, gamma = classify(block, point)
     if kind in _PERIOD_OF_KIND:
@@ -256,13 +256,13 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
 
 
 def _meets_pole_by_iteration(block: PlanarBlock, point: Triple, period: int) -> bool | None:
-    """Return whether an orbit reaches a pole, by iteration; None if the period is too long."""
+    """Return whether an orbit reaches a pole, by iteration; None if the first `_MAX_STEPS` steps do not decide."""
     image = point
-    for _ in range(min(period, _MAX_WALK)):
+    for _ in range(min(period, _MAX_STEPS)):
         image = block.image(image)
         if image[2] == 0:
             return True
-    return None if period > _MAX_WALK else False
+    return None if period > _MAX_STEPS else False
 
 
 def period_of(
@@ -397,7 +397,7 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
         (first_order, first_prime), (last_order, last_prime) = orders[0], orders[-1]
         if first_order != last_order:
             return None, f"T has the orders {first_order} and {last_order} modulo {first_prime} and {last_prime}"
-        if len(orders) == _AGREEMENTS:
+        if len(orders) == _MAX_AGREEING_PRIMES:
             curve = Jacobian(gamma)
             if curve.multiple(first_order, curve.T) is None:
                 return first_order, f"{first_order} T = 0"

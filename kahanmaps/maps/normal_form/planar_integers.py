@@ -135,7 +135,7 @@ class IntegerBlock(LevelBlock):
         return [triple[0], triple[1]], triple[2], fmpz(1)
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
-        """Return a number divisible by all primes that alpha U + beta V and W may have in common.
+        """Return a number divisible by all primes that alpha U + beta V, (alpha, beta) = `form`, and W may share.
 
         None if every prime may be common to both.
         """

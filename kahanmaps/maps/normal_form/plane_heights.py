@@ -28,7 +28,7 @@ _MULTIPLES = 24  # the largest m for which the reduction of m T is examined
 _LARGE_MULTIPLE = 50  # if no such m T is nonsingular at all primes, a multiple with m of at least this size is used
 _MAX_COEFFICIENT = 3  # largest coefficient of elements by which the model is reduced
 _TERMS = 40  # terms of the series; they decrease like 4^-n
-_ACCURACY = 1e-14
+_ACCURACY = 1e-14  # requested accuracy of heights
 
 
 def plane_height(block: PlanarBlock, point: Triple) -> arb:

@@ -29,7 +29,7 @@ from kahanmaps.maps.normal_form.tau import triples
 
 Block = IntegerBlock | AlgebraBlock
 
-# Powers of the fixed primes up to this size are found from one residue.
+# Powers of the fixed primes up to this exponent are found from one residue.
 _PRIME_POWER = 3
 
 

@@ -33,7 +33,7 @@ _RISE = 16  # number of steps over which a rise of the heights is more than a fl
 _EXACT_STEPS = 256  # number of steps that are first computed exactly,
 _EXACT_BITS = 8192  # as long as the numbers have at most this bit length
 _SINGLE_STEPS = 24  # up to this step, single steps are used in a plane
-_PRIMES = 20
+_PRIMES = 20  # number of random primes modulo which a pole is searched for
 # The default limits: longer numbers take minutes; this number of steps modulo a prime is faster than long numbers.
 _MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
@@ -172,7 +172,7 @@ class OrbitInPlanes:
 
 
 def _halve_above(n: int, step: int) -> int:
-    """Return the least of n, n/2, n/4, ..., rounded down, that is above `step`: a table for n contains its value."""
+    """Return the least of n, n/2, n/4, ..., rounded down, above `step`: a tau table for n contains its value."""
     while n >> 1 > step:
         n >>= 1
     return n

@@ -1,4 +1,4 @@
-"""The planes into which the normal form splits over a field, and the conversion of points to planes and back.
+"""The planes into which the normal form over K = Q[t]/chi splits over a field, and the conversion of points.
 
 Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g. Over GF(p) there is one for
 each factor of chi modulo p, with coordinates in GF(p^deg g). Over real balls there is one for each real root, and one,
@@ -188,7 +188,7 @@ def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], lis
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
-    """Return the monic irreducible factors over Q: linear factors by root, then others by degree and coefficients."""
+    """Return the monic irreducible factors over Q: linear factors by root, then the others by degree, coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 

@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences, a third as long.
+"""Tau functions: points of an orbit in a plane from terms of two Somos sequences, which have a third of their digits.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -30,7 +30,7 @@ from typing import Any
 from kahanmaps.maps.normal_form.planar_block import Triple, determinant
 from kahanmaps.maps.somos import Terms
 
-_MAX_BASES = 3
+_MAX_BASES = 3  # number of base points that are tried
 _MIN_INDEX = 2  # the least n: for smaller n, psi_{n-1} would be 0
 _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then holds about ten times the digits of a point
 
@@ -38,7 +38,7 @@ _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then hold
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    The points between n/2 and n would need more memory.
+    After P_n the terms of both sequences are kept from the index n/2 - 4 on.
     """
     table = table_near(block)
     if table is None:

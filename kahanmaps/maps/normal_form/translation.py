@@ -39,7 +39,7 @@ def iterate(
     """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
     `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep if one of
-    the first points, which are computed step by step, is a pole; NoTranslation for too many special positions.
+    the first points, which are computed step by step, is a pole; NoTranslation if a divisor is 0 at every base point.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> F = GF(10007)

@@ -11,7 +11,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # If a common divisor has fewer bits than this, dividing every entry by it takes longer than it saves.
 _USEFUL_BITS = 64
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which a determinant is shown not to be 0
 
 
 def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz) -> IntegerPoint | None:
@@ -21,7 +21,7 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
     up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
     length of W instead of up to n times: the exact divisions by the previous pivot remove the higher powers. If the
-    minors have no common factor with `candidate_divisor`, this is the usual algorithm. If they have one by chance (a
+    minors have no common factor with `candidate_divisor`, this is Bareiss' algorithm. If they have one by chance (a
     pivot W^2 in a matrix with a block that is W times the identity), the previous pivot need not divide later entries;
     the part of it that divides them is then found by gcds. The divisions are not checked one by one: the solution is
     verified in the equation.

@@ -22,7 +22,7 @@ class _Row:
     """A row of the equation: the exponents of p_k and q_k in each monomial, and the coefficients of the entries."""
 
     unknown: int
-    known_unknowns: tuple[int, ...]
+    earlier_unknowns: tuple[int, ...]  # the unknowns in the row that are solved before
     powers: tuple[tuple[tuple[int, int, int], ...], ...]
     entries: fmpz_mat  # rows: coefficients of the unknown and of the solved coordinates, then the right-hand side
     divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row
@@ -40,7 +40,7 @@ class _Row:
         if denominator_form == 0 or any(point[x][0] == 0 for x in self.divisors):
             return None
         denominator = fmpz(1)
-        for k, entry in zip(self.known_unknowns, known_entries, strict=True):
+        for k, entry in zip(self.earlier_unknowns, known_entries, strict=True):
             # Compute numerator/denominator - entry p/q with gcds of short numbers only.
             p, q = solved_coordinates[k]
             gcd = entry.gcd(q)
@@ -88,8 +88,8 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
         if i is None:
             return None
         unknown = next(j for j in unknowns_of_row[i] if j not in solved_unknowns)
-        known_unknowns = tuple(j for j in unknowns_of_row[i] if j in solved_unknowns)
-        entries = [rows[i][j] for j in (unknown, *known_unknowns, n)]
+        earlier_unknowns = tuple(j for j in unknowns_of_row[i] if j in solved_unknowns)
+        entries = [rows[i][j] for j in (unknown, *earlier_unknowns, n)]
         terms = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
         min_exponents = [min(exponents[k][x] for k in terms) for x in range(n)]
         reduced_exponents = [[exponents[k][x] - min_exponents[x] for x in range(n)] for k in terms]
@@ -97,7 +97,7 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
         matrix_terms = [k for k in terms if any(entry[k] for entry in entries[:-1])]
         row = _Row(
             unknown,
-            known_unknowns,
+            earlier_unknowns,
             tuple(
                 tuple((x, e, max_exponents[x] - e) for x, e in enumerate(powers) if max_exponents[x])
                 for powers in reduced_exponents

@@ -17,8 +17,8 @@ _LONG_BITS = 3000
 # If a common factor has fewer bits than this, and than this part of the numbers, it is not divided out ...
 _SHORT_BITS, _SHORT_PART = 64, 64
 # ... until the numbers have become this many times as long as at the last division.
-_LONGER = 8
-_SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8
+_MAX_RATIO = 8
+_SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8  # the primes below 50, each with the exponent 8
 
 
 class IntegerPoint:
@@ -52,7 +52,7 @@ class IntegerPoint:
     def lowest_terms(self) -> list[Fraction]:
         """Return the reduced numerator and denominator of each coordinate, with a single gcd of large numbers.
 
-        A common factor of some numerator and W is also a factor of W and the product of all numerators modulo W.
+        A common factor of a numerator and the denominator W divides W and the product of all numerators modulo W.
         """
         return _lowest_terms(self.numerators, self.denominator, _gcd_with_product(self.numerators, self.denominator))
 
@@ -107,8 +107,8 @@ class UnreducedPoint(IntegerPoint):
 
     The gcds of long numbers take most of the time of an orbit whose heights grow exponentially, and usually have only a
     few bits. A factor that is not removed costs little: its share of the length of the integers stays the same from
-    step to step. So only small primes are divided out at each step, and other common factors when the numbers have
-    become `_LONGER` times as long, or when coordinates are read. After a long common factor all points are reduced.
+    step to step. So only small primes are divided out at each step, and other common factors if the numbers have
+    become `_MAX_RATIO` times as long, or when coordinates are read. After a long common factor all points are reduced.
     """
 
     def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous_point: IntegerPoint) -> None:
@@ -118,7 +118,7 @@ class UnreducedPoint(IntegerPoint):
         self._integers = numerators, denominator
         self._common_factor_multiple: fmpz | None = None  # a multiple of the common factor, if known
         bits = self._bits_with_factors
-        self.keeps_factors = _LONG_BITS <= bits < _LONGER * self._previous_state[1] and not self._previous_state[0]
+        self.keeps_factors = _LONG_BITS <= bits < _MAX_RATIO * self._previous_state[1] and not self._previous_state[0]
         if self.keeps_factors:
             self._divide(common_part([denominator, *numerators], _SMALL_PRIMES))
 

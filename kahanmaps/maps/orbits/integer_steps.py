@@ -25,7 +25,7 @@ _ELIMINATION_BITS = 1000
 _ELIMINATION_DIMENSION = 16  # above this dimension FLINT's solver is faster as well
 _SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes longer than it saves
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
-_CRAMER_BITS = 500
+_CRAMER_BITS = 500  # bits of the first entry of the matrix from which on a point counts as long
 _MAX_TRIALS = 2  # after this number of failures, the elimination is no longer tried
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
-DEFAULT_MAX_DIGITS = 200_000
+DEFAULT_MAX_DIGITS = 200_000  # decimal digits of the integers of a point over one common denominator
 LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits is larger
 FIRST_POINTS = 3  # number of points at the beginning that an orbit stores
 _DIGITS_PER_BIT = 0.30103
@@ -131,7 +131,7 @@ class Orbit(HtmlDisplay):
         max_digits: the largest number of decimal digits of the integers over one common denominator (over Q).
         normal_form: if given (family.system_normal_form), steps are taken in the normal form: over Q plane by plane;
             over balls each point directly from the initial point, so that balls do not widen from step to step.
-        is_requested: returns whether a step is requested; other steps may be skipped to save time.
+        is_requested: returns whether a step is requested; steps for which it returns False may be skipped.
 
     `first` is the list of the first points, `last` the last point yielded so far.
 
@@ -190,8 +190,8 @@ class Orbit(HtmlDisplay):
         self._rational_orbit: RationalOrbit | None = None
 
     def __repr__(self) -> str:
-        state = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
-        return f"<Orbit: {state if self.end is None else self.end.text}>"
+        state_text = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
+        return f"<Orbit: {state_text if self.end is None else self.end.text}>"
 
     @property
     def relations(self) -> str | None:
@@ -353,11 +353,11 @@ def _bits_of_digits(max_digits: int | None) -> int | None:
 
 def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
     """Return a sentence saying that a step, perhaps one before the requested step, exceeds the budget."""
-    limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
+    limit_text = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
     size_text = "would have longer numbers"
     if bits is not None:
         size_text = f"has numbers of {counted(_digits_of_bits(bits), 'digit')}, more"
-    text = f"step {step} {size_text} than {limit}"
+    text = f"step {step} {size_text} than {limit_text}"
     return text if requested is None or requested == step else f"step {requested} cannot be reached: {text}"
 
 

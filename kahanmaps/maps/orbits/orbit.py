@@ -48,7 +48,7 @@ _MAX_SINGLE_STEPS = 10**13  # more single steps would take years
 # Up to these numbers of steps, no normal form is searched for: an exact search takes longer than it saves. In floating
 # point and with balls it also makes the points more accurate.
 _MAX_STEPS_WITHOUT_SEARCH = {"exact": 20, "float": 3, "ball": 3, "mod": DOUBLING_FROM["mod"] - 1}
-_LONG_INPUT = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
+_LONG_INPUT_BITS = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
 _MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
 _FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
 _BITS_PER_DIGIT = 3.3219281
@@ -597,7 +597,7 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Calla
         orbit = orbit_with(bits)
         if on_progress is not None:
             on_progress(f"balls of {bits} bits")
-        # Accuracy is relative to the largest coordinate, since others may be 0; one inaccurate point ends the trial.
+        # Accuracy is relative to the largest coordinate, as a coordinate may be 0; one inaccurate point ends the trial.
         is_accurate = all(
             entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(coordinate.mid()) for coordinate in point.x)
             for point in orbit
@@ -637,7 +637,7 @@ def _find_normal_form(
     if method is None:  # do not search for a normal form if the search takes longer than the orbit
         max_steps = _MAX_STEPS_WITHOUT_SEARCH[arithmetic.kind]
         numbers = [eps, *(rational(entry) for entry in request.start)]
-        if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
+        if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT_BITS:
             max_steps = max(max_steps, 24)
         if request.steps <= max_steps:
             return NoNormalForm("not computed for so few steps")

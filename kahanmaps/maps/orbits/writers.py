@@ -261,8 +261,8 @@ class Npz(Writer):
             self._rows.close()
             return
         # The numbers of iterates computed directly may exceed 64 bits.
-        fits_int64 = max(self._steps, default=0) < 2**63
-        steps: list[Any] = self._steps if fits_int64 else [str(step).encode() for step in self._steps]
+        has_int64_steps = max(self._steps, default=0) < 2**63
+        steps: list[Any] = self._steps if has_int64_steps else [str(step).encode() for step in self._steps]
         n = len(self._x)
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
@@ -326,7 +326,7 @@ WRITERS: dict[str, type[Writer]] = {
     "parquet": Parquet,
 }
 FORMATS = (*WRITERS, "npy")
-BINARY = ("npz", "parquet")
+_BINARY_FORMATS = ("npz", "parquet")
 
 
 @contextmanager
@@ -338,7 +338,7 @@ def writer_to(
     Raises InputError if the format is binary and the stream has no buffer of bytes.
     """
     if not isinstance(to, str | Path):
-        stream = getattr(to, "buffer", None) if form in BINARY else to
+        stream = getattr(to, "buffer", None) if form in _BINARY_FORMATS else to
         if stream is None:
             raise InputError(f"{form} is a binary format: give a path, or a stream with a buffer of bytes")
         yield WRITERS[form](stream, variables, integrals)
@@ -347,7 +347,7 @@ def writer_to(
         raise InputError(
             f"found a folder {meta_of(to)}, expected no folder of this name: the metadata is written there"
         )
-    with atomic_write(to) if form in BINARY else open_append(to) as stream:
+    with atomic_write(to) if form in _BINARY_FORMATS else open_append(to) as stream:
         writer = WRITERS[form](stream, variables, integrals)
         if isinstance(writer, Csv):
             writer.metadata_path = meta_of(to)

@@ -97,7 +97,7 @@ def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: flo
 
 
 def _inverse_of_last(b: Any, length: int, p: float, nu: float, inverses: Any) -> Any:
-    """Return 1/c for the last coefficient c."""
+    """Return 1/c for the last coefficient c of b; inverses[k] is 1/k modulo p."""
     u, v = b[0, length - 1], b[1, length - 1]
     norm = inverses[int((u * u - nu * v * v) % p)]
     return (u * norm) % p, ((p - v) * norm) % p

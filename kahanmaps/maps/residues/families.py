@@ -25,9 +25,9 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
-MAX_DIMENSION = 6
+MAX_DIMENSION = 6  # largest number of variables of a map
 NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
-_CHUNK_SIZE = 128
+_CHUNK_SIZE = 128  # members measured in one call of the kernel
 LONG = 200  # number of members from which on compiling saves time
 
 Members = NDArray[np.int64]
@@ -120,7 +120,7 @@ class Family:
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
     def coefficients(self, members: Members, eps: fmpq | None, numpy_rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return the coefficients of the equation, an array (members, 2, places)."""
+        """Return the coefficients of the equation in GF(p^2), an array (members, 2, coefficients)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):
             eps_values = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])

@@ -23,7 +23,7 @@ from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, cla
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
-_MAX_ONES = 7
+_MAX_ONES = 7  # numbers that are 1 in a counterexample
 _NEGATION = "not "
 
 Slot = tuple[str, tuple[int, ...]]  # a number that may be 1: "H", exponents; "J", index pair; "x", one index
@@ -71,11 +71,11 @@ def table(report: Report) -> str:
     for finding in report.findings:
         if finding.witness is not None:
             left, right = finding.witness.left[0], finding.witness.right[0]
-            point = ", ".join(finding.witness.point)
+            point_text = ", ".join(finding.witness.point)
             summary = finding.evidence.summary.removeprefix("fails for ")
             variation = VARIATIONS[finding.place["variation"]].title
             # Formulas are code: * and _ of plain text would become emphasis in Markdown.
-            data_text = f"`{summary}` at `x = ({point})`, `eps = 1`"
+            data_text = f"`{summary}` at `x = ({point_text})`, `eps = 1`"
             statement = finding.place["statement"]
             lines.append(f"* `{statement}`, {variation}: fails for {data_text}; the sides are `{left}` and `{right}`")
     return "\n".join(lines)

@@ -30,11 +30,11 @@ from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, Elliptic
 from kahanmaps.maps.orbits.relations.sections import common_primes
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
-_MAX_PRIMES = 100
+_MAX_PRIMES = 100  # number of primes from which the coefficients are computed
 _BITS_PER_PRIME = 100  # bits of the points for each prime: the coefficients must be shorter than the points
-_MAX_FACTORS = 8
+_MAX_FACTORS = 8  # of the shortest sequence of factors that a composition repeats
 _SKIPPED_STEPS = 3  # for a special initial point: terms of U near the beginning may be 0, like W(0)
-_FIRST = 2  # the least n for which the forms are used
+_MIN_INDEX = 2  # the least n for which the forms are used
 
 Groups = Sequence[tuple[int, ...]]  # groups of coordinates with a common denominator
 
@@ -86,7 +86,7 @@ def elliptic_steps(
 
 
 class Numbers(NamedTuple):
-    """The numbers that determine the forms of a group: H, y(2), y(3), and the coefficients, row by row."""
+    """What determines the forms of a group: H, y = y(2), z = y(3) (elliptic_search.py); coefficients, row by row."""
 
     H: fmpq
     y: fmpq
@@ -107,7 +107,7 @@ class _Search:
         self.groups: Groups = [tuple(range(n))]
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(factor.integer_steps.is_triangular for factor in factors):
-            # Each coordinate must be a copy of a new coordinate some steps before; coordinates must not only permute.
+            # Each coordinate must be new, or equal to one that was new at an earlier step; they must not only permute.
             earlier: list[list[int | None]] = [[None] * n for _ in range(stride)]
             for k, copied_coordinates in enumerate(earlier):
                 # The index of the equal coordinate of the point, for each coordinate of the image that is a copy.
@@ -132,7 +132,7 @@ class _Search:
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
-        """Return the numbers of all new groups; None if no curves exist or the numbers are too long."""
+        """Return the numbers of all new groups; None if no curves exist or `max_primes` primes do not suffice."""
         residues = from_residues(self._numbers_modulo, max_primes)
         if residues is None:
             return None
@@ -145,7 +145,7 @@ class _Search:
     @property
     def first(self) -> int:
         """The number of steps of factors after which the forms are used, since W(0) = 0."""
-        return (_FIRST + self.factors[0].dim) * self.stride
+        return (_MIN_INDEX + self.factors[0].dim) * self.stride
 
     def degree(self, k: int, group: int) -> int:
         """Return the degree of a group of coordinates on a curve."""

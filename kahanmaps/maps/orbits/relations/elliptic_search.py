@@ -6,13 +6,13 @@ divided by coordinates of all points but one. Two independent sections vanish at
 quotient z takes each value twice. With the sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of
 the zeros of a section,
 
-    z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m)),
+    z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m))      for an integer k and a sequence r,
 
 so the cross ratios of z give quotients of W and U. Those of four consecutive points are 1 - y(2n + k - 1) with
 
     y(u) = H U(u)^2/(U(u + 1) U(u - 1)),      y(u + 1) y(u) (1 - y(u)) y(u - 1) = H,
 
-where W(2) = H and W(3) = H^3. Another choice of four points gives y(u) at the remaining u, up to an unknown factor.
+where W(2) = H and W(3) = H^3. Another choice of four points gives 1 - y(u) at the remaining u, up to a factor K.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from kahanmaps.maps.somos import around, first_terms
 
 Rows = list[list[int]]
 
-_MAX_PRODUCTS = 64
-_MAX_DEGREE = 8
+_MAX_PRODUCTS = 64  # largest number of products of coordinates that are tried as sections
+_MAX_DEGREE = 8  # largest degree d of the line bundle
 _EXTRA_POINTS = 8  # rows beyond the number of unknowns; a wrong relation passes at each with probability 2^-60
 _Z_VALUES = 14  # values of z from which the sequences are computed; nine suffice
 _POINT_COUNTS, _LAGS = (2, 3), (1, 2)  # possible numbers of points in a product, and possible distances between them
@@ -116,7 +116,7 @@ def _section_basis(points: Rows, sections: Sections, prime: int) -> Rows | None:
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
     # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
-    # factors 1 (the last coordinate) and a linear form with other zeros suffice for g.
+    # factors 1 (the last coordinate) and a linear form without zeros in common with it suffice for g.
     all_products = _products_of_coordinates(points, coordinates, count, lag, prime)
     values = [[row[k] for k in sections.products] for row in all_products]
     product_matrix = matrix(values[: sections.rows], prime)

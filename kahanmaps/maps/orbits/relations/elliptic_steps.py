@@ -1,4 +1,4 @@
-"""Steps along an orbit on an elliptic curve; the coordinates are forms in the terms of two Somos sequences.
+"""Steps along an orbit P + n T on an elliptic curve; the coordinates are forms in the terms of two Somos sequences.
 
 If the forms have degree d, the terms have 1/d of the length of the coordinates: a step consists of a few short
 products, without a gcd of long integers.
@@ -18,7 +18,7 @@ from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.sections import exponents
 from kahanmaps.maps.somos import Terms
 
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which skipped points are shown to exist
 
 
 class EllipticSteps:

@@ -36,7 +36,7 @@ def is_conserved(family: MapFamily, eps: fmpq, integral: RationalFunction) -> bo
 def level_curve(
     integral: RationalFunction, eps: fmpq, points: Sequence[tuple[fmpq, ...]]
 ) -> tuple[EllipticCurve, AffinePoint, fmpq_mpoly] | None:
-    """Return the curve on which an orbit lies, the difference of successive points, and F.
+    """Return the curve on which an orbit lies, the difference of successive points, and its polynomial F.
 
     Args:
         integral: a function of two variables and eps that the map conserves.
@@ -97,7 +97,7 @@ def level_curve(
 
 
 def _lines_through(F: fmpq_mpoly, center: Triple) -> tuple[fmpq_mat, tuple[fmpq_poly, ...]] | None:
-    """Return a basis O, A, B, and F(s O + A + t B) = p0 + p1 s + p2 s^2 with polynomials in t; None for other degrees.
+    """Return a basis O, A, B, and F(s O + A + t B) = p0 + p1 s + p2 s^2, p_i in Q[t]; None if the degree in s is not 2.
 
     O is the center; the columns of the matrix are the basis.
     """

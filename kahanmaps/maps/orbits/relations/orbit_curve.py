@@ -150,12 +150,12 @@ class OrbitCurve(PrintableResult):
                 f"  canonical height\t{self.height.str(12)}",
             ]
             visits = {1: "", 2: ", the orbit stays on one" if self.steps == 1 else ", the orbit visits both in turn"}
-            side = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
+            side_texts = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
             n = self.components or 1
-            lines.append(f"  real components\t{n}{visits[n]}{side[n]}")
+            lines.append(f"  real components\t{n}{visits[n]}{side_texts[n]}")
         if self.trace is not None:
-            kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
-            lines.append(f"  multiplier\t{kind}, infinite order (proved)")
+            multiplier = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
+            lines.append(f"  multiplier\t{multiplier}, infinite order (proved)")
         if self.rotation is not None:
             note = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
             lines.append(f"  rotation number\t{self.rotation.str(12)}{note}")
@@ -200,7 +200,7 @@ def orbit_curve(
         map_over: the map.
         start: the initial point, exact.
         family, integrals: the map for every eps, and its claimed integrals. In the plane, the level curves of proved
-            integrals are used for orbits that are periodic or special.
+            integrals are used for orbits whose points determine no curve.
 
     Raises UnknownCurve if no curve is found, InputError if the orbit is finite or the map is not over Q.
 
@@ -323,7 +323,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return enough points to recognize a period, which ends them, or a rational curve; None follows if too long."""
+    """Return the points that show a period (which ends them) or a rational curve; None follows if too long."""
     dim = map_over.dim
     map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]

@@ -1,4 +1,4 @@
-"""Orbits over Q: single steps until relations between the points are found, which make further steps faster."""
+"""Orbits over Q: single steps until relations between the points are found, which make the later steps faster."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elli
 # If the coefficients are longer than expected, the search is repeated when points are _RETRY_FACTOR times as long.
 _MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second is multiplied by the square of (dimension + 1)
 _RETRY_FACTOR = 4
-_LONGER_THAN_START = 8
+_LONGER_THAN_START = 8  # the search starts when points are this many times as long as the initial point
 _SLOW_GROWTH = 1.5
 
 

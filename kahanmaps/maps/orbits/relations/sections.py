@@ -15,7 +15,7 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.maps.somos import around
 
-_PRIME = 2**61 - 1
+_PRIME = 2**61 - 1  # modulo which independent products are chosen
 
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
@@ -30,7 +30,7 @@ def exponents(degree: int) -> list[tuple[int, int, int]]:
     """Return the triples (k, i, j) that describe a basis of the sections of a degree.
 
     k is 0 for U(n) and 1 for U(n + 1) W(n - 1); i and j are the exponents of W(n)^2 and W(n + 1) W(n - 1). The products
-    with k = 0 (for odd degree, those with k = 1) have a further factor W(n).
+    with k = 0 (for odd degree, those with k = 1) have an additional factor W(n).
     """
     max_exponents = ((degree - 1) // 2, (degree - 2) // 2)
     return [(k, max_exponent - j, j) for k, max_exponent in enumerate(max_exponents) for j in range(max_exponent + 1)]
