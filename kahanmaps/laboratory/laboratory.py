@@ -237,7 +237,7 @@ class Laboratory:
                 format_polynomial(affine.function), 1, affine.function.compose(*full_ring.gens()[:n], ctx=full_ring)
             )
             for affine in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
-            # l must divide l' for all values of the symbols, not only for those of the file or for the stand-in
+            # l must divide f . grad l for all values of the symbols, not only for those of the file or for the stand-in
             if darboux_cofactor(self.system, affine.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 

@@ -25,7 +25,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 Point = tuple[int, ...]
 Values = Sequence[Any]  # Python integers, or nmod, whose products take half the time
 Exponent = tuple[int, ...]
-_TRIES = 60
+_TRIES = 60  # random points, or orbits
 _UNDEFINED = "the map is not defined at random points modulo a prime"
 
 

@@ -28,7 +28,7 @@ _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
 _MAX_ORDER = 12  # of a linear iterate
 _MAX_DIMENSION = 8  # for the spectral radius, which needs factors of polynomials of degree up to 2 dim^2
-_BITS = 256
+_BITS = 256  # working precision of the roots
 _LARGEST_ORDER = 60  # of an integer matrix of finite order with at most _MAX_DIMENSION rows
 
 

@@ -271,7 +271,7 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     if len(values) < 2 * order + needed_checks(order):
         return None
     # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
-    # # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
+    # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
     integer_coefficients = [int(c) for c in polynomial.coeffs()]
     integer_coefficients = [c - _PRIME if 2 * c > _PRIME else c for c in integer_coefficients]
     for n in range(len(values) - order):

@@ -56,7 +56,7 @@ MAX_INDEPENDENT = 800  # monomials that no relation of lower degree reduces; the
 _SETTLED_DEGREES = 4
 _SPARE_BITS = 40  # a number must be shorter by this than a random residue modulo two primes, which has 122 bits
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
-_MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
+_MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` includes known
-    integrals. `period` is the number of points of closed orbits, else None. `agree`: all maps gave the same numbers.
-    `complete`: all requested degrees were tried; if not, `cut` says why.
+    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` is the
+    largest one with known integrals included. `period` is the number of points of closed orbits, else None.
+    `agree`: all maps gave the same numbers. `complete`: all requested degrees were tried; if not, `cut` says why.
     """
 
     dim: int
@@ -452,7 +452,7 @@ def _relation_basis(map_: ModularMap, degree: int) -> list[list[int]]:
 
 
 def _number_text(coefficient: int, other_coefficient: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is none."""
+    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is not."""
     for power in _POWERS:
         residues = [
             [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]

@@ -352,7 +352,7 @@ def integrals_of(
         on_result(build_result(profile, UNFINISHED))
         share = next(budgets)
         cofactors = laboratory.cofactors()
-        # For a vector field there would be too many candidates. Most integrals have denominators with these factors.
+        # A vector field would have too many candidates; the polynomials of its cofactors suffice for most denominators.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
         denominator_cofactors = denominators_among(factors, laboratory.map.dim)

@@ -101,7 +101,7 @@ def candidates(
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `polynomials` polynomials. For a flow they are the Darboux polynomials that are found within the budget.
+    of the given `polynomials`. For a flow they are the Darboux polynomials that are found within the budget.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -196,7 +196,7 @@ class _Line:
         )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
-        """Evaluate g on a curve (X : Z): the numerator Z^deg g(X/Z)."""
+        """Evaluate g on a curve (X : Z): the numerator Z^deg(g) g(X/Z)."""
         n, p = self.map.dim, self.prime
         field = GF(p)
         parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]

@@ -37,7 +37,7 @@ _LOW_HEIGHT = 12  # up to this height a subspace may be missing modulo one prime
 _MIN_PRIMES = 3
 MAX_FIELD_DEGREE = 6
 SPARE_BITS = 12  # bits by which relations of a point must be shorter than relations of random residues
-_MAX_FAILURES = 200
+_MAX_FAILURES = 200  # successive combinations of residues without conjugate points
 _MAX_POINTS = 24  # points modulo a prime
 _MAX_PRIMES = 14  # primes that are combined
 

@@ -150,7 +150,7 @@ def _find_hypersurfaces(
 
 
 def degree_reached(points: float, count: int) -> int:
-    """Return the largest degree, at most `MAX_DEGREE`, such that `points` points determine hypersurfaces of it.
+    """Return the largest degree, at most 6, such that `points` points in `count` variables determine hypersurfaces.
 
     >>> degree_reached(53, 2), degree_reached(11, 2)
     (6, 2)

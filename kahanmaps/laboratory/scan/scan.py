@@ -60,7 +60,7 @@ _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
 _LINE_FACTOR = 4  # by which the number of lines grows if hypersurfaces were missed
-_MANY_LINES = (150, 60)
+_MANY_LINES = (150, 60)  # the same two numbers for more than 3 parameters
 # The number of random planes, which meet components that lines do not meet, and their primes.
 _PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
 _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
@@ -68,9 +68,9 @@ _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their
 _SWEEPS_END, _CONDITIONS_END, _CONFIRMATION_END, _GROWTH_END = 0.6, 0.75, 0.85, 0.9
 # Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
 _DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
-_MAX_LENGTH = 4096
+_MAX_LENGTH = 4096  # if the number of iterates is given as `terms`
 _TRIAL_PRIME = 8179  # so large that hardly any member is special
-_MAX_TERMS = 7
+_MAX_TERMS = 7  # iterates by default
 _CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
 _TRIES = 20  # attempts to find a rational member
 _GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member

@@ -58,7 +58,7 @@ MAX_MESSAGES = 6  # messages on equations that were not solved
 # By default all quadratic g are tried first. The limit of work for this does not depend on the effort, so that all
 # commands choose the same shape; usually a few hundredths of it suffice.
 QUICK_DIMENSION, QUICK_UNITS = 3, 1e6
-MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
+MAX_SPACE = 24  # dimension l: the cubic equations have up to C(l + 2, 3) + l terms
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import KahanFamily
 
 _BUDGET = 2_000_000  # products of terms, for the arithmetic with integrals
-_MAX_ROUNDS = 5  # combinations of an integral with others
+_MAX_ROUNDS = 5  # combinations of an integral with other integrals
 _MAX_UNKNOWNS = 60  # coefficients of a relation between leading terms
 _SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # monomials of an integral of the flow, and of the second term of a series
 _DENSITY_DEGREE = 4
@@ -222,7 +222,7 @@ def flow_and_map(
         progress: called with a sentence at each stage of the search.
 
     Returns:
-        The comparison, exact except for statements marked as measured. None for other maps, or at a single eps.
+        The comparison, exact except for statements marked as measured. None for all other maps, and for a single eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.preserve.integrals import find_integrals

@@ -265,7 +265,7 @@ def find_poisson(
             limit_text = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             candidate_tensors, _ = _find_tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
         if not candidate_tensors and denominator is None:
-            # Try the product of the factors of a known density as denominator; its degree is added to the degree.
+            # Try the product of the factors of a known density as denominator; its degree is added to that of entries.
             density = None
             with suppress(NoPoint):
                 density = products_of(
