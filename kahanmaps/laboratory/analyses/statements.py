@@ -19,7 +19,7 @@ from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 
 PROVED, MEASURED, UNDECIDED, NOTE = Certainty.PROVED, Certainty.MEASURED, Certainty.UNDECIDED, Certainty.NOTE
 
-MAX_POINTS = 8  # the number of fixed points that three quadratic equations have
+MAX_POINTS = 8  # sets of fixed points that are listed; three quadratic equations have up to 8 points
 MAX_NAMES = 6  # names that are listed one by one
 MAX_DEGREES = 12  # degrees of iterates that are printed
 MAX_FIELDS = 6  # vector fields that are listed one by one
