@@ -570,9 +570,9 @@ def verdict_on(
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
     eps_texts = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
-    point = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    parameters_text = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
-    scope = f"for {point}{restriction}" if point else restriction.removeprefix(", ").strip()
+    scope = f"for {parameters_text}{restriction}" if parameters_text else restriction.removeprefix(", ").strip()
     identity_key = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
     identity = Identity(
         n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=identity_key

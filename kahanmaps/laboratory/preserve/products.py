@@ -344,7 +344,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
 
     def evaluate_constants(map_: ModularMap) -> list[int]:
         """Return prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
-        p, field_p, products = map_.prime, GF(map_.prime), list[int]()
+        p, field_p, constants = map_.prime, GF(map_.prime), list[int]()
         parameters = [field_p.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
             count_work(50 + 10 * n)
@@ -357,8 +357,8 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
                     if not value or not image_value:
                         raise NoPoint("a polynomial vanishes at a random point modulo a prime")
                     constant = constant * pow(image_value, k, p) * pow(value, -k, p) % p
-            products.append(constant)
-        return products
+            constants.append(constant)
+        return constants
 
     values = constants_of(laboratory, evaluate_constants)
     vectors_with_constant = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]

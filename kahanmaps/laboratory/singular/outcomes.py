@@ -266,9 +266,9 @@ class Tracking:
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
-        letters = MapSequence([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.offsets = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
-        return letters
+        map_sequence = MapSequence([*equations[self.stage : self.period], *equations[: self.stage]])
+        map_sequence.offsets = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
+        return map_sequence
 
     def along(self, form: Any, field: PrimeField) -> TrackedFunctions:
         """Return the functions whose orders are measured along curves through the hypersurface of `form`."""

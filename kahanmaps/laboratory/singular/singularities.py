@@ -74,7 +74,7 @@ _SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimens
 _LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
 _REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MAX_FIRST_STEPS = 200  # steps along series before only points are followed
-_DRAWS = 2  # the number of pairs of eps that are tried, as an eps may be special
+_MAX_EPS_PAIRS = 2  # pairs of eps that are tried, as an eps may be special
 WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; they are slow in higher ones
 _POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
@@ -428,7 +428,7 @@ def patterns(
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
     result = _no_patterns("")
-    for attempt in range(_DRAWS if eps is None else 1):
+    for attempt in range(_MAX_EPS_PAIRS if eps is None else 1):
         if attempt and (not result.running or budget.is_spent):
             break
         values = default_eps(map_, seed + attempt) if eps is None else (eps,)

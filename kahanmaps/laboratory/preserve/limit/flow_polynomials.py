@@ -343,7 +343,7 @@ class _Line:
 
     def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], factors: Iterable[fmpq_mpoly]) -> None:
         self.flow, self.degree, self.support, self.known_polynomials = flow, degree, support, factors
-        self.count = len(support)
+        self.count = len(support)  # monomials
         self.start, self.slope = flow.random_point(), flow.random_point()
         self._generic_dimensions: dict[int, int] = {}
 

@@ -80,7 +80,7 @@ class Pencil:
     def text(self) -> str:
         """A sentence on degree, genus and base points of the generic curve."""
         verb = "is" if self.components == 1 else f"has {self.components} components"
-        points_text = ", ".join(points_text.text for points_text in self.base_points)
+        points_text = ", ".join(points.text for points in self.base_points)
         return (
             f"the generic curve {self.integral} = c {verb} of degree {self.degree} and genus {self.genus}; "
             f"base points: {points_text}"
