@@ -16,7 +16,7 @@ from flint import fmpq_mpoly, fmpz
 from kahanmaps.certificates.entropy import EPS, LINE, PositiveEntropy, image_degree
 from kahanmaps.errors import InputError
 
-_MAX_PRIMES = 20
+_MAX_PRIMES = 20  # primes from 1009 on that are tried
 
 LIBRARY = """\
 Require Import ZArith Znumtheory List.

@@ -54,7 +54,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 
-MAX_TERMS = 10_000
+MAX_TERMS = 10_000  # iterates that are measured
 _LINES = 2  # random lines along which each degree is measured
 _DENSE_TERMS, _SEARCH_INTERVAL = 64, 8  # recurrences are searched for after each of the first 64 terms, then every 8
 _MIN_QUOTIENTS = 6  # d_n/d_{n-1}, for the estimate whether the growth is exponential

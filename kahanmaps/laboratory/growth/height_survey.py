@@ -35,7 +35,7 @@ DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
-_MAX_STARTS = 1000
+_MAX_STARTS = 1000  # initial points for each eps
 _GROWTH_TEXTS = {
     Growth.PERIODIC: "points come back",
     Growth.BOUNDED: "bit lengths stay bounded",

@@ -43,8 +43,8 @@ from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
-_MAX_UNKNOWNS = 1000
-_MAX_DEGREE = 12
+_MAX_UNKNOWNS = 1000  # monomials of phi
+_MAX_DEGREE = 12  # of phi, if the caller gives no degree
 _FIRST_POWER = CofactorProduct((1,), 1)  # of det dPhi
 
 

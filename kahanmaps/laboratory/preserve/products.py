@@ -48,7 +48,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
-_MAX_CANDIDATES = 60
+_MAX_CANDIDATES = 60  # polynomials whose powers are multiplied
 _MAX_TERMS = 20_000  # of an expanded product
 _DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that this exponent is small in reduced bases
 

@@ -30,7 +30,7 @@ from kahanmaps.laboratory.singular.jets import (
 )
 from kahanmaps.maps.equation import Equation
 
-_MAX_PRECISION = 4096
+_MAX_PRECISION = 4096  # terms of a series
 # Numbers of terms of long series: the work of a step is at least proportional to the number.
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
 _MIN_ROWS = 8  # at least so many last rows must be zero, or so many rows satisfy a recurrence

@@ -52,7 +52,7 @@ _SPARE = 8  # orders of a series beyond the number of monomials
 _MAX_CHOICES = 400  # choices of zeros on a line, and pairs of choices on two lines
 _PRIMES = 12  # the first one usually suffices
 _PRECISION = 24  # exponent of a prime power, which has 1,464 bits
-_MAX_CONJUGATES = 8
+_MAX_CONJUGATES = 8  # the largest degree of coefficients that are recognized as algebraic
 _LINES = 4  # modulo each prime
 
 Vectors = list[list[int]]

@@ -48,7 +48,7 @@ _BUDGET = 2_000_000  # products of terms, for the arithmetic with integrals
 _MAX_ROUNDS = 5  # combinations of an integral with other integrals
 _MAX_UNKNOWNS = 60  # coefficients of a relation between leading terms
 _SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # monomials of an integral of the flow, and of the second term of a series
-_DENSITY_DEGREE = 4
+_DENSITY_DEGREE = 4  # of the densities of the flow that are searched for
 _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dimension; 3 in higher dimension
 
 

@@ -35,7 +35,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.singular.jets import modulo
 
-MAX_DEGREE = 12
+MAX_DEGREE = 12  # of numerator and denominator of the integral
 _TRIES = 3  # primes, until the results for two of them agree
 _BITS = 31  # of primes; python-flint does not sort factors with larger coefficients
 # The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the

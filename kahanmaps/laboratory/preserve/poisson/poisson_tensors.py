@@ -56,7 +56,7 @@ from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
-_MAX_UNKNOWNS = 2000
+_MAX_UNKNOWNS = 2000  # coefficients of all entries of a tensor
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
 _SPARE_POINTS = 8  # points beyond those that determine the unknowns
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
