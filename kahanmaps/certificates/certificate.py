@@ -117,7 +117,7 @@ def certificate(
     effort: int = 1,
     command: str = "",
 ) -> Certificate:
-    """Write a proof for another program to check: integrals, invariant volume forms and further claims, for every eps.
+    """Write a proof for another program to check: integrals, invariant volume forms and other claims, for every eps.
 
     Args:
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.

@@ -78,7 +78,7 @@ class _Script:
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
     def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
-        """Return definitions of functions with the same arguments."""
+        """Return the definitions of the `polynomials` as functions of the `arguments`."""
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:

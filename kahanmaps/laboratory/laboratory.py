@@ -177,7 +177,7 @@ class Laboratory:
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
-        """Yield `count` maps modulo further primes, each at other random residues of the symbols and eps."""
+        """Yield `count` maps modulo other random primes, each at its own random residues of the symbols and eps."""
         return self._draw_maps("other maps", count)
 
     def _draw_maps(self, name: str, count: int) -> Iterator[ModularMap]:

@@ -90,7 +90,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def fitted(self) -> Recurrence | None:
-        """The shortest linear recurrence that further measured degrees confirm, or None; see `unconfirmed`."""
+        """The shortest recurrence with enough confirming degrees for `find_recurrence`, or None; see `unconfirmed`."""
         return find_recurrence(self.degrees)
 
     @cached_property

@@ -114,7 +114,7 @@ class Profile:
 
     @property
     def is_settled(self) -> bool:
-        """Whether at least 4 degrees were tried and the last one showed no further integral."""
+        """Whether at least 4 degrees were tried and the last one showed no more integrals than the one before."""
         return self.degree >= _SETTLED_DEGREES and self.codimensions[-1] == self.codimensions[-2]
 
     @property
@@ -198,7 +198,7 @@ def orbit_profile(
     known_gradients: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
-    """Measure the relations of degree 1, 2, ... on one orbit of each map, which should have the same dimensions.
+    """Measure the relations of degree 1, 2, ... on one orbit of each map; their dimensions should agree.
 
     Args:
         maps: the maps, with different primes and, if eps is not given, different eps.

@@ -273,7 +273,7 @@ class _ScanRun:
             self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
-        """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are smaller than those of others."""
+        """Sweep modulo the primes of a plan, and drop sweeps with smaller generic degrees than other sweeps."""
         self.planned_members += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
@@ -306,7 +306,7 @@ class _ScanRun:
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def plan_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
-        """Plan more random lines, all new, if a hypersurface was probably missed on the lines so far.
+        """Plan random lines, all new and 4 times as many, if a hypersurface was probably missed on the lines so far.
 
         A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
         plan is empty if none was missed, or if the plan would need more than `max_members` members.
@@ -375,7 +375,7 @@ class _ScanRun:
         return list(chain.from_iterable(components)), skipped_count
 
     def with_growth(self, component: Component, shared_growths: dict[Degrees, DegreeGrowth]) -> Component:
-        """Add the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees.
+        """Add the growth at a rational member; if there is none, or it is special, the growth of `_fit_growth`.
 
         Nothing is added if the component shares the growth of another one, or if an iterate is nowhere defined.
         """
@@ -406,7 +406,7 @@ class _ScanRun:
 def _fit_growth(
     component: Component, family: ScannedFamily, max_degree: int = _MAX_FITTED_DEGREE
 ) -> DegreeGrowth | None:
-    """Return the growth fitted to more degrees, measured modulo a prime; None if no member was found."""
+    """Return the growth fitted to up to 26 degrees, measured modulo a prime; None if no member was found."""
     expected_degrees = [component.degrees[-1]] * _FITTED_TERMS
     degrees = family.degrees_on(component.equations, expected_degrees, random.Random(family.seed), max_degree)
     if degrees is None:

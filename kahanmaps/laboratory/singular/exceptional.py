@@ -210,7 +210,7 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.transversal)
 
     def curve_through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return such a curve through a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
+        """Return this curve, moved to a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple(

@@ -320,8 +320,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, region.values, order, rng, self.budget)
         equations = [*region.equations, *(normal_form(p, region.equations) for p in equations)]
         gens = region.values[0].context().gens()
-        # New coordinates in which each equation has few unknowns. They are used at the first level only: later parts
-        # have further equations, which would have to be transformed as well.
+        # New coordinates in which each equation has few unknowns. They are used at the first order only: regions of
+        # later orders have further equations, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and order_index == 0:
             zero = gens[0].context().constant(0)

@@ -153,7 +153,7 @@ def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a function of eps
-        # The determinant is 1 at eps = 0, so every factor is a number there. Divided by it, the cofactor is 1 there.
+        # The determinant is 1 at eps = 0, so every factor is a number there. Dividing by it makes the cofactor 1 there.
         constant = substitute(factor, {"eps": fmpq(0)})
         cofactors.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(cofactors, key=lambda cofactor: (cofactor.weight, cofactor.name)))

@@ -203,7 +203,7 @@ def darboux_polynomials(
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
-    """Return whether products P Q of elements of other spaces with cofactors of product `C` span the space of `C`."""
+    """Return whether products P Q of elements of other spaces span the space of `C`, the product of their cofactors."""
     space, (product, c) = spaces[C], C
     other_spaces = {(key[0].powers, key[1]): other_space for key, other_space in spaces.items() if key != C}
     rows = []

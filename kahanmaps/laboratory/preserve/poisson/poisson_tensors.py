@@ -334,7 +334,7 @@ def _find_tensors(
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[MatrixPoissonTensor], str]:
-    """Compute formulas for a basis of the tensors with a denominator and with these monomials of the bivector.
+    """Compute formulas for a basis of the tensors with this denominator, with the given `monomials` of the bivector.
 
     Returns the tensors and an empty text, or no tensors and the reason.
     """
