@@ -63,7 +63,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
 # Measured seconds of each program: to start, for each byte of the text, and for each term that is multiplied out.
 _SECONDS = {"rocq": (1.7, 2.2e-4, 7e-5), "gp": (0.05, 5e-6, 0.0), "sympy": (0.6, 0.0, 1.8e-5)}
 VOLUME = "volume"  # the claim that the volume form dx/phi is invariant
-TENSOR = "poisson"
+TENSOR = "poisson"  # the claim that a Poisson tensor is invariant and satisfies the Jacobi identity
 ENTROPY = "entropy"  # the claim of positive algebraic entropy, hence of nonintegrability
 DETERMINANT = "determinant"  # the claim that dx/det(I - eps f') is invariant, if the file claims another density
 UNPROVED = "Pi"  # the claim that J - eps^2 f'^2 J is invariant, if no theorem implies it
@@ -96,7 +96,7 @@ class Certificate(str):
 
     @property
     def summary(self) -> str:
-        """The number of claims, the number of bytes, and the time that the check takes."""
+        """The number of claims, the number of bytes of the text, and the estimated time of the check, as a phrase."""
         time = f"about {self.seconds:.2g} seconds" if self.seconds >= 1 else "less than a second"
         return f"{counted(len(self.claims), 'claim')}, {len(self.encode())} bytes, {time} to check"
 
@@ -117,7 +117,7 @@ def certificate(
     effort: int = 1,
     command: str = "",
 ) -> Certificate:
-    """Write a proof for another program to check: integrals, invariant volume forms and further claims, for every eps.
+    """Write a proof for another program to check: integrals, invariant volume forms and other claims, for every eps.
 
     Args:
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.
@@ -130,7 +130,7 @@ def certificate(
         integrals: further rational functions of x and eps, given as for `check_integrals`.
         density: phi, given as for `check_measure`.
         tensor: a Poisson tensor, given as for `check_poisson`.
-        everything: whether all these claims are searched for as well.
+        everything: if `claims` is None, all claims, also "entropy" and those that need a search.
         commute: another system or map in the same variables: certify that the two maps commute. For members of the
             commuting family the proof uses coordinates in which the planes separate. "associates" stands for all pairs
             of rational associated systems.
@@ -445,7 +445,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         integrals = [integral for integral in result.integrals if integral.verdict is proved]
         return [claim for I in integrals for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
-        densities = [density for density in result.shown if density.verdict is proved]  # further ones are multiples
+        densities = [density for density in result.shown if density.verdict is proved]  # all others: integrals times it
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
     if isinstance(result, PoissonSearch):
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]

@@ -24,7 +24,7 @@ _PRIME = 2**61 - 1
 
 @dataclass(frozen=True)
 class RationalPoint:
-    """A point that depends rationally on x; each coordinate has a numerator and the index of a denominator."""
+    """A point that depends rationally on x; each coordinate has a numerator and an index into `denominators`."""
 
     numerators: tuple[fmpq_mpoly, ...]
     denominators: tuple[fmpq_mpoly, ...]
@@ -51,8 +51,8 @@ class RationalPoint:
 class Chain(EquationClaim):
     """The points x = point 0, point 1, ..., each the image of an earlier point, two of which are equal.
 
-    `maps` are the maps by their letters. For each point except x, `arrows` contains the letter of the map, the number
-    of the preimage, and the index of the point in `values`, which begin with x. The two `equal_points` agree.
+    `maps` has a letter for each map. For each point except x, `arrows` contains the letter of the map, the number of
+    the preimage, and the index of the point in `values`, which begin with x. The points numbered `equal_points` agree.
     """
 
     maps: Mapping[str, MapData]
@@ -89,7 +89,7 @@ def periodic(f: MapData, period: int) -> Chain:
     """Return the identities that prove that an iterate of the map is the identity.
 
     Raises:
-        FalseClaim: if it is not the identity; random points modulo a prime are tried before products are expanded.
+        FalseClaim: if it is not the identity; a random point modulo a prime is tried before products are expanded.
         InputError: for a period above 1000, or if the identities have too many terms.
     """
     if period > MAX_PERIOD:

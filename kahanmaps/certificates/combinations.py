@@ -150,7 +150,7 @@ def affine_symmetry(
     target: MapData | None = None,
     about: str = "",
 ) -> AffineSymmetry:
-    """Return the identity by which T(x) = S x + shift takes the map to `target` (default: the map), or to its inverse.
+    """Return the identity by which T(x) = S x + shift takes the map to itself, `target`, or (`reversing`) its inverse.
 
     Raises:
         FalseClaim: if the identity does not hold, or T is not invertible.

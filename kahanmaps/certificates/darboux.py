@@ -1,8 +1,8 @@
 """Darboux polynomials and their cofactors in factored form, so that no large product is expanded.
 
-P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, then C is the
-product of their cofactors C_i and a power of D. The C_i often have common factors c_1, c_2, ... So only the
-identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all further identities compare monomials in D and the c_j.
+P is a Darboux polynomial of degree k of the map x~ = N/D if D^k P(N/D) = C P. If P is a product of Darboux polynomials
+P_i, then C is the product of their cofactors C_i and a power of D. The C_i often have common factors c_1, c_2, ... Only
+the identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all further identities compare monomials in D and the c_j.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MAX_FACTORED_TERMS = 3000  # terms of a cofactor; longer cofactors are not fact
 
 @dataclass(frozen=True)
 class Monomial:
-    """A constant times a product of powers of D, c_1, c_2, ..."""
+    """A constant times a product of powers of D, c_1, c_2, ...; `powers` are the exponents in this order."""
 
     constant: int
     powers: tuple[int, ...]
@@ -92,7 +92,7 @@ class DarbouxProduct:
 
     @property
     def is_single(self) -> bool:
-        """Whether the product is written as one polynomial."""
+        """Whether the product is one factor with exponent 1, without a content other than 1."""
         return self.content.is_one() and [factor.exponent for factor in self.factors] == [1]
 
     @property
@@ -110,7 +110,7 @@ class DarbouxProduct:
 
 @dataclass(frozen=True)
 class DarbouxProducts:
-    """Two or more products whose cofactors are monomials in D and the same polynomials c_1, c_2, ... over Z."""
+    """Products whose cofactors are monomials in D and the same polynomials c_1, c_2, ... (`common_factors`) over Z."""
 
     products: tuple[DarbouxProduct, ...]
     common_factors: tuple[fmpq_mpoly, ...]
@@ -122,7 +122,7 @@ class DarbouxProducts:
 
     @property
     def cofactors(self) -> list[Monomial]:
-        """The cofactors of all products, for the largest degree."""
+        """For each product P the C with D^k P(N/D) = C P, where k is the largest degree of a product."""
         return [product.cofactor(self.degree, len(self.common_factors)) for product in self.products]
 
 
@@ -161,7 +161,7 @@ class InvariantVolume(Claim):
     def balance(self) -> tuple[Monomial, Monomial, Monomial]:
         """The monomials c, l, r with C D^(n + 1) = c l and B = c r; the claim is then l = r D^n det L(x, N/D).
 
-        C is the cofactor of P, B the cofactor of Q.
+        C is the cofactor of P, B the cofactor of Q, and n the dimension.
         """
         assert self.fraction is not None
         C, B = self.fraction.cofactors

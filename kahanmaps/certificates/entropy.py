@@ -24,19 +24,19 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
 
 PRIME = 2**61 - 1
-EPS = 1234567
+EPS = 1234567  # the residue of eps
 LINE = ((3, 5), (7, 11), (1, 0))  # the points (3 + 5 t : 7 + 11 t : 1)
 _MAX_TERMS = 100  # maximal number of terms of a form of the iterate before the last one
 _MAX_DEGREE = 600  # maximal degree of the image of the line
-_MAX_STEPS = 5
+_MAX_STEPS = 5  # the largest n
 
 
 @dataclass(frozen=True)
 class PositiveEntropy(Claim):
-    """The forms of `inverse` and of F_1, ..., F_n, the common factors c_1, ..., c_n, and the degrees of the line.
+    """The proof that the dynamical degree is above `lower`: forms of F_1, ..., F_n and of `inverse`, and two degrees.
 
     The forms are in the variables, the symbols, eps and a last, homogenizing variable: c_1 F_1 is (N : D), and
-    c_(k+1) F_(k+1) = F_1(F_k). The dynamical degree is greater than `lower`.
+    c_(k+1) F_(k+1) = F_1(F_k) for the `factors` c. `degree` is deg F_n; `line_degree` that of the line's 2n-th image.
     """
 
     inverse: tuple[fmpq_mpoly, ...]

@@ -40,7 +40,7 @@ MAX_PRODUCTS = 20_000_000  # products of terms to expand one side: some ten seco
 
 @dataclass
 class Limits:
-    """The factor by which the limits are multiplied, and the number of terms of all products so far."""
+    """The factor by which MAX_TERMS and MAX_PRODUCTS are multiplied, and the number of terms of all products so far."""
 
     multiple: float = 1.0
     terms: int = 0
@@ -131,7 +131,7 @@ class MapData:
 
     @property
     def two_points(self) -> tuple[str, ...]:
-        """The names for x and x~, and the constants."""
+        """The names for x and x~, then the constants: the symbols and eps."""
         return (*self.variables, *self.new, *self.names[self.dim :])
 
     def residual(self, names: Sequence[str], x_index: int, y_index: int) -> list[fmpq_mpoly]:

@@ -68,7 +68,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """Return the text of det(M) x~: the names of N, or products that Cramer's rule rewrites to N."""
+        """Return the text of det(M) x~: if `at_n` the names of N, else products that Cramer's rule rewrites to N."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
@@ -78,7 +78,7 @@ class _Script:
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
     def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
-        """Return definitions of functions with the same arguments."""
+        """Return the definitions of the `polynomials` as functions of the `arguments`."""
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
@@ -126,7 +126,7 @@ class _Script:
         return [*lines, "Qed."]
 
     def chain(self, claim: Chain, theorem: str) -> list[str]:
-        """State the theorem that the last points of two chains of images are equal."""
+        """State the theorem that the two `equal_points` of the claim are equal."""
         n, lines = self.data.dim, list[str]()
         for letter, data in claim.maps.items():
             lines += [*self.predicate(letter, f"{letter}_maps", data), *self.uniqueness_lemma(letter, data)]
@@ -289,7 +289,7 @@ class _Script:
         return f"{unfolding}rewrite ?det_value; cbv delta [{' '.join(('d', *definitions))}] beta; ring."
 
     def map_equation(self, is_solved: bool) -> list[str]:
-        """Write the variables, the equation of the map, and Cramer's rule if it is needed."""
+        """Write the variables, the equation of the map and, if `is_solved`, its solution by Cramer's rule."""
         data, n = self.data, self.data.dim
         self.is_solved = is_solved
         lines = [
@@ -732,7 +732,7 @@ def _homogeneous_text(
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
-    """Return det times an entry of L (of degree at most 1 in x~), with det(M) x~, or N, in place of x~."""
+    """Return det times an entry of L (of degree at most 1 in x~), with det(M) x~, or N if `at_n`, for x~."""
     letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
     letters[image] = script.image_letters(at_n)
     return _homogeneous_text(entry, letters, 1, image, "det")

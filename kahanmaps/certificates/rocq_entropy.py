@@ -16,7 +16,7 @@ from flint import fmpq_mpoly, fmpz
 from kahanmaps.certificates.entropy import EPS, LINE, PositiveEntropy, image_degree
 from kahanmaps.errors import InputError
 
-_MAX_PRIMES = 20
+_MAX_PRIMES = 20  # primes from 1009 on that are tried
 
 LIBRARY = """\
 Require Import ZArith Znumtheory List.
@@ -127,7 +127,7 @@ Axiom degrees_grow_exponentially : forall (F B G : triple) (g : form) (n d : nat
 def entropy_proof(script: Any, claim: PositiveEntropy, theorem: str) -> Iterator[str]:
     """Yield the lines that prove the hypotheses of the axiom; `script` is the script about the map."""
     n = len(claim.forms)
-    # Coq proves that the prime is prime by trial, so take a small one for which the line has the same degree.
+    # Coq proves by trial that a number is prime: take a small one for which the image of the line has this degree.
     for prime in islice((p for p in count(1009, 2) if fmpz(p).is_prime()), _MAX_PRIMES):
         if image_degree(claim.forms[0], 2 * n, prime) == claim.line_degree:
             break

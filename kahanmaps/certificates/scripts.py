@@ -264,7 +264,7 @@ class _Script:
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.language is GP))
 
     def begin(self, claim: Claim, count: int) -> None:
-        """Append the map of the claim (unless the previous claim has the same map) and the names of points."""
+        """Append the map of the claim (unless the previous claim has the same map) and the names of `count` points."""
         if claim.data is not self.data or not self.has_points:
             self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
             self.points(count)
@@ -277,7 +277,7 @@ class _Script:
         self.lines.append("")
 
     def points(self, count: int) -> None:
-        """Append the names for x, x~ and, for `count` 3, the image of x~."""
+        """Append the names for x, x~ and, if `count` is 3, the image of x~."""
         self.define("n", str(self.data.dim))
         points = {"old": self.data.variables, "new": self.data.new, "third": [f"{name}2" for name in self.data.new]}
         for name, letters in [*points.items()][:count]:

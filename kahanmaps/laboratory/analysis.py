@@ -35,7 +35,7 @@ from kahanmaps.processes import end_with_parent, processors
 
 # Units of work at effort 1 by dimension. The independent steps together have this budget, and the other steps together
 # have a second budget of the same size.
-_UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
+_UNITS_BY_DIMENSION = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
 _MAX_UNITS = 150e6
 
 
@@ -184,7 +184,7 @@ def analyze(
     """
     file, eps = as_file(system), resolve_eps(eps, time_step, h)
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses wrong arguments before any work
-    units = units_at(effort, _UNITS.get(file.dim, _MAX_UNITS))
+    units = units_at(effort, _UNITS_BY_DIMENSION.get(file.dim, _MAX_UNITS))
     analysis = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, analyses=tuple(analyses))
     analysis.defect = laboratory.defect if file.is_quadratic else ""
     context = AnalysisContext(analysis, laboratory, symbols, progress)

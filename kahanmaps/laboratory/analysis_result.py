@@ -85,7 +85,7 @@ class AnalysisResult:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates of `normal_form`; None if H has no centre or there is no normal form yet."""
+        """The origin of the coordinates of `normal_form`; None without it, or if the Hamiltonian has no centre."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
         return None if self.normal_form is None else (fmpq(0),) * self.dim

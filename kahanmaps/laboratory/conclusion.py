@@ -21,8 +21,8 @@ from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
-_POLYNOMIAL = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
-_CURVES = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1"}
+_POLYNOMIAL_GROWTHS = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
+_CURVE_TEXTS = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1"}
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
         genus = result.pencil.genus if result.pencil is not None else None
         if genus is None and result.dim == 2:  # the genus was not computed, but the growth determines it
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
-        clause = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
+        clause = f"so that orbits lie on {_CURVE_TEXTS.get(genus, f'curves of genus {genus}')}"
         sentence = (
             f"{sense.capitalize()} (proved): {facts.integrals_text}, {clause}; {facts.growth_text}{facts.basis_text}."
         )
@@ -209,7 +209,7 @@ def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
         sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{clause}."
         ground = facts.growth_certainty if is_exponential else Certainty.ESTIMATED
         return _Verdict("not integrable", sentence, _sense_if_not_integrable(facts.result), ground)
-    if facts.growth in _POLYNOMIAL:
+    if facts.growth in _POLYNOMIAL_GROWTHS:
         sentence = (
             f"Integrable in the sense of zero algebraic entropy: {facts.growth_text}{facts.basis_text}; {integrals}."
         )
@@ -265,7 +265,7 @@ def contradictions(result: AnalysisResult) -> list[str]:
         sentences.append("positive algebraic entropy is proved, which excludes an integral")
     if result.pencil is not None and (contradiction := result.pencil.contradiction(growth)):
         sentences.append(contradiction)
-    if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
+    if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL_GROWTHS):
         sentences.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
     return sentences
 
@@ -278,7 +278,7 @@ def doubt_of_heights(result: AnalysisResult) -> str:
     is_bounded = growth in (Growth.ZERO, Growth.BOUNDED)
     if is_bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
         reason = "the degrees are bounded"
-    elif growth in _POLYNOMIAL and kind is Growth.EXPONENTIAL:
+    elif growth in _POLYNOMIAL_GROWTHS and kind is Growth.EXPONENTIAL:
         reason = f"the degrees grow {'linearly' if growth is Growth.LINEAR else 'polynomially'}"
     elif growth is Growth.EXPONENTIAL and kind not in (Growth.EXPONENTIAL, Growth.UNDECIDED):
         reason = "the degrees grow exponentially"

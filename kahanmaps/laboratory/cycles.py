@@ -114,7 +114,7 @@ def cycle_census(
         progress: called with messages.
 
     Returns:
-        A `Census`, exact. A TimeLimit ends the count early: the result is then `is_stopped`.
+        A `Census`, exact. A TimeLimit ends the count early: `stopped` of the result is then True.
 
     Raises:
         InputError: for a prime, number or dimension out of range; BadPrime if eps or the map has no reduction modulo p.
@@ -162,7 +162,7 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
     import numpy as np
 
     p, count = census.prime, census.points
-    # The code of a point has the coordinates as digits. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
+    # The base-p digits of a code are the coordinates. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
     place_values = p ** np.arange(census.dim + 1)
     images = np.full(count + 1, count)  # `count` stands for a point without image

@@ -177,7 +177,7 @@ class Laboratory:
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
-        """Yield `count` maps modulo further primes, each at other random residues of the symbols and eps."""
+        """Yield `count` maps modulo other random primes, each at its own random residues of the symbols and eps."""
         return self._draw_maps("other maps", count)
 
     def _draw_maps(self, name: str, count: int) -> Iterator[ModularMap]:
@@ -237,7 +237,7 @@ class Laboratory:
                 format_polynomial(affine.function), 1, affine.function.compose(*full_ring.gens()[:n], ctx=full_ring)
             )
             for affine in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
-            # l must divide l' for all values of the symbols, not only for those of the file or for the stand-in
+            # l must divide f . grad l for all values of the symbols, not only for those of the file or for the stand-in
             if darboux_cofactor(self.system, affine.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 
@@ -570,9 +570,9 @@ def verdict_on(
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
     eps_texts = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
-    point = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    parameters_text = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
-    scope = f"for {point}{restriction}" if point else restriction.removeprefix(", ").strip()
+    scope = f"for {parameters_text}{restriction}" if parameters_text else restriction.removeprefix(", ").strip()
     identity_key = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
     identity = Identity(
         n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=identity_key

@@ -25,7 +25,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 Point = tuple[int, ...]
 Values = Sequence[Any]  # Python integers, or nmod, whose products take half the time
 Exponent = tuple[int, ...]
-_TRIES = 60
+_TRIES = 60  # random points, or orbits
 _UNDEFINED = "the map is not defined at random points modulo a prime"
 
 
@@ -209,9 +209,9 @@ class ModularFlow(ModularMap):
         Each row of the result has the coefficients of one order in t.
         """
         p, factors = self.prime, monomial_tables(self.dim, degree)
-        columns = len(factors) if support is None else len(support)
+        column_count = len(factors) if support is None else len(support)
         recursion_units = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
-        count_work(orders * (recursion_units + columns / 2) + 3 * columns)
+        count_work(orders * (recursion_units + column_count / 2) + 3 * column_count)
         # The keys are indices of monomials: the constant 1 has index 0, the k-th variable has index k + 1.
         coefficients = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
         coefficients |= {index: list[int]() for index, _ in self._products}
@@ -237,7 +237,7 @@ class ModularFlow(ModularMap):
         expansions = [series_of(index).coeffs() for index in (range(len(factors)) if support is None else support)]
         # A list of coefficients ends with its last nonzero entry, so every list may be shorter than `orders`.
         rows: list[Values] = list(islice(zip_longest(*expansions, fillvalue=nmod(0, p)), orders))
-        return rows + [[nmod(0, p)] * columns] * (orders - len(rows))
+        return rows + [[nmod(0, p)] * column_count] * (orders - len(rows))
 
 
 @cache
@@ -298,24 +298,24 @@ def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], p
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
     """Return the value and the gradient at a point of the polynomial with these coefficients."""
     value, gradient = 0, [0] * len(point)
-    powers = monomial_values(point, degree, prime)
+    residues = monomial_values(point, degree, prime)
     count_work(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
-    for coefficient, factors, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
+    for coefficient, factors, residue in zip(vector, monomial_tables(len(point), degree), residues, strict=True):
         if coefficient:  # most are 0
-            value += coefficient * power
+            value += coefficient * residue
             for variable, exponent, quotient_index in factors:
-                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[quotient_index]) % prime
+                gradient[variable] = (gradient[variable] + coefficient * exponent * residues[quotient_index]) % prime
     return value % prime, gradient
 
 
 def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int]]:
     """Return the partial derivatives of all monomials of degree at most `degree`, a row for each variable."""
-    powers = monomial_values(point, degree, prime)
-    rows = [[0] * len(powers) for _ in point]
-    count_work(len(point) * len(powers) / 5)
+    residues = monomial_values(point, degree, prime)
+    rows = [[0] * len(residues) for _ in point]
+    count_work(len(point) * len(residues) / 5)
     for k, factors in enumerate(monomial_tables(len(point), degree)):
         for variable, exponent, quotient_index in factors:
-            rows[variable][k] = exponent * powers[quotient_index] % prime
+            rows[variable][k] = exponent * residues[quotient_index] % prime
     return rows
 
 

@@ -19,9 +19,9 @@ from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 
 PROVED, MEASURED, UNDECIDED, NOTE = Certainty.PROVED, Certainty.MEASURED, Certainty.UNDECIDED, Certainty.NOTE
 
-MAX_POINTS = 8  # the number of fixed points that three quadratic equations have
+MAX_POINTS = 8  # sets of fixed points that are listed; three quadratic equations have up to 8 points
 MAX_NAMES = 6  # names that are listed one by one
-MAX_DEGREES = 12  # degrees that are printed
+MAX_DEGREES = 12  # degrees of iterates that are printed
 MAX_FIELDS = 6  # vector fields that are listed one by one
 MAX_CHARACTERS = 300  # of a sentence with a formula
 
@@ -121,7 +121,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def _join_names(names: Sequence[str]) -> str:
-    """Return the names or, if there are many, the first and the last one."""
+    """Return the names or, if there are more than 6, the first and the last one."""
     return ", ".join(names) if len(names) <= MAX_NAMES else f"{names[0]}, ..., {names[-1]}"
 
 

@@ -62,7 +62,7 @@ def _normal_form_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
-    """Return the singularities at the given eps or at two values of eps; none if formulas would be too large."""
+    """Return the singularities at the given eps or at two values of eps; [] if formulas would be too large."""
     values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
     if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
@@ -176,7 +176,7 @@ ANALYSES = (
         lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
         key="equivalent",
     ),
-    # Degrees use the singularities. Above dimension 4 these are slow and run last, without degrees using them.
+    # The step "degrees" uses the singularities, but not above dimension 4, where these are slow and run last.
     AnalysisStep(
         "singularities",
         _trace_patterns,

@@ -96,7 +96,7 @@ class Line:
     def step(self, guess: int) -> None:
         """Replace the curve by its image; `guess` is the expected degree of the image.
 
-        Raises ZeroDivisionError if the map is undefined at all points of the curve, and Stopped at a limit.
+        Raises ZeroDivisionError if the map is undefined on the whole curve, and Stopped at the limit of degree or work.
         """
         for equation in self._equations:
             degree_error = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")

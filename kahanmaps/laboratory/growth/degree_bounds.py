@@ -14,7 +14,7 @@ deg f_p^n <= deg f^n for every n, it follows that lambda(f_p) <= lambda(f). For 
 * the degrees along K tangents of a conic give an upper bound of D = deg f_p^n. The degree along a line is D minus the
   sum of the multiplicities m_i of the base points on the line, including infinitely near ones. No point lies on more
   than two of the tangents, and the sum of all m_i is 3 (D - 1) (Noether). So if all degrees along the tangents are at
-  most u, then K (D - u) <= 6 (D - 1).
+  most d, then K (D - d) <= 6 (D - 1).
 
 Only p, eps and the conic are chosen at random. docs/mathematics.md has the proofs.
 """
@@ -47,9 +47,9 @@ from kahanmaps.maps.projective import homogeneous_map
 
 _TANGENTS = 96  # lines that touch the conic
 _MAX_DEGREE = 8000  # along the first line
-_MAX_STEPS = 120
-_DIGITS = 6
-_TRIES = 4
+_MAX_STEPS = 120  # along the first line
+_DIGITS = 6  # decimals of the bounds
+_TRIES = 4  # pairs of a prime and a residue eps
 _MAX_FORMULAS = 12  # the largest number of iterates whose formulas are computed
 _MAX_TERMS = 300  # in a coordinate of the last iterate but one
 _MAX_NEXT_TERMS = 4000  # in a coordinate of the last iterate
@@ -154,7 +154,7 @@ def is_birational(map_: Map, rng: random.Random) -> bool:
 def degree_above(max_line_degree: int, line_count: int) -> int:
     """Bound the degree D of a birational map of the plane by the largest of its degrees along tangents of a conic.
 
-    There must be more than six `line_count`. Returns the largest D with lines (D - largest) <= 6 (D - 1).
+    `line_count` is above 6. Returns the largest D with line_count (D - max_line_degree) <= 6 (D - 1).
 
     >>> degree_above(100, 96), degree_above(1, 96), degree_above(16, 97)
     (106, 1, 16)
@@ -247,8 +247,8 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
 def round_up(number: arb, offset: int = 0) -> str:
     """Round an exact number up to six decimals, and add `offset` units of the last decimal.
 
-    With the offset -1 the result is strictly less than the number, so that the dynamical degree is strictly larger
-    than the result for all but finitely many eps.
+    With the offset -1 the result is strictly less than the number: if this is a lower bound of the dynamical degree
+    over Q(eps), the dynamical degree is strictly larger than the result for all but finitely many eps.
     """
     units = int((number.fmpq() * 10**_DIGITS).ceil()) + offset
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"

@@ -54,14 +54,14 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 
-MAX_TERMS = 10_000
-_LINES = 2
-_OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
-_ENOUGH_QUOTIENTS = 6
-_AGREEING = 12  # measured terms, beyond twice the longest pattern, that must agree with the derived degrees
-_LARGE = 2000  # from this degree on no further measured terms need to agree
+MAX_TERMS = 10_000  # iterates that are measured
+_LINES = 2  # random lines along which each degree is measured
+_DENSE_TERMS, _SEARCH_INTERVAL = 64, 8  # recurrences are searched for after each of the first 64 terms, then every 8
+_MIN_QUOTIENTS = 6  # d_n/d_{n-1}, for the estimate whether the growth is exponential
+_AGREEING_TERMS = 12  # measured terms, beyond twice the longest pattern, that must agree with the derived degrees
+_LARGE_DEGREE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
-_REPLACEMENTS = 6  # of lines in special position; about one line in 2^40 is in such a position
+_MAX_REPLACEMENTS = 6  # of lines in special position; about one line in 2^40 is in such a position
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def fitted(self) -> Recurrence | None:
-        """The shortest linear recurrence that further measured degrees confirm, or None; see `unconfirmed`."""
+        """The shortest recurrence with enough confirming degrees for `find_recurrence`, or None; see `unconfirmed`."""
         return find_recurrence(self.degrees)
 
     @cached_property
@@ -183,7 +183,7 @@ class DegreeGrowth(PrintableResult):
         """
         d = self.degrees
         n = len(d) - 1
-        if n < _ENOUGH_QUOTIENTS or d[n - 3] == 0:
+        if n < _MIN_QUOTIENTS or d[n - 3] == 0:
             return False
         a, b, c = (d[k] / d[k - 1] for k in (n - 2, n - 1, n))
         return c > 1.2 and all(abs(later / earlier - 1) < (c - 1) / (4 * n) for earlier, later in ((a, b), (b, c)))
@@ -456,14 +456,13 @@ class _Search:
         return DegreeGrowth(tuple(self.degrees), self.eps, ending, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
-        """Compute the singularity patterns once they are useful, and raise Stopped when a recurrence is confirmed."""
+        """Compute the singularity patterns when useful. With `may_stop` a confirmed recurrence raises Stopped."""
         term_count = len(self.degrees)
-        if term_count < 2 or (term_count > _OFTEN and term_count % _SELDOM):
+        if term_count < 2 or (term_count > _DENSE_TERMS and term_count % _SEARCH_INTERVAL):
             return
         recurrence = find_recurrence(self.degrees)
         # Above dimension 4 patterns of maps without short forms are slow: wait until the degrees suggest a recurrence.
-        is_due = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
-        if is_due:
+        if self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit:
             self._compute_patterns()
         if not may_stop:
             return
@@ -473,7 +472,8 @@ class _Search:
         if derived_recurrence is not None:
             longest_pattern = max(patterns.lengths, default=0) if patterns is not None else 0
             is_equal = recurrence is not None and recurrence.characteristic == derived_recurrence.characteristic
-            if (is_confirmed and is_equal) or term_count > 2 * longest_pattern + _AGREEING or self.degrees[-1] > _LARGE:
+            is_long = term_count > 2 * longest_pattern + _AGREEING_TERMS or self.degrees[-1] > _LARGE_DEGREE
+            if (is_confirmed and is_equal) or is_long:
                 raise Stopped(
                     Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
                 )
@@ -526,7 +526,7 @@ class _Search:
                 raise Stopped(
                     Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
-            if self.replaced > _REPLACEMENTS:
+            if self.replaced > _MAX_REPLACEMENTS:
                 raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees_on_lines}")
             if max_line_degree >= 0:
                 self.notes.append(

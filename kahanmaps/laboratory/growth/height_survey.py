@@ -35,7 +35,7 @@ DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
-_MAX_STARTS = 1000
+_MAX_STARTS = 1000  # initial points for each eps
 _GROWTH_TEXTS = {
     Growth.PERIODIC: "points come back",
     Growth.BOUNDED: "bit lengths stay bounded",
@@ -44,7 +44,7 @@ _GROWTH_TEXTS = {
     Growth.QUADRATIC: "bit lengths grow quadratically",
     Growth.EXPONENTIAL: "bit lengths grow exponentially",
 }
-_MAX_DRAWS = 20  # the largest number of random initial points tried for one orbit without a singular point
+_MAX_ATTEMPTS = 20  # the largest number of random initial points tried for one orbit without a singular point
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ class HeightSurvey(PrintableResult):
         count_text = f"{decided_count} of {total}" if decided_count < total else f"all {total}" if total > 1 else "the"
         eps_text = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
         field_text = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
-        orbits = f"{count_text} exact {'orbit' if total == 1 else 'orbits'} tried"
-        return f"{_GROWTH_TEXTS[self.kind]} on {orbits}{eps_text}{field_text}{note}"
+        orbits_text = f"{count_text} exact {'orbit' if total == 1 else 'orbits'} tried"
+        return f"{_GROWTH_TEXTS[self.kind]} on {orbits_text}{eps_text}{field_text}{note}"
 
     def rows(self) -> list[dict[str, str]]:
         """Return a row for each orbit, for example for `pandas.DataFrame(survey.rows())`."""
@@ -183,7 +183,7 @@ def height_survey(
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field_name)
             try:
                 progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(initial_points)}")
-                for _ in range(_MAX_DRAWS if start is None else 1):
+                for _ in range(_MAX_ATTEMPTS if start is None else 1):
                     # Many maps have invariant curves with short equations, such as eps^2 x^2 = 1. To avoid these,
                     # numerators are primes: a coordinate is no simple multiple of 1/eps.
                     candidate = start or tuple(

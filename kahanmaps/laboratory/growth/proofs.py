@@ -28,7 +28,7 @@ _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
 _MAX_ORDER = 12  # of a linear iterate
 _MAX_DIMENSION = 8  # for the spectral radius, which needs factors of polynomials of degree up to 2 dim^2
-_BITS = 256
+_BITS = 256  # working precision of the roots
 _LARGEST_ORDER = 60  # of an integer matrix of finite order with at most _MAX_DIMENSION rows
 
 
@@ -200,6 +200,6 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
             period += linear_period
             is_identity = all(field.equal(x, y) for x, y in zip(point, variables, strict=True))
     period = period if is_identity else linear_period
-    iterate = "the map" if period == 1 else f"iterate {period}"
-    reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
+    iterate_text = "the map" if period == 1 else f"iterate {period}"
+    reason = f"Phi^{period} is the identity" if is_identity else f"{iterate_text} is linear on projective space"
     return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)

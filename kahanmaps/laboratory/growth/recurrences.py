@@ -24,7 +24,7 @@ from kahanmaps.display_protocols import ResultPart
 from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
-_MODULO = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
+_MODULAR_CONTEXT = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
 _BITS = 256  # working precision of the roots
 _MAX_CLASSES = 12  # residue classes of n with a polynomial each
 
@@ -266,12 +266,12 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     values = [integer(value, "an entry") for value in values]
     if len(values) < 2:
         return None
-    polynomial = _MODULO.minpoly(list(values))
+    polynomial = _MODULAR_CONTEXT.minpoly(list(values))
     order = int(polynomial.degree())
     if len(values) < 2 * order + needed_checks(order):
         return None
     # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
-    # # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
+    # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
     integer_coefficients = [int(c) for c in polynomial.coeffs()]
     integer_coefficients = [c - _PRIME if 2 * c > _PRIME else c for c in integer_coefficients]
     for n in range(len(values) - order):

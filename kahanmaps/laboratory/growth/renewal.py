@@ -7,9 +7,9 @@ the order of the form of C_j. If a generic line meets the strict preimage of C_i
     d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
     s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
 
-with d_0 = 1. The reason: the factors that are divided out are powers of the forms of these preimages, and the zeros of
-C_i along the image of the line lie in such preimages, too. For the generating functions in z this is a linear system
-over Q(z). docs/mathematics.md proves it. Multiplicities along hypersurfaces are measured, all else follows exactly.
+for the degrees d_k of the iterates, d_0 = 1: the factors that are divided out are powers of the forms of these
+preimages, and the zeros of C_i along the image of the line lie in such preimages, too. For the generating functions in
+z this is a linear system over Q(z), proved in docs/mathematics.md. Only the multiplicities mu and nu are measured.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def degree_series(
     indices = needed_hypersurfaces(patterns)
     if indices is None:
         raise ValueError("expected known multiplicities of all hypersurfaces that are needed")
-    # The unknowns are the series S_i of the needed C_i, then the series D of the stages 1, 2, ..., 0, and 1.
+    # Unknowns: the series S_i of the needed C_i, then the series D of the stages 1, 2, ..., 0. Constants come last.
     period, rows = len(degrees), []
     stages = stages or [0] * len(patterns)
 
@@ -169,7 +169,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
 
 
 def _continued_series(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
-    """Return the generating function of a column of orbit data of `start`, continued according to `continues_as`."""
+    """Return the generating function of a column of pattern `start`, continued according to `continues_as`."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}

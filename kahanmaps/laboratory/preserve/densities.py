@@ -43,8 +43,8 @@ from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
-_MAX_UNKNOWNS = 1000
-_MAX_DEGREE = 12
+_MAX_UNKNOWNS = 1000  # monomials of phi
+_MAX_DEGREE = 12  # of phi, if the caller gives no degree
 _FIRST_POWER = CofactorProduct((1,), 1)  # of det dPhi
 
 
@@ -105,8 +105,8 @@ class DensitySearch(Search):
     def reason(self) -> str:
         """Why the search ended without a density, or before the requested degree."""
         if self.shows_none:
-            degree = f"no polynomial of degree at most {self.degree}"
-            return f"{degree}, and no product of powers of known ones, is a density"
+            polynomials_text = f"no polynomial of degree at most {self.degree}"
+            return f"{polynomials_text}, and no product of powers of known ones, is a density"
         return self.cut
 
     @property
@@ -120,8 +120,8 @@ class DensitySearch(Search):
         if len(self.densities) < 2:
             return ""
         count = len(self.densities) - 1
-        kind = f"{counted(count, 'further polynomial')} of this kind"
-        return f"phi times any integral is a density again; --json lists {kind}"
+        others_text = f"{counted(count, 'further polynomial')} of this kind"
+        return f"phi times any integral is a density again; --json lists {others_text}"
 
     @property
     def note(self) -> str:

@@ -51,12 +51,12 @@ from kahanmaps.laboratory.modular_points import (
 )
 
 _SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at each with probability 1/p
-MAX_UNKNOWNS = 1800
+MAX_UNKNOWNS = 1800  # monomials up to a degree
 MAX_INDEPENDENT = 800  # monomials that no relation of lower degree reduces; their elimination takes about a second
-_SETTLED_DEGREES = 4
+_SETTLED_DEGREES = 4  # degrees that must be tried before a profile counts as settled
 _SPARE_BITS = 40  # a number must be shorter by this than a random residue modulo two primes, which has 122 bits
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
-_MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
+_MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` includes known
-    integrals. `period` is the number of points of closed orbits, else None. `agree`: all maps gave the same numbers.
-    `complete`: all requested degrees were tried; if not, `cut` says why.
+    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` is the
+    largest one with known integrals included. `period` is the number of points of closed orbits, else None.
+    `agree`: all maps gave the same numbers. `complete`: all requested degrees were tried; if not, `cut` says why.
     """
 
     dim: int
@@ -114,7 +114,7 @@ class Profile:
 
     @property
     def is_settled(self) -> bool:
-        """Whether at least 4 degrees were tried and the last one showed no further integral."""
+        """Whether at least 4 degrees were tried and the last one showed no more integrals than the one before."""
         return self.degree >= _SETTLED_DEGREES and self.codimensions[-1] == self.codimensions[-2]
 
     @property
@@ -198,7 +198,7 @@ def orbit_profile(
     known_gradients: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
-    """Measure the relations of degree 1, 2, ... on one orbit of each map, which should have the same dimensions.
+    """Measure the relations of degree 1, 2, ... on one orbit of each map; their dimensions should agree.
 
     Args:
         maps: the maps, with different primes and, if eps is not given, different eps.
@@ -452,7 +452,7 @@ def _relation_basis(map_: ModularMap, degree: int) -> list[list[int]]:
 
 
 def _number_text(coefficient: int, other_coefficient: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is none."""
+    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is not."""
     for power in _POWERS:
         residues = [
             [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]

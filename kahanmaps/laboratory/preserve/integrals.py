@@ -52,7 +52,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
-_SHOWN_TERMS = 500
+_SHOWN_TERMS = 500  # of numerator and denominator together, in a report
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
 _CONJUGATE_PRIMES = 4  # two conjugate pencils are rational modulo these and the first prime with probability 1/32
 
@@ -353,7 +353,7 @@ def integrals_of(
         on_result(build_result(profile, UNFINISHED))
         share = next(budgets)
         cofactors = laboratory.cofactors()
-        # For a vector field there would be too many candidates. Most integrals have denominators with these factors.
+        # A vector field would have too many candidates; the polynomials of its cofactors suffice for most denominators.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
         denominator_cofactors = denominators_among(factors, laboratory.map.dim)

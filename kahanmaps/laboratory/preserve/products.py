@@ -48,7 +48,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
-_MAX_CANDIDATES = 60
+_MAX_CANDIDATES = 60  # polynomials whose powers are multiplied
 _MAX_TERMS = 20_000  # of an expanded product
 _DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that this exponent is small in reduced bases
 
@@ -101,7 +101,7 @@ def candidates(
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `polynomials` polynomials. For a flow they are the Darboux polynomials that are found within the budget.
+    of the given `polynomials`. For a flow they are the Darboux polynomials that are found within the budget.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -196,7 +196,7 @@ class _Line:
         )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
-        """Evaluate g on a curve (X : Z): the numerator Z^deg g(X/Z)."""
+        """Evaluate g on a curve (X : Z): the numerator Z^deg(g) g(X/Z)."""
         n, p = self.map.dim, self.prime
         field = GF(p)
         parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]
@@ -344,7 +344,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
 
     def evaluate_constants(map_: ModularMap) -> list[int]:
         """Return prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
-        p, field_p, products = map_.prime, GF(map_.prime), list[int]()
+        p, field_p, constants = map_.prime, GF(map_.prime), list[int]()
         parameters = [field_p.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
             count_work(50 + 10 * n)
@@ -357,8 +357,8 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
                     if not value or not image_value:
                         raise NoPoint("a polynomial vanishes at a random point modulo a prime")
                     constant = constant * pow(image_value, k, p) * pow(value, -k, p) % p
-            products.append(constant)
-        return products
+            constants.append(constant)
+        return constants
 
     values = constants_of(laboratory, evaluate_constants)
     vectors_with_constant = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]

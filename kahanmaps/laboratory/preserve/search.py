@@ -56,11 +56,11 @@ from kahanmaps.maps.kahan import KahanMap
 
 # The largest degree, by dimension, in the search for polynomials with a given cofactor.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
-_MAX_TERMS = 1000
+_MAX_TERMS = 1000  # monomials of these polynomials
 SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # for a prime and values of the names
 
 _SAMPLES = (150, 600, 3000)  # numbers of samples; all coefficients are tried with 150 before any is tried with 600
-_COEFFICIENTS = 6
+_MAX_COEFFICIENTS = 6  # that are tried to distinguish spaces
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8  # points beyond the number of unknowns
 AFFINE = "v.x with v.f(x) = 0"
@@ -324,7 +324,7 @@ def find_branches(
     count, context = len(model), ring((*names, "T"))
     *gens, T = context.gens()
     at_zero = {"T": fmpq(0)}
-    for samples, position in cartesian(_SAMPLES, distinguishing_positions[:_COEFFICIENTS]):
+    for samples, position in cartesian(_SAMPLES, distinguishing_positions[:_MAX_COEFFICIENTS]):
         if budget.is_spent:
             return None
 

@@ -34,10 +34,10 @@ RationalRows = tuple[tuple[fmpq, ...], ...]
 _MAX_PAIRS = 100_000  # tried pairs of affine subspaces modulo two primes
 _MAX_CONJUGATES = 24  # the largest number of hypersurfaces modulo a prime for which products of two are tried
 _LOW_HEIGHT = 12  # up to this height a subspace may be missing modulo one prime
-_MIN_PRIMES = 3
+_MIN_PRIMES = 3  # modulo which a variety over Q must appear
 MAX_FIELD_DEGREE = 6
 SPARE_BITS = 12  # bits by which relations of a point must be shorter than relations of random residues
-_MAX_FAILURES = 200
+_MAX_FAILURES = 200  # successive combinations of residues without conjugate points
 _MAX_POINTS = 24  # points modulo a prime
 _MAX_PRIMES = 14  # primes that are combined
 
@@ -272,6 +272,6 @@ def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits:
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
     shortest_row = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest_row)
-    # Any residues have a relation of a height with (2 height + 1)^size about the modulus; it must be much smaller.
+    # Any residues have a relation of a height with (2 height + 1)^size about the modulus; this one must be smaller.
     is_small = (2 * height + 1) ** size << spare_bits <= modulus
     return [int(c) for c in shortest_row] if is_small and shortest_row[-1] else None

@@ -20,12 +20,12 @@ from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import MapFamily
 
 _TRIES = 200  # the number of random values of the free variables for which a root of the equations is tried
-_PRIMES = 40
+_PRIMES = 40  # random primes that are tried for a member
 _HEIGHTS = (12, 120)  # of random values; the small height if an equation of higher degree must have a rational root
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
-    """Return a random solution over Q, of small height, or over GF(p); None if none was found.
+    """Return random values of `count` variables, of small height over Q or in GF(p), that solve equations, or None.
 
     `equations` define an affine subspace (reduced: the first variable of each equation occurs in no other), or a
     hypersurface, or a point over a number field (each equation has one more variable than the one before). Raises

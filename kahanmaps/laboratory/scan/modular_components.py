@@ -28,7 +28,7 @@ _SPARE = 1.2  # number of points per coefficient of a hypersurface
 # Numbers of samples of points. With more than 3 parameters a sample rarely lies on one component, so that more samples
 # are needed. From degree 3 on a sample is expensive, and useless if its points lie on two components.
 _TRIES, _TRIES_MANY_PARAMETERS, _TRIES_HIGH_DEGREE = 80, 3000, 12
-_MAX_PRODUCT_DEGREE = 12
+_MAX_PRODUCT_DEGREE = 12  # of a product of hypersurfaces that is interpolated
 _MAX_SINGLE_POINTS = 400  # if more points lie on no component, they are not isolated points
 
 
@@ -150,7 +150,7 @@ def _find_hypersurfaces(
 
 
 def degree_reached(points: float, count: int) -> int:
-    """Return the largest degree, at most `MAX_DEGREE`, such that `points` points determine hypersurfaces of it.
+    """Return the largest degree, at most 6, such that `points` points in `count` variables determine hypersurfaces.
 
     >>> degree_reached(53, 2), degree_reached(11, 2)
     (6, 2)

@@ -22,7 +22,7 @@ from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 Row = tuple[fmpq, ...]
 Change = tuple[Row, ...]  # a matrix acting on (a, b, ..., 1), scaled to first nonzero entry 1 in the last row
 
-_MAX_POINTS = 24
+_MAX_POINTS = 24  # rational point components from which shifts and factors are taken
 
 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
@@ -133,7 +133,7 @@ def _is_reportable(change: Change, components: Sequence[Component], names: Seque
 
 
 def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
-    """Return the group that changes generate; it is finite, because it permutes points."""
+    """Return the group, finite since it permutes points, that changes generate; stop at 2000 or more elements."""
 
     def compose(first: Change, second: Change) -> Change:
         rows = tuple(zip(*(_apply_change(second, column) for column in zip(*first, strict=True)), strict=True))

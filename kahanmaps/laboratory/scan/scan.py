@@ -60,7 +60,7 @@ _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
 _LINE_FACTOR = 4  # by which the number of lines grows if hypersurfaces were missed
-_MANY_LINES = (150, 60)
+_MANY_LINES = (150, 60)  # the same two numbers for more than 3 parameters
 # The number of random planes, which meet components that lines do not meet, and their primes.
 _PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
 _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
@@ -68,9 +68,9 @@ _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their
 _SWEEPS_END, _CONDITIONS_END, _CONFIRMATION_END, _GROWTH_END = 0.6, 0.75, 0.85, 0.9
 # Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
 _DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
-_MAX_LENGTH = 4096
+_MAX_LENGTH = 4096  # if the number of iterates is given as `terms`
 _TRIAL_PRIME = 8179  # so large that hardly any member is special
-_MAX_TERMS = 7
+_MAX_TERMS = 7  # iterates by default
 _CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
 _TRIES = 20  # attempts to find a rational member
 _GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member
@@ -273,7 +273,7 @@ class _ScanRun:
             self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
-        """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are smaller than those of others."""
+        """Sweep modulo the primes of a plan, and drop sweeps with smaller generic degrees than other sweeps."""
         self.planned_members += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
@@ -306,7 +306,7 @@ class _ScanRun:
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def plan_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
-        """Plan more random lines, all new, if a hypersurface was probably missed on the lines so far.
+        """Plan random lines, all new and 4 times as many, if a hypersurface was probably missed on the lines so far.
 
         A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
         plan is empty if none was missed, or if the plan would need more than `max_members` members.
@@ -375,7 +375,7 @@ class _ScanRun:
         return list(chain.from_iterable(components)), skipped_count
 
     def with_growth(self, component: Component, shared_growths: dict[Degrees, DegreeGrowth]) -> Component:
-        """Add the growth at a rational member; if there is none, or it is special, the growth fitted to more degrees.
+        """Add the growth at a rational member; if there is none, or it is special, the growth of `_fit_growth`.
 
         Nothing is added if the component shares the growth of another one, or if an iterate is nowhere defined.
         """
@@ -406,7 +406,7 @@ class _ScanRun:
 def _fit_growth(
     component: Component, family: ScannedFamily, max_degree: int = _MAX_FITTED_DEGREE
 ) -> DegreeGrowth | None:
-    """Return the growth fitted to more degrees, measured modulo a prime; None if no member was found."""
+    """Return the growth fitted to up to 26 degrees, measured modulo a prime; None if no member was found."""
     expected_degrees = [component.degrees[-1]] * _FITTED_TERMS
     degrees = family.degrees_on(component.equations, expected_degrees, random.Random(family.seed), max_degree)
     if degrees is None:

@@ -23,7 +23,7 @@ Point = tuple[int, ...]
 Degrees = tuple[int, ...]
 Choice = tuple[int, int | None, int]  # a prime, the number of affine subspaces (None: all members), their dimension
 
-_BATCH_SIZE = 512
+_BATCH_SIZE = 512  # members
 _MIN_LINES, _MAX_LINES = 3, 12  # the numbers of lines on which a special member is measured
 
 

@@ -102,7 +102,7 @@ def components(
 
 
 _MIN_LINES, _MAX_LINES = 8, 24  # each modulo its own prime, until two have points of every hypersurface
-_REPEATED = 4  # equal multiplicities for the same orders of forms, after which they are not computed again
+_MIN_EQUAL_RESULTS = 4  # equal multiplicities for the same orders of forms, after which they are not computed again
 _DISTINGUISHING_STEPS = 12  # the number of first steps by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # the number of lines on a surface that are searched for a point of a component
@@ -210,7 +210,7 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.transversal)
 
     def curve_through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return such a curve through a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
+        """Return this curve, moved to a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple(
@@ -274,7 +274,7 @@ class _Orders:
             return nu
         # Equal orders of forms often have the same multiplicities. If not, take the fewest terms that suffice.
         columns = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
-        if len(columns) >= _REPEATED and all(column == columns[0] for column in columns):
+        if len(columns) >= _MIN_EQUAL_RESULTS and all(column == columns[0] for column in columns):
             return columns[0]
         term_count = 1 + max((int(max(column.entries())) for column in columns), default=1)
         while True:
@@ -348,7 +348,7 @@ def exceptional_hypersurfaces(
 def _find_patterns(
     curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int
 ) -> list[Hypersurface]:
-    """Return the exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
+    """Return the exceptional hypersurfaces. Raises OrbitDataUnknown, also if the sum of all degrees is not `zeros`."""
     keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     form_degrees = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]

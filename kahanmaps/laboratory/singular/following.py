@@ -30,10 +30,10 @@ from kahanmaps.laboratory.singular.jets import (
 )
 from kahanmaps.maps.equation import Equation
 
-_MAX_PRECISION = 4096
+_MAX_PRECISION = 4096  # terms of a series
 # Numbers of terms of long series: the work of a step is at least proportional to the number.
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
-_CONSTANT = 8  # a column counts as constant if at least this number of last entries are equal
+_MIN_ROWS = 8  # at least so many last rows must be zero, or so many rows satisfy a recurrence
 _CONFIRMING_ORDERS = 4  # orders that must satisfy a recurrence, beyond the orders that determine it
 _STEPS_AFTER_FIRST = 100  # steps for which a confined hypersurface is followed after the first steps
 _SHOWN_EVENTS = 6  # in a sentence
@@ -272,13 +272,13 @@ class TestCurve:
             rows = self.tracked.rows(run)
             last_nonzero = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
             event = None
-            if is_complete and len(rows) - last_nonzero >= _CONSTANT:
+            if is_complete and len(rows) - last_nonzero >= _MIN_ROWS:
                 event, last_step = self._next_event(run[-1].limit, len(run), limits.max_steps)
                 if event is None:
                     return OrbitData(rows[:last_nonzero], (), last_step, True)
             recurrences = [find_recurrence(column) for column in zip(*rows, strict=True)]
             is_recurrent = all(
-                recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CONFIRMING_ORDERS)
+                recurrence is not None and len(rows) >= max(_MIN_ROWS, 2 * recurrence.order + _CONFIRMING_ORDERS)
                 for recurrence in recurrences
             )
             is_cut = not is_complete and not limits.budget.is_spent  # the largest precision did not suffice
@@ -289,7 +289,7 @@ class TestCurve:
                 and (is_long or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
             ):
                 polynomials = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
-                row_count = max(_CONSTANT, *(2 * int(polynomial.degree()) for polynomial in polynomials))
+                row_count = max(_MIN_ROWS, *(2 * int(polynomial.degree()) for polynomial in polynomials))
                 return OrbitData(rows[:row_count], polynomials, len(run), True)
             if is_cut and max_precision < _LONG_PRECISION:
                 max_precision *= 2

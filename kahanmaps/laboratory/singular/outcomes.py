@@ -49,9 +49,9 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapFamily
 
-_MAX_TANGENT_PRECISION = 1024
+_MAX_TANGENT_PRECISION = 1024  # terms of series with tangents
 _KEY_PRECISION = 64  # terms of the series by which points are distinguished
-_TRIES = 40
+_TRIES = 40  # random primes
 _MIN_LINES = 6  # lines that are searched for critical points; more lines as long as a multiplicity has no point
 _POINTS = 2  # of each hypersurface, modulo different primes
 MAX_CHARACTERS = 60  # characters of a polynomial in a sentence
@@ -266,9 +266,9 @@ class Tracking:
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
-        letters = MapSequence([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.offsets = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
-        return letters
+        map_sequence = MapSequence([*equations[self.stage : self.period], *equations[: self.stage]])
+        map_sequence.offsets = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
+        return map_sequence
 
     def along(self, form: Any, field: PrimeField) -> TrackedFunctions:
         """Return the functions whose orders are measured along curves through the hypersurface of `form`."""
@@ -281,7 +281,7 @@ class Tracking:
         )
 
 
-_UNKNOWN, NONE_TRACKED = Hypersurface(), Tracking()
+_UNDECIDED_OUTCOME, NONE_TRACKED = Hypersurface(), Tracking()
 
 
 def outcome_of(
@@ -299,7 +299,7 @@ def outcome_of(
     modulo two random primes, are followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
-    outcome, note = _UNKNOWN, BUDGET_SPENT
+    outcome, note = _UNDECIDED_OUTCOME, BUDGET_SPENT
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.budget.is_spent:
             break
@@ -351,11 +351,11 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: S
             equations = map_.at(eps, field).equations
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
             tangents = _tangent_vectors(point, [0] * map_.dim + [1], field)
-            outcome = _UNKNOWN if tangents is None else _outcome_at(equations, point, tangents, rng, limits)
+            outcome = _UNDECIDED_OUTCOME if tangents is None else _outcome_at(equations, point, tangents, rng, limits)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            outcome = _UNKNOWN
+            outcome = _UNDECIDED_OUTCOME
         return [*hypersurfaces, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
     return hypersurfaces
 
@@ -404,7 +404,7 @@ def outcomes_of_points(
             except NotGeneric:
                 continue
             except PrecisionTooLow:
-                outcome = _UNKNOWN
+                outcome = _UNDECIDED_OUTCOME
             key = (critical_point.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             keys.append(key)
             hypersurface = replace(

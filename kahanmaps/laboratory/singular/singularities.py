@@ -67,14 +67,14 @@ MAX_DIMENSION = 6
 MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of the numbers in eps and the system
 _DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # units of work, by dimension
-_FEW_DIGITS = 50
+_MIN_DIGITS = 50  # the least limit of digits, for any budget
 _DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
 _LEAST_STEPS = 100  # in dimension 5 and 6
 _SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimension
 _LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
 _REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MAX_FIRST_STEPS = 200  # steps along series before only points are followed
-_DRAWS = 2  # the number of pairs of eps that are tried, as an eps may be special
+_MAX_EPS_PAIRS = 2  # pairs of eps that are tried, as an eps may be special
 WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; they are slow in higher ones
 _POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
@@ -329,8 +329,8 @@ class Patterns:
     def terms_needed(self, order: int) -> int:
         """The number of terms, including d_0, that determine a recurrence of this order.
 
-        Two rational generating functions of degrees r and R are equal if they agree in r + R + 1 terms. Here R is
-        at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
+        Two rational generating functions of degrees r and R are equal if they agree in r + R + 1 terms. Here r is
+        `order`, and R is at most 1 more than the sum of the `lengths`, in which equal patterns count once.
         """
         return order + sum(self.lengths) + 2
 
@@ -428,7 +428,7 @@ def patterns(
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
     result = _no_patterns("")
-    for attempt in range(_DRAWS if eps is None else 1):
+    for attempt in range(_MAX_EPS_PAIRS if eps is None else 1):
         if attempt and (not result.running or budget.is_spent):
             break
         values = default_eps(map_, seed + attempt) if eps is None else (eps,)
@@ -469,7 +469,7 @@ def _count_digits(map_: MapFamily, eps: fmpq) -> int:
 
 def _max_digits(dim: int, budget: Budget) -> int:
     """Return the largest number of digits for which the budget allows formulas, at least 50."""
-    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
+    return max(_MIN_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:

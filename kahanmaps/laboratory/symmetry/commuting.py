@@ -58,7 +58,7 @@ MAX_MESSAGES = 6  # messages on equations that were not solved
 # By default all quadratic g are tried first. The limit of work for this does not depend on the effort, so that all
 # commands choose the same shape; usually a few hundredths of it suffice.
 QUICK_DIMENSION, QUICK_UNITS = 3, 1e6
-MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
+MAX_SPACE = 24  # dimension l: the cubic equations have up to C(l + 2, 3) + l terms
 
 
 @dataclass(frozen=True)
@@ -320,8 +320,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, region.values, order, rng, self.budget)
         equations = [*region.equations, *(normal_form(p, region.equations) for p in equations)]
         gens = region.values[0].context().gens()
-        # New coordinates in which each equation has few unknowns. They are used at the first level only: later parts
-        # have further equations, which would have to be transformed as well.
+        # New coordinates in which each equation has few unknowns. They are used at the first order only: regions of
+        # later orders have further equations, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and order_index == 0:
             zero = gens[0].context().constant(0)

@@ -127,7 +127,7 @@ class Symmetries(PrintableResult):
         """The number of elements of the group that take the map to its inverse."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
-        # f is not 0, so that no element is of both kinds: the whole group or half of it commutes with the map
+        # f is not 0, so no element is both symmetry and reversing: the group or half of it commutes with the map
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
 
     @property

@@ -36,7 +36,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 MAX_DIMENSION = 6  # 720 permutations
 MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher dimensions Groebner bases may take a minute
 MAX_ORDERS = 24  # permutations that are tried; the monomials may allow all 720
-MAX_FRAMES = 6
+MAX_FRAMES = 6  # from invariant hyperplanes, and as many from lines of fixed points
 _MAX_DEPTH = 4  # the number of unknowns that are set to numbers if there are infinitely many solutions
 
 Monomials = frozenset[tuple[int, ...]]

@@ -34,7 +34,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 6  # in higher dimensions Groebner bases of quadrics may take long, and they cannot be interrupted
 _UNITS = 1e6  # for one Groebner basis at a given eps
-_KINDS = {1: "line", 2: "plane"}
+_NAMES_BY_DIMENSION = {1: "line", 2: "plane"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class FixedPoints(ResultPart):
     def where(self) -> str:
         """A phrase: "fixed point (1, 0)", "line of fixed points (x, 0)", "2 fixed points (x, 1) with x^2 - 2 = 0"."""
         point_text = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
-        kind_text = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
+        kind_text = _NAMES_BY_DIMENSION.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:
             return f"{kind_text} of fixed points {point_text}" if self.dimension else f"fixed point {point_text}"
         count_text = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""

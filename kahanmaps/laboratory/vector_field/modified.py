@@ -38,7 +38,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 LARGEST_ORDER = 12
 _MAX_UNKNOWNS = 1000  # the number of coefficients of all corrections of an integral
 _EFFORT = -2  # of the search for integrals of the flow
-_SHOWN_TERMS = 60
+_SHOWN_TERMS = 60  # of a polynomial in a line
 
 Field = tuple[fmpq_mpoly, ...]
 

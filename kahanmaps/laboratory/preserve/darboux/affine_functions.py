@@ -57,7 +57,7 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Exact affine Darboux functions. `complete`: there are no others over Q; otherwise `reason` says why not.
+    """Exact affine Darboux functions. `complete`: there are no others over Q; if this is unknown, `reason` says why.
 
     Constants and the affine integrals (cofactor 0) are left out. A `complete` list is wrong only if the random line of
     the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, the
@@ -100,7 +100,7 @@ def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
 class QuotientForms:
     """The linear forms modulo the affine integrals z = V x, in terms of the coordinates y = (x_i with i in `free`).
 
-    `section` is the n x m matrix S = dx/dy at fixed z. A form v is v S modulo the integrals, and the system for y has
+    `section` is the matrix S = dx/dy at fixed z. A form v is v S modulo the integrals, and the system for y has
     the Jacobi matrix R S, where R consists of the rows `free` of f'. `shift` is dx/dz, so that x = S y + shift z.
     """
 

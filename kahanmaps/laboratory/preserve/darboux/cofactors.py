@@ -51,7 +51,7 @@ from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8  # points beyond the number of unknowns
-_DETERMINANT_BUDGET = 20_000_000
+_DETERMINANT_BUDGET = 20_000_000  # products of terms
 _DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
 _MAX_WORK = 4_000_000  # entries of matrices in one search, about two seconds
 _MAX_DIMENSION = 16  # in higher dimension even a sparse determinant takes too long to expand
@@ -153,7 +153,7 @@ def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a function of eps
-        # The determinant is 1 at eps = 0, so every factor is a number there. Divided by it, the cofactor is 1 there.
+        # The determinant is 1 at eps = 0, so every factor is a number there. Dividing by it makes the cofactor 1 there.
         constant = substitute(factor, {"eps": fmpq(0)})
         cofactors.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(cofactors, key=lambda cofactor: (cofactor.weight, cofactor.name)))

@@ -1,7 +1,7 @@
 """The search for discrete Darboux polynomials of a map: P of bounded degree with P(x~) = C(x) P(x), for many C.
 
 C runs through products of the cofactors of cofactors.py, times any number if these are known only up to a number. A
-space is listed unless products of elements of others span it. Source: celledoni-2019.
+space is listed unless products of elements of other spaces span it. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _MAX_TERMS = 2000  # of a polynomial: the number of unknowns
-_MAX_PRODUCTS = 2000
+_MAX_PRODUCTS = 2000  # of cofactors
 ScaledProduct = tuple[CofactorProduct, int]  # a product of cofactors and its numerical factor modulo a prime
 
 
@@ -203,7 +203,7 @@ def darboux_polynomials(
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
-    """Return whether products P Q of elements of other spaces with cofactors of product `C` span the space of `C`."""
+    """Return whether products P Q of elements of other spaces span the space of `C`, the product of their cofactors."""
     space, (product, c) = spaces[C], C
     other_spaces = {(key[0].powers, key[1]): other_space for key, other_space in spaces.items() if key != C}
     rows = []

@@ -50,7 +50,7 @@ from kahanmaps.laboratory.modular_points import (
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
 
 _SPARE = 8  # points beyond the number of unknowns
-_MAX_FORMS = 12
+_MAX_MATRICES = 12  # antisymmetric matrices A that are used
 # Bounds of s = dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
 TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
@@ -130,7 +130,7 @@ class DarbouxSpace:
 def darboux_spaces(
     map_: ModularMap, degree: int, known_spaces: Sequence[DarbouxSpace] = (), max_span: int = LARGEST_SPAN
 ) -> list[DarbouxSpace] | None:
-    """Find the spaces of degree `degree` that are not multiples of the `known_spaces` ones of lower degree.
+    """Find the spaces of degree `degree` that are not multiples of the spaces `known_spaces` of lower degree.
 
     Returns None, without a search, if the relations span more than `max_span` dimensions. There may be relations that
     no space explains: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
@@ -140,7 +140,7 @@ def darboux_spaces(
     if len(span) > 2 * LARGEST_SPAN:
         return None
     multiples = echelon([row for space in known_spaces for row in space.multiples(degree, prime)], prime)
-    # `complement` completes the multiples of known spaces to a basis of the sum of multiples and span.
+    # `complement` completes the multiples of known spaces to a basis of the span of the multiples and relations.
     stacked_rows = [*multiples, *span]
     independent_indices = pivots(echelon(list(zip(*stacked_rows, strict=True)), prime)) if stacked_rows else []
     complement = [stacked_rows[k] for k in independent_indices if k >= len(multiples)]
@@ -208,8 +208,8 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
         return []
     count_work(len(solutions) * n**2)
     blocks = [nmod_mat([[int(A[i, j]) for j in pivot_columns] for i in pivot_columns], prime) for A in solutions]
-    if len(blocks) > _MAX_FORMS:  # a few random combinations give the same conditions on E
-        blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_FORMS)]
+    if len(blocks) > _MAX_MATRICES:  # a few random combinations give the same conditions on E
+        blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_MATRICES)]
     rows = []
     count_work(n**3 + n**4 / 100)
     for A in blocks[:2]:  # two A leave few E with E A = A E^T, which are then restricted by the other A
@@ -250,7 +250,7 @@ def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int)
     symmetric matrices that all these forms annihilate are the multiples of c c^T.
     """
     count = len(solutions)
-    if not 1 <= count <= _MAX_FORMS:
+    if not 1 <= count <= _MAX_MATRICES:
         return []
     rng = random.Random(prime)
     size = len(complement)

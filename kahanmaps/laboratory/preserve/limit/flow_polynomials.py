@@ -52,7 +52,7 @@ _SPARE = 8  # orders of a series beyond the number of monomials
 _MAX_CHOICES = 400  # choices of zeros on a line, and pairs of choices on two lines
 _PRIMES = 12  # the first one usually suffices
 _PRECISION = 24  # exponent of a prime power, which has 1,464 bits
-_MAX_CONJUGATES = 8
+_MAX_CONJUGATES = 8  # the largest degree of coefficients that are recognized as algebraic
 _LINES = 4  # modulo each prime
 
 Vectors = list[list[int]]
@@ -233,7 +233,7 @@ class _Search:
         return [_make_monic(space[0], flow.prime) for space in spaces_so_far if len(space) == 1], False
 
     def _try_lift(self, residues: Sequence[int], modulus: int) -> bool:
-        """Lift residues to rational coefficients; add a Darboux polynomial to the known ones, and say if it is one."""
+        """Lift residues to a polynomial P over Q; add P if it is special, and return whether P is known afterwards."""
         values = rational_vector(residues, modulus)
         if values is None:
             return False
@@ -343,7 +343,7 @@ class _Line:
 
     def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], factors: Iterable[fmpq_mpoly]) -> None:
         self.flow, self.degree, self.support, self.known_polynomials = flow, degree, support, factors
-        self.count = len(support)
+        self.count = len(support)  # monomials
         self.start, self.slope = flow.random_point(), flow.random_point()
         self._generic_dimensions: dict[int, int] = {}
 
@@ -381,7 +381,7 @@ class _Line:
         # The common factor, on the line, of the minors of the matrix of Taylor coefficients. The minors have as many
         # rows as the rank at random points; the first rows are independent there. Replacing the last row by the next
         # one gives the derivative of a minor along the flow; the common factor of minor and derivative contains all
-        # invariant factors (and multiple ones). Columns are combined at random. If there are more columns than the
+        # invariant factors, and multiple factors. Columns are combined at random. If there are more columns than the
         # rank, the two minors use different combinations, and share the factor common to all minors.
         p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
         matrices = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2

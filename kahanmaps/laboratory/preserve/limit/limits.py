@@ -45,10 +45,10 @@ from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import KahanFamily
 
 _BUDGET = 2_000_000  # products of terms, for the arithmetic with integrals
-_MAX_ROUNDS = 5  # combinations of an integral with others
+_MAX_ROUNDS = 5  # combinations of an integral with other integrals
 _MAX_UNKNOWNS = 60  # coefficients of a relation between leading terms
 _SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # monomials of an integral of the flow, and of the second term of a series
-_DENSITY_DEGREE = 4
+_DENSITY_DEGREE = 4  # of the densities of the flow that are searched for
 _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dimension; 3 in higher dimension
 
 
@@ -135,14 +135,14 @@ class FlowAndMap:
         for F in self.other_integrals if others else ():
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))
         names = ", ".join(F.name for F in self.other_integrals)
-        number = counted(self.count, "integral") if self.count else "no integral"
-        number += " free of n" if self.map_search.time_dependent else ""  # time-dependent integrals contain the step n
+        count_text = counted(self.count, "integral") if self.count else "no integral"
+        count_text += " free of n" * bool(self.map_search.time_dependent)  # time-dependent ones contain the step n
         if self.lost:
             lost_names = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
-            limits = f", with limits independent of {names}" if self.count else ""
+            count_text += f", with limits independent of {names}" if self.count else ""
             verb, degree = "is" if self.lost == 1 else "are", self.map_search.profile.degree
             statements.append(
-                ("measured", f"{lost_names} {verb} lost up to degree {degree}: the map shows {number}{limits}")
+                ("measured", f"{lost_names} {verb} lost up to degree {degree}: the map shows {count_text}")
             )
         if self.lost < len(self.other_integrals):
             missing_text = f"the limits of {counted(self.without_limit, 'integral')} are not known"
@@ -175,10 +175,10 @@ class FlowAndMap:
             text = f"{time_dependent.name} = {time_dependent.text} is a time-dependent integral of the flow"
             statements.append((str(time_dependent.integral.verdict), text))
         if self.polynomials_degree > 1:
-            other_text, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
-            degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
+            other_text, exception = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
+            scope = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {other_text}Darboux polynomials {degrees} {exceptions} factors of known integrals")
+                ("measured", f"no {other_text}Darboux polynomials {scope} {exception} factors of known integrals")
             )
         if self.polynomials_reason:
             subject_text = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
@@ -222,7 +222,7 @@ def flow_and_map(
         progress: called with a sentence at each stage of the search.
 
     Returns:
-        The comparison, exact except for statements marked as measured. None for other maps, or at a single eps.
+        The comparison, exact except for statements marked as measured. None for all other maps, and for a single eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.preserve.integrals import find_integrals

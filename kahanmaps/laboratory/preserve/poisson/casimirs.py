@@ -1,4 +1,4 @@
-"""Candidates for Casimirs of a tensor among functions of known integrals: products of powers, polynomials, quotients.
+"""Candidates for Casimirs of a tensor P among functions of known integrals: products of powers, polynomials, quotients.
 
 C is a Casimir if P grad C = 0. For C = prod I_i^k_i this says sum k_i P grad I_i / I_i = 0; for a polynomial in the I_i
 it is a linear relation among multiples of the P grad I_i. At random points modulo a prime these are linear equations

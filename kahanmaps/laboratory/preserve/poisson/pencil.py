@@ -35,8 +35,8 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.singular.jets import modulo
 
-MAX_DEGREE = 12
-_TRIES = 3
+MAX_DEGREE = 12  # of numerator and denominator of the integral
+_TRIES = 3  # primes, until the results for two of them agree
 _BITS = 31  # of primes; python-flint does not sort factors with larger coefficients
 # The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the
 # curves: diller-favre-2001.
@@ -80,7 +80,7 @@ class Pencil:
     def text(self) -> str:
         """A sentence on degree, genus and base points of the generic curve."""
         verb = "is" if self.components == 1 else f"has {self.components} components"
-        points_text = ", ".join(points_text.text for points_text in self.base_points)
+        points_text = ", ".join(points.text for points in self.base_points)
         return (
             f"the generic curve {self.integral} = c {verb} of degree {self.degree} and genus {self.genus}; "
             f"base points: {points_text}"
@@ -177,12 +177,12 @@ class _ModularPlane:
         count_work(500 + 60 * degree**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
             [form**k for k in range(degree + 1)]
-            for form in (x * self._draw() + y * self._draw() + self._draw() for _ in "xyz")
+            for form in (x * self._draw_residue() + y * self._draw_residue() + self._draw_residue() for _ in "xyz")
         )
         P, Q = (sum((X[i] * Y[j] * Z[degree - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
         curves: list[nmod_mpoly] = []  # the components through three random points
         for _ in range(3):
-            point = [self._draw(), self._draw()]
+            point = [self._draw_residue(), self._draw_residue()]
             member = P * int(Q(*point)) - Q * int(P(*point))
             _require(not member.is_zero())
             through_point = [(C, e) for C, e in member.factor()[1] if not int(C(*point))]
@@ -203,7 +203,7 @@ class _ModularPlane:
         )
         return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - genus_drop, tuple(points))
 
-    def _draw(self) -> int:
+    def _draw_residue(self) -> int:
         return self._rng.randrange(1, self.prime)
 
     def _find_points(self, C: nmod_mpoly, D: nmod_mpoly, d: int) -> None:
@@ -262,7 +262,7 @@ class _ModularPlane:
         self.points[m, is_near] += K.degree()
         if m * m == max_intersection:
             return
-        shear = K(self._draw())  # afterwards x = 0 is tangent to neither curve
+        shear = K(self._draw_residue())  # afterwards x = 0 is tangent to neither curve
         f, g = (  # F(x + s y, y)
             _collect_terms(((i - k, j + k), c * comb(i, k) * shear**k) for (i, j), c in F.items() for k in range(i + 1))
             for F in (f, g)

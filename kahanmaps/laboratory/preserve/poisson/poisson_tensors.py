@@ -56,7 +56,7 @@ from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
-_MAX_UNKNOWNS = 2000
+_MAX_UNKNOWNS = 2000  # coefficients of all entries of a tensor
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
 _SPARE_POINTS = 8  # points beyond those that determine the unknowns
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
@@ -265,7 +265,7 @@ def find_poisson(
             limit_text = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             candidate_tensors, _ = _find_tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
         if not candidate_tensors and denominator is None:
-            # Try the product of the factors of a known density as denominator; its degree is added to the degree.
+            # Try the product of the factors of a known density as denominator; its degree is added to that of entries.
             density = None
             with suppress(NoPoint):
                 density = products_of(
@@ -334,7 +334,7 @@ def _find_tensors(
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[MatrixPoissonTensor], str]:
-    """Compute formulas for a basis of the tensors with a denominator and with these monomials of the bivector.
+    """Compute formulas for a basis of the tensors with this denominator, with the given `monomials` of the bivector.
 
     Returns the tensors and an empty text, or no tensors and the reason.
     """
