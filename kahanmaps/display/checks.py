@@ -15,8 +15,8 @@ from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_record_suffix
 
-_MAX_CLAIMS = 30  # displayed in a notebook
-_MAX_TEXT = 400  # characters of a displayed sentence
+_MAX_CLAIMS = 30  # maximal number of claims displayed in a notebook
+_MAX_TEXT = 400  # maximal number of characters of a displayed sentence
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def finding_html(finding: Finding) -> str:
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
-    """Return the details of a claim as pairs of a word and HTML: formula, evidence, witness, source."""
+    """Return the details of a claim as pairs of a label and HTML: formula, evidence, witness, source."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
         rows.append(("formula", f"<code>{_escaped(finding.formula, limits.formula)}</code>"))

@@ -7,7 +7,7 @@ from kahanmaps.display_protocols import html_form
 from kahanmaps.experiments.results.store import Store, StoreError
 from kahanmaps.experiments.results.summary import Summary
 
-_MAX_ROWS = 40
+_MAX_ROWS = 40  # maximal number of rows of a table
 
 
 @html_form.register

@@ -40,8 +40,8 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _MAX_ROWS = 60  # maximal number of rows of a table in a notebook
-_MAX_TEXT = 300
-_MAX_LENGTHS = 12
+_MAX_TEXT_CHARACTERS = 300  # maximal number of characters of a cell in a notebook
+_MAX_CYCLE_LENGTHS = 12  # maximal number of cycle lengths in a line, the largest ones
 WORDS = (
     "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
     "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
@@ -118,7 +118,7 @@ def result_html(result: Any, map_: MapFamily | None = None) -> str:
     return markup.block(title, (markup.folded_table(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + more, subtitle)
 
 
-def _html(text: str, width: int = _MAX_TEXT) -> str:
+def _html(text: str, width: int = _MAX_TEXT_CHARACTERS) -> str:
     return markup.escape(markup.abbreviate(text, width))
 
 
@@ -170,19 +170,19 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """List each formula with its verdict and evidence, then the reason why there are no more."""
+    """List each formula with its verdict and evidence, then the remarks on the search."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
 @lines_of.register
 def _densities(search: DensitySearch) -> Iterator[Line]:
-    """Yield a density with its verdict and evidence, then further densities, or the reason why there is no density."""
+    """Yield a density with its verdict and evidence, then other densities, or the reason why there is none."""
     return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """List each tensor with its verdict and properties, then the reason why there are no more."""
+    """List each tensor with its verdict and properties, then the remarks on the search."""
     named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named_results, (search.note, search.reason))
 
@@ -263,7 +263,7 @@ def _census(census: Census) -> Iterator[Line]:
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"
-    longest = list(census.lengths.items())[-_MAX_LENGTHS:]
+    longest = list(census.lengths.items())[-_MAX_CYCLE_LENGTHS:]
     if longest:
         label = "length x cycles" if census.complete else "length x points"
         more = "... " if len(census.lengths) > len(longest) else ""

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 16_000_000
 _TOML = TomlKind("system file", MAX_FILE_BYTES, SystemFileError)
-_MAX_LABEL = 120
+_MAX_LABEL = 120  # maximal number of characters of equations that serve as a name
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 

@@ -71,7 +71,7 @@ def parse_with_iterates(
     formula, *definition_texts = pieces
     definitions = {}
     for piece in definition_texts:
-        name, equals, value = (polynomial.strip() for polynomial in piece.partition("="))
+        name, equals, value = (side.strip() for side in piece.partition("="))
         if not equals or not is_name(name):
             expected = "expected what a letter stands for: F0 = x*y~"
             raise InputError(f"found {quoted(piece.strip())} behind a comma, {expected}")

@@ -20,7 +20,7 @@ from kahanmaps.plots.style import COLOR_MAP, COLORS, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MAX_CELLS, MAX_STEPS = 2000, 1_000_000
+MAX_CELLS, MAX_STEPS = 2000, 1_000_000  # cells along each axis, steps of each orbit
 STAYS, ENDS = -1, -2  # instead of a direction: the orbit stays in the ball; it ends at a pole or by overflow
 
 

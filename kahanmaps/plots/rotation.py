@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.62
-_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
+_MIN_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
 _MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
-_MAX_POINTS = 10_000
+_MAX_POINTS = 10_000  # initial points
 
 
 def plot_rotation(
@@ -137,6 +137,6 @@ def _resonances(low: float, high: float) -> list[Fraction]:
             break
         for p in range(math.ceil(low * q), math.floor(high * q) + 1):
             value = Fraction(p, q)
-            if low < value < high and all(abs(value - r) >= _SPACING * (high - low) for r in resonances):
+            if low < value < high and all(abs(value - r) >= _MIN_SPACING * (high - low) for r in resonances):
                 resonances.append(value)
     return resonances

@@ -28,7 +28,7 @@ from kahanmaps.version import __version__
 
 CHARACTERS = 6_000  # approximate limit for one formula, and limit for one line of text
 _MAX_SYSTEM = 200_000  # maximal number of characters of a printed system file
-_MAX_EQUATIONS = 40
+_MAX_EQUATIONS = 40  # maximal number of equations of a system on a page
 # LaTeX commands with their arguments, and words.
 _WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
 # Text commands in names with special characters; latex2mathml would print these commands literally.

@@ -19,7 +19,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
     "--shape",
     type=click.Choice(["linear", "quadratic"]),
     help="linear: g = B f with a constant matrix B; quadratic: any g of degree at most 2 (the default in dimension 1 "
-    "to 3, where it takes a second).",
+    "to 3, else linear).",
 )
 @opt.seed_option
 @opt.error_bits_option("A statement reported as supported is false with probability below 2^-BITS.")

@@ -114,7 +114,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     _scale_option,
 )
 def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
-    """Plot the heights of exact orbits, which measure the growth of the numbers.
+    """Plot the heights of exact orbits (the lengths of the numbers) against the step.
 
     \b
       kahanmaps plot heights weierstrass -o heights.png

@@ -17,7 +17,7 @@ from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
 # Orbits in one variable are drawn against the step number, and only their beginning is of interest.
-_STEPS, _STEPS_ON_A_LINE = 1000, 100
+_DEFAULT_STEPS, _DEFAULT_STEPS_IN_ONE_VARIABLE = 1000, 100
 
 
 @picture(
@@ -30,7 +30,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     ),
     opt.backward_option,
     click.option(
-        "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions; step is the number of steps."
+        "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions, or step (the step number)."
     ),
     click.option("--3d", "space", is_flag=True, help="Draw three axes, chosen automatically."),
     click.option(
@@ -45,7 +45,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     click.option(
         "--lines",
         is_flag=True,
-        help="Join the points of each orbit by lines: neighbors on its curve, or else consecutive steps.",
+        help="Join the points of each orbit: neighbors on the curve that it fills, else consecutive points.",
     ),
     click.option(
         "--levels", metavar="F", help="Draw level curves of an integral or expression in the plane of the axes."
@@ -82,7 +82,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     By default sixteen initial points are chosen around an equilibrium, and the
     projection with the largest spread is drawn. Messages on standard error say
     what was chosen, how many points lie outside the window, and which orbits
-    ended early. Colors go from dark to light; the widest orbits are drawn first.
+    ended early. Colors of many orbits go from dark to light; the widest are drawn first.
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
@@ -93,7 +93,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     notes: list[str] = []
     field = lib.field_of(file)
     starts = initial_points(file, field, eps, options)
-    default_steps = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
+    default_steps = _DEFAULT_STEPS if file.dim > 1 else _DEFAULT_STEPS_IN_ONE_VARIABLE
     steps = default_steps if options["steps"] is None else options["steps"]
     color = options["color_by"]
     if color not in ("orbit", "step"):

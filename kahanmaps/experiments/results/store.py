@@ -80,14 +80,14 @@ PRAGMA user_version = 1;
 """
 PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
 RESULT_CHUNK = 50  # rows read with their results, each of which may take megabytes
-MAX_FOUND = 20
-CONFLICTS_SHOWN = 5
+MAX_FOUND_TASKS = 20  # of one prefix of a key
+MAX_CONFLICTS_SHOWN = 5  # keys of conflicting tasks in the result of a merge
 
 _BUSY_SECONDS = 30.0
 _MIN_BYTES = 512  # the smallest page that SQLite has
-# In KiB. Planning accesses the index of keys at random: unless the index of a million keys fits into the cache, every
-# key causes the write of a page.
-_CACHE = 128 << 10
+# KiB of cache for SQLite. Planning accesses the index of keys at random: unless the index of a million keys fits into
+# the cache, every key causes the write of a page.
+_CACHE_KIB = 128 << 10
 _MACHINE_CODES = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 # fmt: off
 _COLUMNS = (
@@ -278,7 +278,7 @@ class Store(HtmlDisplay):
                 finally:
                     if self._lock is None:
                         os.close(descriptor)
-            self._execute(f"PRAGMA cache_size = -{_CACHE}")
+            self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
             if not self._is_initialized(create):  # again: another process may have done it before the lock
                 with self._transaction():
@@ -644,7 +644,7 @@ class Store(HtmlDisplay):
                         self._put_result(task, other_result, attempts + (own_attempts or 0))
                     elif other_result[0] == Outcome.OK and other_result[1:3] != own_result[1:3]:
                         conflicts += 1
-                        conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
+                        conflicting += [key] if conflicts <= MAX_CONFLICTS_SHOWN else []
         return Merged(new_tasks, results, replaced, conflicts, tuple(conflicting))
 
     # Queries
@@ -702,7 +702,7 @@ class Store(HtmlDisplay):
         tasks = self._fetch(
             f"SELECT t.id, t.key, t.text, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
-            (prefix, f"{prefix}g", MAX_FOUND),  # g comes after every hexadecimal digit
+            (prefix, f"{prefix}g", MAX_FOUND_TASKS),  # g comes after every hexadecimal digit
         )
         places_sql = (
             "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "

@@ -152,7 +152,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 def transform_cubic(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
     """Return the coefficients of the cubic in the coordinates `matrix` (of determinant 1) times the old coordinates."""
     f, g, k, l = matrix.entries()
-    # u = l u' - g v', v = -k u' + f v'
+    # (u', v') are the new coordinates: u = l u' - g v', v = -k u' + f v'
     a, b, c, d = block.a, block.b, block.c, block.d
     slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
     other_u, other_v = 3 * a * g * g - 2 * b * g * f + c * f * f, b * g * g - 2 * c * g * f + 3 * d * f * f
