@@ -186,7 +186,7 @@ def _catch_interrupts() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
-    """Show the last message below a notebook cell, from two seconds after the start until the block ends."""
+    """Show the latest message below a notebook cell, from two seconds after the start until the block ends."""
     if not _in_notebook():
         yield lambda _: None
         return

@@ -113,7 +113,7 @@ def functions_along(
         requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
             or "known" for all integrals that follow from theorems or are claimed by the file.
         in_floats: whether the orbit is in floating point.
-        taken: the names of further columns of the table.
+        taken: the names of the other columns of the table.
 
     Raises:
         InputError: if a name occurs twice or is in `taken`, or if a function cannot be evaluated in floats.

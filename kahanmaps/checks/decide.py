@@ -39,7 +39,7 @@ DEFAULT_ERROR_BITS = 100
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
 _MAX_UNDEFINED_POINTS = 200
 _SMALL_POINT_COUNT = 400
-_HIGH_POINT_COUNT = 20  # further points with long coordinates, where a nonzero function hardly ever vanishes
+_HIGH_POINT_COUNT = 20  # with long coordinates, tried last: a nonzero function hardly ever vanishes there
 _HIGH_BITS = 62
 
 Sides = tuple[Sequence[Any], Sequence[Any]]

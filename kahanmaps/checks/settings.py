@@ -205,7 +205,7 @@ def _orbit_data(run: OrbitRun, tried_count: int, undefined_count: int) -> Mappin
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
-    """Return (settings, claim), even if the claim was passed as `settings`; a given eps replaces settings.eps."""
+    """Return (settings, claim), also if the claim was passed as `settings`; `eps`, if given, replaces settings.eps."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:

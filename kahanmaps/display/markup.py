@@ -15,7 +15,7 @@ from kahanmaps.errors import counted, printable
 from kahanmaps.maps.convention import eps_record_suffix
 
 # A symbol, and a color that is mixed with the text color; the contrast exceeds 4.5 : 1 on white and on near-black.
-WORDS = {
+SYMBOLS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
@@ -108,7 +108,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str =
 
 
 def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Return a table that shows the first 12 rows; a click on the number of further rows shows all.
+    """Return a table that shows the first 12 rows; a click on the number of hidden rows shows all.
 
     >>> folded_table([["a"]]) == table((), [["a"]]), "<summary>3 more lines</summary>" in folded_table([["a"]] * 15)
     (True, True)
@@ -142,9 +142,9 @@ def verdict(word: object) -> str:
     '<span class="verdict">note</span>'
     """
     text = str(word)
-    if text not in WORDS:
+    if text not in SYMBOLS:
         return f'<span class="verdict">{escape(text)}</span>'
-    mark, color = WORDS[text]
+    mark, color = SYMBOLS[text]
     style = f"color: color-mix(in srgb, currentColor 35%, {color}); white-space: nowrap"
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 

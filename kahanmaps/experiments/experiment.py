@@ -127,10 +127,10 @@ def key_of(path: KeyPath) -> str:
 
 
 class SpecDocument:
-    """A spec, whose paths of system files are relative to `folder`.
+    """A spec as plain data; paths of system files in it are relative to `folder`.
 
     `mistakes` are pairs of a key and a sentence; wrong shapes come first. `documents` contains the documents of the
-    systems that were read. With `skip_bad` all experiments skip systems that cannot be read, as with on_error = "skip".
+    systems that were read. If `skip_bad`, all experiments skip systems that cannot be read, as with on_error = "skip".
     """
 
     def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:

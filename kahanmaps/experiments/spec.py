@@ -62,7 +62,7 @@ class Spec:
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
     """Read the spec in a TOML file; paths of system files in it are relative to the folder of the spec.
 
-    With `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
+    If `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
     SpecError with all mistakes, and InputError if the file cannot be read.
     """
     data = _TOML.read(path)

@@ -115,7 +115,7 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """The messages for integrals or a density that are neither claimed in the file nor given by a theorem."""
+        """What is neither claimed in the file nor given by a theorem ("integrals", "density"), with a message."""
         if self.H is not None:  # the modified H and the density det(I - eps f'(x)) are known
             return {}
         messages = {}

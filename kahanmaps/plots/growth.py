@@ -147,7 +147,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Plot the heights of exact orbits against the step, with the fitted growth, in a color for each eps.
+    """Plot the heights of exact orbits against the step, with the fitted growth; each eps has a color.
 
     Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2 or c n with terms of lower
     degree, or an exponential; orbits with bounded, logarithmic or undecided growth have no line. `scale` is "linear",

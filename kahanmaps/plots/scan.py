@@ -113,7 +113,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _ColorGroup:
-    """The objects of one color: points, pieces of curves, and conditions with possible label positions."""
+    """What is drawn in one color: points, pieces of curves, and conditions with possible positions of their labels."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -158,7 +158,7 @@ def _draw(scan: Scan, style: Style, groups: list[_ColorGroup], window: Window, l
 def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: Style) -> None:
     """Write conditions next to their curves, then next to points, if they fit; labels may cover points.
 
-    Points with the fastest growth that is not exponential are labelled first. Among the positions at which a label
+    Points with the fastest growth below exponential are labelled first. Among the positions at which a label
     fits, the position crossed by the fewest curves is chosen.
     """
     em = _CONDITION_FONT_RATIO * style.font_size

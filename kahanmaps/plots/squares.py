@@ -224,7 +224,7 @@ def plot_squares(
 
 
 def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
-    """Return the two coordinates that maximize the smallest width of the squares and of their gaps."""
+    """Return the two coordinates in which the narrowest of the squares and of their gaps is as wide as possible."""
     dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0
@@ -380,7 +380,7 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
 
 
 def _to_table(lattice: Lattice) -> Floats:
-    """Return the points as floating-point numbers; nan for missing points and for points that are too large."""
+    """Return the points as floating-point numbers; nan for missing points and coordinates of 1e150 or more."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _MAX_COORDINATE, table, np.nan)

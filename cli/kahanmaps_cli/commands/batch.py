@@ -393,7 +393,7 @@ def _print_status(data: Mapping[str, Any]) -> None:
         for skipped in row["skipped"]:
             print_raw(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
     if data["unplanned"]:
-        click.echo(f"{data['unplanned']} more results belong to tasks of no current experiment")
+        click.echo(f"{data['unplanned']} results in addition belong to tasks of no current experiment")
 
 
 @command.command("show")
@@ -526,7 +526,7 @@ def summary(
         print_raw(lib.summary_markdown(result), end="")
     elif on_terminal():
         for table in result.tables(digits=4):
-            print_table([table.columns, *table.rows], words=table.words)
+            print_table([table.columns, *table.rows], text_count=table.words)
     else:
         for line in result.lines():
             print_raw(line)

@@ -44,7 +44,8 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
     error is the difference at a fixed time from a Taylor solution in balls; the column measured has the order, log_2 of
     the ratio of errors at two time steps with the ratio 2. Equations of implicit methods are solved by Newton's method
     to rounding; orbits in which this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian
-    T(p) + V(q). yoshida4, suzuki4 and yoshida6 are compositions of Kahan's method, which is symmetric.
+    T(p) + V(q). yoshida4, suzuki4 and yoshida6 are compositions of Kahan's method, which is symmetric. The work is
+    given as evaluations of f and solutions of linear systems per step.
 
     FILE has the columns kind (drift or error), method, function, eps, step, value and evaluations of f.
 

@@ -43,7 +43,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     initial points.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
-    those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|.
+    those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|; residual is the
+    largest difference of an orbit, normally round-off.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early or --seconds stopped the run.
     """

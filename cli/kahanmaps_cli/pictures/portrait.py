@@ -32,7 +32,7 @@ _DEFAULT_STEPS, _DEFAULT_STEPS_IN_ONE_VARIABLE = 1000, 100
     click.option(
         "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions, or step (the step number)."
     ),
-    click.option("--3d", "space", is_flag=True, help="Draw three axes, chosen automatically."),
+    click.option("--3d", "three_axes", is_flag=True, help="Draw three axes, chosen automatically."),
     click.option(
         "--colour-by",
         "--color-by",
@@ -106,7 +106,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         lambda step: progress(f"step {step} of {steps}"),
     )
     if axes is None:
-        count = 3 if options["space"] else 2
+        count = 3 if options["three_axes"] else 2
         axis_names = [file.variables[k] for k in lib.fullest_axes(orbits.points.reshape(-1, file.dim), count)]
         axes = tuple(lib.requested_axis(file, eps, name) for name in axis_names)
         if file.dim > count:
@@ -163,7 +163,7 @@ def _require_consistent(options: dict[str, Any]) -> None:
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:
         raise click.UsageError(f"found --steps {steps}, expected 0 to {_MAX_STEPS} (--backward steps backward)")
-    if options["space"] and options["axes"] is not None:
+    if options["three_axes"] and options["axes"] is not None:
         raise click.UsageError("give --axes A,B,C or --3d, not both")
     if options["levels_at"] is not None and options["levels"] is None:
         raise click.UsageError("--levels-at needs --levels F")
@@ -188,7 +188,7 @@ def _requested_axes(
     file: lib.SystemFile, eps: Any, options: dict[str, Any]
 ) -> tuple[lib.PointFunction | str, ...] | None:
     """Return the requested axes, or the only possible axes; None if the points determine the axes."""
-    text, count = options["axes"], 3 if options["space"] else 2
+    text, count = options["axes"], 3 if options["three_axes"] else 2
     if text is not None:
         texts = [axis_text.strip() for axis_text in text.split(",")]
         if len(texts) not in (2, 3) or not all(texts):

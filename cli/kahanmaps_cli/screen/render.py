@@ -139,5 +139,5 @@ def json_number(value: Any) -> Any:
 
 
 def short_float(value: Any) -> str:
-    """Format a number with three digits."""
+    """Format a number with three significant digits."""
     return f"{float(value):.3g}"

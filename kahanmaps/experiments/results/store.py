@@ -202,7 +202,7 @@ class Store(HtmlDisplay):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """Open the store in a file, for writing unless `readonly`; with `create`, create a missing file."""
+        """Open the store in a file, for writing unless `readonly`; if `create`, create a missing file."""
         if create and readonly:
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
@@ -506,9 +506,9 @@ class Store(HtmlDisplay):
         retry_failed: bool = False,
         shard: tuple[int, int] = (1, 1),
     ) -> Iterator[Job]:
-        """Yield each task without a result once, in plan order; results may be added during the iteration.
+        """Yield a job for each task without a result, once, in plan order; results may be added during the iteration.
 
-        With `retry_failed` failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
+        If `retry_failed`, failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
         i-th of n disjoint parts of the tasks.
         """
         sql, queries = self._pending_query(experiments, retry_failed, shard)
@@ -587,7 +587,7 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
+        """Yield the tasks with their records in plan order; if `missing`, also the tasks without a record."""
         stored = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED_COLUMNS}

@@ -71,12 +71,12 @@ class WorkersError(KahanmapsError):
 
 @dataclass
 class _Attempt:
-    """A job in flight, with the history of its attempts."""
+    """A job in flight (submitted, its record not yet returned), with the history of its attempts."""
 
     job: Job
     documents: dict[str, str]
     tries: int = 0  # number of attempts in which the worker was killed from outside
-    had_fault: bool = False
+    had_fault: bool = False  # an earlier attempt failed for a reason that may lie in its worker
     begun: float = 0.0  # time of the start of this attempt
 
 

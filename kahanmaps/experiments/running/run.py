@@ -19,7 +19,7 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _WAIT_SECONDS = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time taken to write the last list
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time that writing the last list took
 GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
 
 

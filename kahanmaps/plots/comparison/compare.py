@@ -328,7 +328,7 @@ def compare(
     initial, relative = _initial_values(functions, starts)
     time, references = _references(field, starts[:_REFERENCE_STARTS], eps, progress) if orders else (None, None)
     if orders and time is None:
-        notes.append("no errors: no reference, for the solution moves not at all, or reaches a pole at once")
+        notes.append("no errors are measured: the solution is constant, or reaches a pole at once")
     runs, curves = [], []
     edges = _bin_edges(steps, linear_bins)
     for name in method_names:

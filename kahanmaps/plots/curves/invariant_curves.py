@@ -219,7 +219,7 @@ def _compute_orbit(
 
 
 def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> PlaneCubic:
-    """Return the curve through the initial point, with numerator and denominator scaled to moderate size."""
+    """Return the cubic through the initial point, its numerator and denominator scaled: the larger one is 1 or -1."""
     U, V, W = initial_triple
     time_step = 2 * arb(eps)
     u, v = U / W / time_step, V / W / time_step

@@ -69,9 +69,9 @@ class PlaneCubic:
         return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
     def value_on_sphere(self, angles: Floats, length: float) -> Floats:
-        """Return values of this polynomial at points (..., 2) of a half sphere that represents the projective plane.
+        """Return the polynomial of `value`, made homogeneous, on a half sphere that represents the projective plane.
 
-        The first angle is the direction in the plane, the second the angle from the axis, pi/2 at infinity:
+        `angles` (..., 2) are the direction of a point in the plane, and an angle from the axis, pi/2 at infinity:
         (u, v) = length tan(second) (cos(first), sin(first)). If the curve consists of lines through the origin, or is a
         conic, the factors that vanish at the origin and at infinity are omitted.
         """

@@ -41,7 +41,7 @@ def plot_invariant_curves(
 ) -> Figure:
     """Plot the cubics and the orbits on them: one panel for each real plane, two panels for each complex plane.
 
-    With `projective` a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
+    If `projective`, a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
     at infinity. `flow` adds the level curve of the differential equation through each initial point, dashed. `original`
     are the indices of two variables: the first panel then shows the orbit in these variables. `labels` are the names of
     the initial points, if there are several. Raises InputError for invalid indices.

@@ -80,7 +80,7 @@ def portrait_of(
 ) -> Portrait:
     """Project orbits to two or three axes, each of which is a function of the point or the word "step".
 
-    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. With `join`
+    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. If `join`,
     the neighbours of each point on the curve of its orbit are computed, unless an axis is the step. Raises InputError
     for other axes or colors.
 
@@ -198,7 +198,7 @@ _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait as dots or, with `lines`, as joined points; with `equal` both axes have the same unit.
+    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, both axes have one unit.
 
     `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
     """
@@ -323,7 +323,7 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Draw the orbits in this order as dots or, with `lines`, as segments, colored by the values.
+    """Draw the orbits in this order as dots or, if `lines`, as segments, colored by the values.
 
     A segment has the color of its first point; `limits` are the least and the largest value of the color bar.
     """

@@ -53,7 +53,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """Return the range of values that `window_of` determines, without a margin; `required` are the initial points.
+    """Return the range of values that `window_of` determines, without a margin; `required` are initial values.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
