@@ -37,10 +37,10 @@ METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
 # log2 of 3 N / (5 ln N), a lower bound of Rosser and Schoenfeld for the primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
-_MAX_UNDEFINED_POINTS = 200
-_SMALL_POINT_COUNT = 400
+_MAX_UNDEFINED_POINTS = 200  # random points at which no sides are defined, after which the test ends
+_SMALL_POINT_COUNT = 400  # rational points of small height that are tried as witnesses
 _HIGH_POINT_COUNT = 20  # with long coordinates, tried last: a nonzero function hardly ever vanishes there
-_HIGH_BITS = 62
+_HIGH_BITS = 62  # of these long coordinates
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
 

@@ -202,8 +202,8 @@ def _polarized_component(polynomial: fmpq_mpoly, variables: Sequence[str]) -> st
     terms = counted(len(polynomial), "term")
     if not len(terms_shown) and len(polynomial):
         return rf"\text{{({terms}, not shown)}}"
-    more = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
-    return latex_polynomial(2 * at_midpoint - (at_x + at_y) / 2) + more
+    ellipsis = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
+    return latex_polynomial(2 * at_midpoint - (at_x + at_y) / 2) + ellipsis
 
 
 def _tex(text: object) -> str:

@@ -16,7 +16,7 @@ from kahanmaps.algebra.parsing import is_name, parse_polynomial, parse_rational_
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
-MAX_ITERATES = 16
+MAX_ITERATES = 16  # largest number of ~ after a name
 _MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced
 
 

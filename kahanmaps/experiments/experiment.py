@@ -36,7 +36,7 @@ DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY = "family"
-_MAX_FILES = 10_000
+_MAX_FILES = 10_000  # that match one pattern
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 

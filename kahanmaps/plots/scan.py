@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_ASPECT = 0.8
+_ASPECT = 0.8  # height over width of the axes
 _EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
 _CONDITION_FONT_RATIO = 0.8  # font size of conditions, relative to the font size of other text
 _LABEL_POSITIONS, _SAMPLES = 12, 300  # points of a curve: for its condition, and to find labels that it crosses

@@ -28,7 +28,7 @@ UP, DOWN, BOTH = "up", "down", "both"
 _NODE_COUNT = 6  # interpolation nodes: three points on either side of the hyperplane
 _NEWTON_STEPS = 12  # for the zero of an interpolation polynomial
 _MAX_DIFFERENCE = 0.1  # largest difference of interpolation with four and with six nodes, in steps
-_ASPECT = 0.75
+_ASPECT = 0.75  # height over width of the axes
 
 
 @dataclass(frozen=True, eq=False)

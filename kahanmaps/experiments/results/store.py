@@ -83,7 +83,7 @@ RESULT_CHUNK = 50  # rows read with their results, each of which may take megaby
 MAX_FOUND_TASKS = 20  # of one prefix of a key
 MAX_CONFLICTS_SHOWN = 5  # keys of conflicting tasks in the result of a merge
 
-_BUSY_SECONDS = 30.0
+_BUSY_SECONDS = 30.0  # of waiting for a lock of another process
 _MIN_BYTES = 512  # the smallest page that SQLite has
 # KiB of cache for SQLite. Planning accesses the index of keys at random: unless the index of a million keys fits into
 # the cache, every key causes the write of a page.

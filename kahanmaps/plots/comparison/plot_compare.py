@@ -32,7 +32,7 @@ KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
 _MIN_PANEL_WIDTH = 5.5  # minimal width in centimetres of panels side by side
 _MIN_CLIPPED_ERROR = 1e3  # no smaller error is shown as an arrow
-_MAX_PANELS = 6
+_MAX_PANELS = 6  # of one picture, each of one function
 _DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the error axis if all errors are 0
 
 

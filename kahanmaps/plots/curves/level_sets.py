@@ -18,7 +18,7 @@ from kahanmaps.plots.portraits.windows import Window
 
 MAX_LEVELS = 200  # of one function in one picture
 GRID = 301  # grid lines in each direction
-_NEWTON_STEPS = 8
+_NEWTON_STEPS = 8  # for each vertex
 
 
 Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices

@@ -171,7 +171,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     return np.asarray(rows[pairs[lengths <= max_length]], dtype=np.int64)
 
 
-_ASPECT = 0.75
+_ASPECT = 0.75  # height over width of the axes
 _EULER_COLOR = "#BBBBBB"
 _LEVEL_STYLE: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
 _MAX_JOINED_POINTS = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
