@@ -136,11 +136,11 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
     return pandas.DataFrame(rows)
 
 
-_TEXTS = ("text", "sentence", "summary", "claim", "reason", "rhs")
+_TEXT_ATTRIBUTES = ("text", "sentence", "summary", "claim", "reason", "rhs")
 
 
 class ResultPart(AttributeHints, Certified):
-    """Base class of the parts of results. A part is shown by the first attribute listed in `_TEXTS` that it has."""
+    """Base class of the parts of results. A part is shown by its first attribute in `_TEXT_ATTRIBUTES`."""
 
     __slots__ = ()
 
@@ -150,7 +150,7 @@ class ResultPart(AttributeHints, Certified):
             cls.__repr__ = ResultPart.__repr__  # type: ignore[method-assign]  # a dataclass prints all its fields
 
     def __repr__(self) -> str:
-        value = next(getattr(self, name) for name in _TEXTS if hasattr(self, name))
+        value = next(getattr(self, name) for name in _TEXT_ATTRIBUTES if hasattr(self, name))
         text = value if isinstance(value, str) else ", ".join(map(str, value))
         return f"<{type(self).__name__}: {shorten(text.partition(chr(10))[0], 100)}>"
 
@@ -211,7 +211,7 @@ def latex_form(value: object) -> str:
     raise TypeError(f"no LaTeX is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
-_FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
+_FILES = {"documents": "systems", "family": "systems", "maps": "systems"}  # folder -> file of kahanmaps.display
 
 
 def _load_displays(value: object) -> None:

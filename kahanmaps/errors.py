@@ -15,7 +15,7 @@ from datetime import date, time
 from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
-_MISTAKES_SHOWN = 50
+_MISTAKES_SHOWN = 50  # in one message
 _CONTEXT_WIDTH = 72  # characters of a text that are shown around a mistake in it
 # Codes of the operating system for a full or broken disk, or for another exhausted resource.
 _MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})

@@ -22,7 +22,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.errors import InputError, suggestion
 from kahanmaps.hard_stop import TimeLimit
 
-_DELAY, _UPDATE_INTERVAL = 2.0, 0.5  # seconds before the first message, and between two messages
+_DELAY_SECONDS, _UPDATE_SECONDS = 2.0, 0.5  # seconds before the first message, and between two messages
 _ARGUMENT_HINTS = {
     **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
     **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
@@ -186,7 +186,7 @@ def _catch_interrupts() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
-    """Show the last message below a notebook cell, from two seconds after the start until the block ends."""
+    """Show the latest message below a notebook cell, from two seconds after the start until the block ends."""
     if not _in_notebook():
         yield lambda _: None
         return
@@ -195,11 +195,11 @@ def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
     messages, is_done = [f"{name} ..."], threading.Event()
 
     def show() -> None:
-        if is_done.wait(_DELAY):
+        if is_done.wait(_DELAY_SECONDS):
             return
         with suppress(Exception):  # an error of the display must not end the search
             handle = ipython.display(ipython.HTML(_progress_bar(messages[-1])), display_id=True)
-            while not is_done.wait(_UPDATE_INTERVAL):
+            while not is_done.wait(_UPDATE_SECONDS):
                 handle.update(ipython.HTML(_progress_bar(messages[-1])))
             handle.update(ipython.HTML(""))
 

@@ -109,7 +109,7 @@ def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
 
 
 class AttributeHints:
-    """Base class of values: the error for a missing attribute suggests an existing one."""
+    """Base class of values whose error for a missing attribute suggests an existing one."""
 
     __slots__ = ()
 

@@ -10,7 +10,7 @@ from helpers import table
 
 from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli.main import WELCOME, cli
-from kahanmaps_cli.options import Renamed
+from kahanmaps_cli.options import RenamedOption
 
 # The least that a command needs, in the folder of the fixture `least_folder`.
 LEAST = dict(line.split(" => ") for line in table(Path(__file__).with_name("cli") / "least.txt")["least"])
@@ -34,7 +34,7 @@ def _below(words: str, command: click.Command) -> Iterator[tuple[str, click.Comm
 
 def names_of(option: click.Option) -> list[str]:
     """The names of an option that its help shows."""
-    return option.opts[:1] if isinstance(option, Renamed) else list(option.opts)
+    return option.opts[:1] if isinstance(option, RenamedOption) else list(option.opts)
 
 
 def options_of(command: click.Command) -> list[click.Option]:

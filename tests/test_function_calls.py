@@ -100,7 +100,7 @@ def test_progress_is_shown_in_a_notebook_after_a_while_and_removed(monkeypatch):
     display = SimpleNamespace(HTML=str, display=lambda html, display_id: (show(html), SimpleNamespace(update=show))[1])
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr(function_calls, "_in_notebook", lambda: True)
-    monkeypatch.setattr(function_calls, "_UPDATE_INTERVAL", 0.01)
+    monkeypatch.setattr(function_calls, "_UPDATE_SECONDS", 0.01)
 
     def search(progress=lambda _: None):
         progress("step 1")
@@ -108,12 +108,12 @@ def test_progress_is_shown_in_a_notebook_after_a_while_and_removed(monkeypatch):
         return seen.wait(5)
 
     search.__annotations__["progress"] = "Callable[[str], None]"
-    monkeypatch.setattr(function_calls, "_DELAY", 0.01)
+    monkeypatch.setattr(function_calls, "_DELAY_SECONDS", 0.01)
     assert public_function(search, "search")()
     assert "step 2 &lt;b&gt;" in shown[-2]
     assert shown[-1] == ""
     count = len(shown)
-    monkeypatch.setattr(function_calls, "_DELAY", 60)
+    monkeypatch.setattr(function_calls, "_DELAY_SECONDS", 60)
     seen.set()
     assert public_function(search, "search")()
     assert len(shown) == count  # nothing for a short search

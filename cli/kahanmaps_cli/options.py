@@ -28,10 +28,8 @@ def stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return apply
 
 
-class Renamed(click.Option):
+class RenamedOption(click.Option):
     """An option with older names, which are accepted but not shown in the help."""
-
-    old_names = True
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         names, self.opts = self.opts, self.opts[:1]
@@ -91,7 +89,7 @@ inline_options: Callable[[F], F] = stack(
         "--image",
         multiple=True,
         metavar="EXPR",
-        help="Component of a map given on the command line, repeated for each variable.",
+        help="Component of a map given on the command line, repeated for each variable; or all: 'y; x/y'.",
     ),
     click.option(
         "--inverse",
@@ -217,7 +215,7 @@ check_options: Callable[[F], F] = stack(
         "--max-digits",
         type=Whole(1),
         metavar="N",
-        help="Stop the test orbit when a number exceeds N digits (default: by dimension).",
+        help="Stop the test orbit when a number exceeds N digits (default: depends on the dimension).",
     ),
     verbose_option,
     output_options,
@@ -225,7 +223,7 @@ check_options: Callable[[F], F] = stack(
 
 
 def pick(options: Mapping[str, Any], *names: str, **renamed: str) -> dict[str, Any]:
-    """Return the values of options as keyword arguments; `pick(options, "seed", terms="max")` renames max to terms."""
+    """Return values of options as keyword arguments; `pick(options, "seed", terms="max")` passes max as terms."""
     return {name: options[name] for name in names} | {argument: options[name] for argument, name in renamed.items()}
 
 

@@ -158,7 +158,7 @@ def Whole(minimum: int = 0) -> ParameterKind:
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
-    """Return the type of NAME=VALUE; with `name_is_optional` a text without a name is the value."""
+    """Return the type of NAME=VALUE; if `name_is_optional`, a text without a name is the value."""
 
     def read(text: str) -> tuple[str, str]:
         name, equals, value = (piece.strip() for piece in text.partition("="))

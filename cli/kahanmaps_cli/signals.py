@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 INTERRUPTED = 130  # the exit status
-_REPEAT_SECONDS = 1.0  # CPU time between repeated interrupts
+_REPEAT_SECONDS = 1.0  # CPU time between two interrupts after one signal
 
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:

@@ -2,8 +2,8 @@
 
 Proof and experiment are independent: if a proved claim fails at a point, this program contains an error, and reports
 it as such. A false claim may pass at random points, with a probability that the evidence bounds. If both sides can be
-expanded, the expansion decides. It uses the code that evaluates an identity at points over Q and GF(p), over the field
-of rational functions, within a budget of products of terms.
+expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) is run over the field
+of rational functions, within a budget that counts products of two terms.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ class NotEqual(ArithmeticError):
 def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     """Expand both sides over the field of rational functions; return the evidence that they are equal.
 
-    `budget` bounds the number of products of terms; the default is smaller for long coefficients. Returns None if the
-    expansion exceeds the budget. Raises NotEqual if the two sides differ.
+    `budget` bounds the number of products of two terms; the default is smaller for long coefficients. Returns None if
+    the expansion exceeds the budget. Raises NotEqual if the two sides differ.
     """
     if budget is None:
         if identity.dim > MAX_DIMENSION:
@@ -111,7 +111,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
         if identity.scales_with_eps:
-            budget *= 2  # dimension 6 is feasible, as for the integrals of paper_m3: 130 million products
+            budget *= 2  # then dimension 6 is feasible: the integrals of paper_m3 take 130 million products
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
     modulus = None if identity.root is None else identity.root.polynomial.coeffs()
     if modulus is not None:

@@ -61,7 +61,7 @@ class Witness(ResultPart):
     left_label: str
     right_label: str
     field: str = "QQ"
-    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # further vectors and numbers, by name
+    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # other vectors and numbers, by name
 
     @property
     def text(self) -> str:
@@ -83,7 +83,7 @@ class Witness(ResultPart):
 
 @dataclass(frozen=True)
 class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
-    """A claim with its verdict. A `control` is expected to be refuted, and shows that the check is able to fail."""
+    """A claim with its verdict. A true `control` is expected to be refuted: it shows that the check is able to fail."""
 
     claim: str
     verdict: Certainty

@@ -24,8 +24,8 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SOURCE = "petrera-suris-2016, Theorem 9"
-SAME_STEP = fmpq(1)
-# The number of pairs of maps tried along an orbit and at random points as well; the proof covers all pairs.
+EQUAL_STEPS = fmpq(1)
+# Maximal number of pairs of maps that are also tried at random points and along an orbit; the proof covers all pairs.
 _MAX_TRIED_PAIRS = 30
 _MAX_TRIED_PAIRS_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one pair takes many seconds
 
@@ -35,7 +35,7 @@ def commutativity(
     g: QuadraticSystem | MapFamily,
     eps: fmpq | None,
     names: tuple[str, str],
-    ratio: fmpq = SAME_STEP,
+    ratio: fmpq = EQUAL_STEPS,
 ) -> Identity:
     """Return Phi_f o Phi_g = Phi_g o Phi_f as an identity.
 
@@ -116,7 +116,7 @@ def check_commute(
     g, note = match_variables(file, other_file)
     notes = [note] if note else []
     is_same_order = set(f.variables) != set(other_file.variables) or f.variables == other_file.variables
-    ratio, is_same_step = SAME_STEP, True
+    ratio, is_same_step = EQUAL_STEPS, True
     if eps2 is not None:
         if settings.eps is None:
             raise InputError("a second step needs the first one as well: give both --eps and --eps2")
@@ -127,7 +127,7 @@ def check_commute(
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
         if other_file.is_quadratic and isinstance(g, KahanFamily):
             # The Kahan map of g depends only on the product eps g.
-            g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), SAME_STEP, ratio == 1
+            g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), EQUAL_STEPS, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
         notes.append(f"{note}; the evidence below is stated for eps")

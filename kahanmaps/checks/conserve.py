@@ -38,9 +38,9 @@ from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Candidate = tuple[PhaseFunction, Evidence | None, str]  # an integral, its proof by a theorem, and the source
-# The largest number of integrals that are tried along an orbit as well.
-_MAX_TRIED = 32
-_MAX_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
+# Maximal number of proved integrals that are also tried along an orbit.
+_MAX_TRIED_INTEGRALS = 32
+_MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
 
 
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
@@ -93,7 +93,7 @@ def known_integrals(file: SystemFile) -> list[Candidate]:
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
         integrals.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    # m - 1 further integrals. They are rational, even if chi has irrational roots and the K~_s are irrational.
+    # m - 1 integrals from the powers of A, which are rational even if chi has irrational roots and the K~_s are not.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
     for k in range(1, member.m):
@@ -113,7 +113,7 @@ def functions_along(
         requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
             or "known" for all integrals that follow from theorems or are claimed by the file.
         in_floats: whether the orbit is in floating point.
-        taken: the names of further columns of the table.
+        taken: the names of the other columns of the table.
 
     Raises:
         InputError: if a name occurs twice or is in `taken`, or if a function cannot be evaluated in floats.
@@ -205,7 +205,7 @@ def check_integrals(
     claim_data = [integral.subject for integral, _, _ in candidates]
     orbit = run_orbit(file.map, settings, claim_data, file.member is not None)
     findings = []
-    max_tried = _MAX_TRIED if file.dim <= 16 else _MAX_TRIED_IN_HIGH_DIMENSION
+    max_tried = _MAX_TRIED_INTEGRALS if file.dim <= 16 else _MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
@@ -237,7 +237,7 @@ def check_integrals(
 def _certified(
     file: SystemFile, integral: PhaseFunction, settings: Settings, claims: Mapping[str, RationalFunction]
 ) -> dict[str, Any]:
-    """The arguments with which `certificate` proves that an integral is conserved."""
+    """Return the arguments with which `certificate` proves that an integral is conserved, or why there are none."""
     if isinstance(integral, ClaimedFunction):
         if integral.name in claims:
             return settings.certified(file, integrals={integral.name: claims[integral.name]})

@@ -2,11 +2,12 @@
 
 With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. For each trial a prime
 p from [2^62, 2^63) and then a point over GF(p) are drawn by a hash of the identity and a seed, so that no identity can
-be constructed for given points (algebra/chance.py). If P is not the zero polynomial, a trial succeeds only if p divides
-all coefficients of P (at most bits/62 of more than 2^55 primes do) or the point is a root of P (probability at most
-degree/(p - 1), and p - 1 >= 2^62). A point at which a denominator vanishes is replaced by another one; such points
-have probability below 1/2, which is why the sum of the two probabilities is doubled. Trials are independent, so their
-bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
+be constructed for given points (algebra/chance.py). If P is not zero, has degree d and a coefficient of b bits, a trial
+succeeds only if p divides all coefficients of P (at most b/62 of more than 2^55 primes do) or the point is a root of P
+(probability at most d/(p - 1), and p - 1 >= 2^62). A point at which a denominator vanishes is replaced by another one;
+such points have probability below 1/2, which is why the sum of the two probabilities is doubled. Trials are
+independent, so their bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from
+N to 2N).
 
 A trial that fails refutes the identity; then a small rational point is searched for at which the two sides differ.
 """
@@ -34,12 +35,12 @@ from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
 
 METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
-# By Rosser and Schoenfeld there are at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
+# log2 of 3 N / (5 ln N), a lower bound of Rosser and Schoenfeld for the primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
-_MAX_UNDEFINED_POINTS = 200
-_SMALL_POINT_COUNT = 400
-_HIGH_POINT_COUNT = 20  # further points with long coordinates, where a nonzero function hardly ever vanishes
-_HIGH_BITS = 62
+_MAX_UNDEFINED_POINTS = 200  # random points at which no sides are defined, after which the test ends
+_SMALL_POINT_COUNT = 400  # rational points of small height that are tried as witnesses
+_HIGH_POINT_COUNT = 20  # with long coordinates, tried last: a nonzero function hardly ever vanishes there
+_HIGH_BITS = 62  # of these long coordinates
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
 
@@ -160,7 +161,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """The result at one random point modulo `prime`; None if undefined there; with a `decision` if it refutes."""
+    """The result at a random point: `prime` is None if no sides are defined there, `decision` None unless refuted."""
 
     prime: int | None = None
     decision: Decision | None = None
@@ -251,8 +252,8 @@ def log2_error(size: CoefficientSize, pole_degree: int, conjugates: int = 1) -> 
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
-    at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many
-    are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides the norm.
+    at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many such
+    primes are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides its norm.
     """
     if max(size.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or poles

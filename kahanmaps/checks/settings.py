@@ -147,8 +147,8 @@ def run_orbit(
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
     map_at_eps = as_map(system).at(eps, number_fields[0] if number_fields else QQ)
-    # Without a normal form, a claim that contains two more iterates multiplies the number of digits by dim^2, and the
-    # elimination by dim again. For members of the family the number of digits hardly grows from step to step.
+    # Without a normal form a claim about the second iterate of a point multiplies the number of digits by dim^2, and
+    # solving for it by dim again. For members of the family the number of digits hardly grows from step to step.
     default_max_digits = 5_000 if is_integrable else max(100, 60_000 // map_at_eps.dim**2)
     max_digits = default_max_digits if settings.max_digits is None else settings.max_digits
     random_points = random_starts(map_at_eps.dim, seed)
@@ -205,7 +205,7 @@ def _orbit_data(run: OrbitRun, tried_count: int, undefined_count: int) -> Mappin
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
-    """Return (settings, claim), even if the claim was passed as `settings`; a given eps replaces settings.eps."""
+    """Return (settings, claim), also if the claim was passed as `settings`; `eps`, if given, replaces settings.eps."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:

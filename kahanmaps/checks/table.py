@@ -35,8 +35,8 @@ class ClaimOption:
 class Check:
     """A check. `question` is shown in lists, `headline` and `text` in the help of its command.
 
-    `function` is "module:name" of a function (file, settings, extra) that returns a Report; the function of a check of
-    two systems is (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
+    `function` is "module:name" of a function (file, settings, extra), for two systems (file, other, settings, eps2),
+    that returns a Report. `examples` are command lines without "kahanmaps check-NAME", `outcome` is that of status 0.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Proof by hypotheses: each function verifies the finitely many hypotheses of a theorem exactly.
 
-It returns evidence, or None. The theorems are from petrera-suris-2016 and cmoq-2013. What goes beyond these papers
-(splitting without J, repeated roots, dimension 2) is proved in docs/mathematics.md.
+It returns the evidence, or None if a hypothesis does not hold. The theorems are from petrera-suris-2016 and cmoq-2013.
+What goes beyond these papers (splitting without J, repeated roots, dimension 2) is proved in docs/mathematics.md.
 """
 
 from __future__ import annotations

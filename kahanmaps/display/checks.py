@@ -15,8 +15,8 @@ from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_record_suffix
 
-_MAX_CLAIMS = 30  # displayed in a notebook
-_MAX_TEXT = 400  # characters of a displayed sentence
+_MAX_CLAIMS = 30  # maximal number of claims displayed in a notebook
+_MAX_TEXT = 400  # maximal number of characters of a displayed sentence
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,11 @@ def finding_html(finding: Finding) -> str:
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
-    """Return the details of a claim as pairs of a word and HTML: formula, evidence, witness, source."""
+    """Return the details of a claim as pairs of a label and HTML: formula, evidence, witness, source."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
         rows.append(("formula", f"<code>{_escaped(finding.formula, limits.formula)}</code>"))
-    rows.append(("because", because(finding.evidence, limits)))
+    rows.append(("because", reason(finding.evidence, limits)))
     rows += [("also", _escaped(evidence.summary, limits.text)) for evidence in finding.also[: limits.entries]]
     if len(finding.also) > limits.entries:
         rows.append(("also", f"… and {len(finding.also) - limits.entries} more"))
@@ -67,12 +67,12 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
     return rows + [(label, _escaped(str(value), limits.text)) for label, value in origin.items() if value]
 
 
-def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
+def reason(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
     """Return the evidence of a claim as a sentence, with the verified hypotheses."""
     return _escaped(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
-def counts(findings: Iterable[Finding]) -> str:
+def verdict_counts(findings: Iterable[Finding]) -> str:
     """Count the claims by verdict as text: 3 proved, 1 refuted."""
     findings = list(findings)
     verdicts = Counter(str(f.verdict) for f in findings if f.applies and not f.control)
@@ -89,8 +89,8 @@ def eps_sentence(report: Report) -> str:
     context = report.context
     if "eps" not in context:
         return ""
-    second = f", second map at eps2 = {markup.abbreviate(context['eps2'])}" if "eps2" in context else ""
-    return markup.eps_phrase(context) + second
+    second_map = f", second map at eps2 = {markup.abbreviate(context['eps2'])}" if "eps2" in context else ""
+    return markup.eps_phrase(context) + second_map
 
 
 def ending_sentence(report: Report) -> str:
@@ -109,16 +109,16 @@ def systems_sentence(report: Report) -> str:
 def report_html(report: Report) -> str:
     """Return the findings of a check as a table; for many claims, counts by section and the unproved claims only."""
     title = f"{report.check}: {systems_sentence(report)}"
-    pieces = [f"<p>{markup.verdict(report.verdict)} ({_escaped(counts(report.findings))})</p>"]
+    pieces = [f"<p>{markup.verdict(report.verdict)} ({_escaped(verdict_counts(report.findings))})</p>"]
     shown_findings = list(report.findings)
     if len(shown_findings) > _MAX_CLAIMS:
         sections = sections_of(report.findings).items()
-        rows = [(_escaped(title or "claims"), _escaped(counts(findings))) for title, findings in sections]
+        rows = [(_escaped(title or "claims"), _escaped(verdict_counts(findings))) for title, findings in sections]
         pieces.append(markup.table(["section", "claims"], rows))
         shown_findings = [f for f in shown_findings if str(f.verdict) != "proved" and not f.control and f.applies]
     if shown_findings:
         cells = [
-            (verdict_html(f), _escaped(f.claim), because(f.evidence) if f.witness is None else _witness_html(f.witness))
+            (verdict_html(f), _escaped(f.claim), reason(f.evidence) if f.witness is None else _witness_html(f.witness))
             for f in shown_findings[:_MAX_CLAIMS]
         ]
         pieces.append(markup.table(["verdict", "claim", "because"], cells))
@@ -141,8 +141,8 @@ def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
 
 def _witness_html(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
     lines = witness_lines(witness, limits.number)
-    if (more := len(witness.vectors) - limits.entries) > 0:
-        lines[limits.entries + 1 : -2] = [f"… and {more} more vectors"]
+    if (hidden_count := len(witness.vectors) - limits.entries) > 0:
+        lines[limits.entries + 1 : -2] = [f"… and {hidden_count} more vectors"]
     return "<br/>".join(_escaped(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
 
 
@@ -222,10 +222,10 @@ def witness_lines(witness: Witness, width: int | None) -> list[str]:
         return ", ".join(value if width is None else shorten(value, width) for value in values)
 
     where = "" if witness.field == "QQ" else f" over {witness.field}"
-    more = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
+    vector_lines = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
     return [
         f"witness: x = ({numbers(witness.point)}){f', eps = {witness.eps}' if witness.eps else ''}{where}",
-        *more,
+        *vector_lines,
         f"  {witness.left_label} = {numbers(witness.left)}",
         f"  {witness.right_label} = {numbers(witness.right)}",
     ]

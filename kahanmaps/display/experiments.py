@@ -7,7 +7,7 @@ from kahanmaps.display_protocols import html_form
 from kahanmaps.experiments.results.store import Store, StoreError
 from kahanmaps.experiments.results.summary import Summary
 
-_MAX_ROWS = 40
+_MAX_ROWS = 40  # maximal number of rows of a table
 
 
 @html_form.register
@@ -40,8 +40,8 @@ def summary_html(summary: Summary) -> str:
     for table in summary.tables(6):
         rows = [[markup.escape(cell) for cell in row] for row in table.rows[:_MAX_ROWS]]
         pieces.append(markup.table(table.columns, rows, table.title))
-        if more := len(table.rows) - len(rows):
-            pieces.append(f"<p>… and {more} more rows</p>")
+        if hidden_count := len(table.rows) - len(rows):
+            pieces.append(f"<p>… and {hidden_count} more rows</p>")
     return markup.block("summary", "\n".join(pieces))
 
 

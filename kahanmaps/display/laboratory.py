@@ -40,9 +40,9 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _MAX_ROWS = 60  # maximal number of rows of a table in a notebook
-_MAX_TEXT = 300
-_MAX_LENGTHS = 12
-WORDS = (
+_MAX_TEXT_CHARACTERS = 300  # maximal number of characters of a cell in a notebook
+_MAX_CYCLE_LENGTHS = 12  # maximal number of cycle lengths in a line, the largest ones
+STATUS_LEGEND = (
     "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
     "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
 )
@@ -108,17 +108,17 @@ def result_html(result: Any, map_: MapFamily | None = None) -> str:
         if isinstance(cell, HtmlCell):
             return cell.html()
         text = str(cell).strip().removeprefix("# ")
-        return markup.verdict(text) if text in markup.WORDS else _html(text)
+        return markup.verdict(text) if text in markup.SYMBOLS else _html(text)
 
     rows = [[cell_html(cell) for cell in line] for line in islice(lines_of(result), _MAX_ROWS + 1)]
-    more = "\n<p>… print shows all lines</p>" if len(rows) > _MAX_ROWS else ""
+    ellipsis = "\n<p>… print shows all lines</p>" if len(rows) > _MAX_ROWS else ""
     title, subtitle = _TITLES[type(result)](result)
     if map_ is not None:
         subtitle = eps_sentence(result.eps, map_)
-    return markup.block(title, (markup.folded_table(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + more, subtitle)
+    return markup.block(title, (markup.folded_table(rows[:_MAX_ROWS]) if rows else "<p>none</p>") + ellipsis, subtitle)
 
 
-def _html(text: str, width: int = _MAX_TEXT) -> str:
+def _html(text: str, width: int = _MAX_TEXT_CHARACTERS) -> str:
     return markup.escape(markup.abbreviate(text, width))
 
 
@@ -135,7 +135,7 @@ def analysis_title(analysis: Analysis) -> str:
 
 def analysis_head(analysis: Analysis) -> str:
     """Return the head of the report: the title, the equations, and explanations of the words for verdicts."""
-    return f"analyze: {analysis_title(analysis)}\n{analysis.file.map}\n{WORDS}"
+    return f"analyze: {analysis_title(analysis)}\n{analysis.file.map}\n{STATUS_LEGEND}"
 
 
 @text_form.register
@@ -155,11 +155,11 @@ def analysis_html(analysis: Analysis) -> str:
     conclusion = analysis.conclusion
     statements = [(title, line) for title, lines in analysis.sections for line in lines]
     rows = [(_html(title), markup.verdict(line.status), _html(line.text)) for title, line in statements[:_MAX_ROWS]]
-    more = f"<p>… and {len(statements) - _MAX_ROWS} more statements</p>" if len(statements) > _MAX_ROWS else ""
+    ellipsis = f"<p>… and {len(statements) - _MAX_ROWS} more statements</p>" if len(statements) > _MAX_ROWS else ""
     pieces = [
         f"<p>{map_html(analysis.file.map)}</p>",
         f"<p><strong>{_html(conclusion.kind)}</strong>: {_html(conclusion.sentence, 800)}</p>",
-        markup.folded_table(rows, ["", "known how", ""]) + more,
+        markup.folded_table(rows, ["", "known how", ""]) + ellipsis,
     ]
     subtitle = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
     return markup.block(markup.abbreviate(analysis.file.name), "\n".join(pieces), subtitle)
@@ -170,19 +170,19 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """List each formula with its verdict and evidence, then the reason why there are no more."""
+    """List each formula with its verdict and evidence, then the remarks on the search."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
 @lines_of.register
 def _densities(search: DensitySearch) -> Iterator[Line]:
-    """Yield a density with its verdict and evidence, then further densities, or the reason why there is no density."""
+    """Yield a density with its verdict and evidence, then other densities, or the reason why there is none."""
     return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """List each tensor with its verdict and properties, then the reason why there are no more."""
+    """List each tensor with its verdict and properties, then the remarks on the search."""
     named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named_results, (search.note, search.reason))
 
@@ -263,11 +263,11 @@ def _census(census: Census) -> Iterator[Line]:
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"
-    longest = list(census.lengths.items())[-_MAX_LENGTHS:]
+    longest = list(census.lengths.items())[-_MAX_CYCLE_LENGTHS:]
     if longest:
         label = "length x cycles" if census.complete else "length x points"
-        more = "... " if len(census.lengths) > len(longest) else ""
-        yield label, more + " ".join(f"{length}x{n}" for length, n in longest)
+        ellipsis = "... " if len(census.lengths) > len(longest) else ""
+        yield label, ellipsis + " ".join(f"{length}x{n}" for length, n in longest)
 
 
 @lines_of.register

@@ -115,7 +115,7 @@ def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
 
 
 def latex_matrix(entries: fmpq_mat, max_size: int = 8) -> str:
-    r"""Return a matrix over Q, or its size if it has more than `max_size` rows or columns, or long entries.
+    r"""Return a matrix over Q, or its size if it has more than `max_size` rows or columns, or entries of over 100 bits.
 
     >>> print(latex_matrix(fmpq_mat([[1, 0]])))
     \begin{pmatrix} 1 & 0 \end{pmatrix}
@@ -214,6 +214,6 @@ def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: i
 
 
 def matrix(entries: fmpq_mat, left: str = "", max_size: int = 8) -> str:
-    """Return a matrix over Q as HTML, or its size if it has more than `max_size` rows or columns, or long entries."""
+    """Return a matrix over Q as HTML, or its size if it is too large, as in `latex_matrix`; `left` is its name."""
     text = latex_matrix(entries, max_size)
     return typeset(f"{latex_name(left)} = {text}" if left else text, False)

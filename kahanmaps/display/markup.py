@@ -15,7 +15,7 @@ from kahanmaps.errors import counted, printable
 from kahanmaps.maps.convention import eps_record_suffix
 
 # A symbol, and a color that is mixed with the text color; the contrast exceeds 4.5 : 1 on white and on near-black.
-WORDS = {
+SYMBOLS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
@@ -25,9 +25,9 @@ WORDS = {
     "refuted": ("✗", "#e0353f"),
     "undecided": ("?", "#b8860b"),
 }
-_LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
-_OPEN_ROWS = 12
-_MAX_LETTERS = 60  # maximal number of characters of a displayed number or name
+_ALIGN_LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
+_MAX_OPEN_ROWS = 12  # rows of a table that are shown before a click
+_MAX_CHARACTERS = 60  # maximal number of characters of a displayed number or name
 
 
 def escape(text: object) -> str:
@@ -63,7 +63,7 @@ def code(text: object) -> str:
     return f"{fence}{margin}{line}{margin}{fence}"
 
 
-def abbreviate(text: object, width: int = _MAX_LETTERS) -> str:
+def abbreviate(text: object, width: int = _MAX_CHARACTERS) -> str:
     """Shorten a text that is longer than `width` to its beginning, its end and its length, without escaping it.
 
     >>> abbreviate("1" * 100, 20)
@@ -95,25 +95,25 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str =
     </tbody></table>
     """
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
-    names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in headings)
+    names = "".join(f'<th scope="col" {_ALIGN_LEFT}>{escape(name)}</th>' for name in headings)
     names = f"<thead><tr>{names}</tr></thead>" if names else ""
     body = [list(row) for row in rows]
     width = max(map(len, (headings, *body)))
     lines = []
     for *cells, last in body:
         colspan = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
-        line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
-        lines.append(f"<tr>{line}<td{colspan} {_LEFT}>{last}</td></tr>")
+        line = "".join(f"<td {_ALIGN_LEFT}>{cell}</td>" for cell in cells)
+        lines.append(f"<tr>{line}<td{colspan} {_ALIGN_LEFT}>{last}</td></tr>")
     return "\n".join([f"<table>{title}{names}<tbody>", *lines, "</tbody></table>"])
 
 
 def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Return a table that shows the first 12 rows; a click on the number of further rows shows all.
+    """Return a table that shows the first 12 rows; a click on the number of hidden rows shows all.
 
     >>> folded_table([["a"]]) == table((), [["a"]]), "<summary>3 more lines</summary>" in folded_table([["a"]] * 15)
     (True, True)
     """
-    open_rows, more_rows = rows[:_OPEN_ROWS], rows[_OPEN_ROWS:]
+    open_rows, more_rows = rows[:_MAX_OPEN_ROWS], rows[_MAX_OPEN_ROWS:]
     if not more_rows:
         return table(head, rows)
     more = f"<details><summary>{counted(len(more_rows), 'more line')}</summary>\n{table(head, more_rows)}\n</details>"
@@ -124,7 +124,7 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of two columns: a word (text) and its value (HTML)."""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
-        f"<td {_LEFT}>{value}</td></tr>"
+        f"<td {_ALIGN_LEFT}>{value}</td></tr>"
         for word, value in rows
     ]
     return "\n".join(["<table><tbody>", *lines, "</tbody></table>"])
@@ -142,9 +142,9 @@ def verdict(word: object) -> str:
     '<span class="verdict">note</span>'
     """
     text = str(word)
-    if text not in WORDS:
+    if text not in SYMBOLS:
         return f'<span class="verdict">{escape(text)}</span>'
-    mark, color = WORDS[text]
+    mark, color = SYMBOLS[text]
     style = f"color: color-mix(in srgb, currentColor 35%, {color}); white-space: nowrap"
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 

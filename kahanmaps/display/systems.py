@@ -39,7 +39,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CHARACTERS = 300  # approximate limit for the length of one formula
-_MAX_TEXT = 200
+_MAX_TEXT = 200  # maximal number of characters of one value
 _MAX_EQUATIONS, _MAX_LATEX_EQUATIONS = 12, 8
 
 
@@ -143,12 +143,12 @@ def normal_form_html(form: NormalForm) -> str:
         (f"plane at t = {markup.abbreviate(format_number(part.root), 20)}", formula(part.h, "h", CHARACTERS))
         for part in form.parts[:8]
     ]
-    more = "x = S z, a planar system over K = Q[t]/chi"
-    return markup.block(f"normal form, m = {form.m}", markup.definitions(rows), more)
+    remark = "x = S z, a planar system over K = Q[t]/chi"
+    return markup.block(f"normal form, m = {form.m}", markup.definitions(rows), remark)
 
 
-_COORDINATES = 8
-_POINTS = 6
+_COORDINATES = 8  # maximal number of coordinates in a row
+_POINTS = 6  # number of first points of an orbit that are displayed
 _MAX_DIGITS = 2_000  # longer numbers are not converted to text
 
 
@@ -202,8 +202,8 @@ def _polarized_component(polynomial: fmpq_mpoly, variables: Sequence[str]) -> st
     terms = counted(len(polynomial), "term")
     if not len(terms_shown) and len(polynomial):
         return rf"\text{{({terms}, not shown)}}"
-    more = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
-    return latex_polynomial(2 * at_midpoint - (at_x + at_y) / 2) + more
+    ellipsis = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
+    return latex_polynomial(2 * at_midpoint - (at_x + at_y) / 2) + ellipsis
 
 
 def _tex(text: object) -> str:

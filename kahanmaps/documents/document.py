@@ -36,7 +36,7 @@ from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
-_MAX_NAME = 1000
+_MAX_NAME = 1000  # maximal number of characters of the name of a system
 _MAX_FACTORS = 64  # maximal number of maps in a composition, including maps of its parts
 _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number if a rational number reveals the same mistakes
 
@@ -61,7 +61,7 @@ Values = dict[str, RationalFunction]
 
 
 class _Part(NamedTuple):
-    """A map of a composition, its exponent, the values of its symbols, and its entry written as a table."""
+    """A map of a composition, its exponent, the values of its symbols, and its entry of the list as a TOML table."""
 
     map: MapFamily
     power: int

@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-_CALL = re.compile(r"(\w+)(?:\((.*)\))?")
+_MEMBER_NAME = re.compile(r"(\w+)(?:\((.*)\))?")
 _INTEGER = re.compile(r"-?[0-9]{1,6}")
-LARGEST = 40  # largest n: documents grow like n^2
-_SHOWN_DEGREES = 4
+MAX_SPECIES = 40  # largest n: documents grow like n^2
+_DEGREE_COUNT = 4  # number of degrees d_1, d_2, ... in a document
 
 
 class NamedFamily(NamedTuple):
@@ -62,8 +62,8 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
     >>> lotka_volterra(3, 1)["system"]["rhs"]
     ['x1*(x2 - x3)', 'x2*(x3 - x1)', 'x3*(x1 - x2)']
     """
-    if not (2 <= n <= LARGEST and 0 <= k and 2 * k + 1 <= n):
-        raise InputError(f"found lv({n},{k}), expected lv(n,k) with 2 <= n <= {LARGEST}, 0 <= k and 2k + 1 <= n")
+    if not (2 <= n <= MAX_SPECIES and 0 <= k and 2 * k + 1 <= n):
+        raise InputError(f"found lv({n},{k}), expected lv(n,k) with 2 <= n <= {MAX_SPECIES}, 0 <= k and 2k + 1 <= n")
     x = [f"x{i + 1}" for i in range(n)]
     middle_species = x[k : n - k]
     middle_sum = " + ".join(middle_species)
@@ -82,7 +82,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
-    cross_ratios, is_full = n - 2 * k - 2, n == 2 * k + 1
+    ratio_count, is_full = n - 2 * k - 2, n == 2 * k + 1
     # Known statements about the flow and the map, each with a status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
@@ -91,9 +91,9 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         "(docs/mathematics.md).",
         "Proved: the sum of all x_i is conserved, as every affine integral of the flow is.",
     ]
-    if cross_ratios > 0:
+    if ratio_count > 0:
         facts.append(
-            f"Proved: I2, ..., I{cross_ratios + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
+            f"Proved: I2, ..., I{ratio_count + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
         )
     if k:
         where = "" if is_full else f" of LV({2 * k + 1},{k}), to which the map projects,"
@@ -114,7 +114,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
             "sources": ["itoh-1987", "bogoyavlenskij-1988", "damianou-2017", "kouloukas-quispel-vanhaecke-2016"],
             "convention": "the sources treat the flow, the last one with a Kahan map of time step 2 eps",
             "facts": facts,
-            "degrees": [degree(n, k, middle_sum) for middle_sum in range(1, _SHOWN_DEGREES + 1)],
+            "degrees": [degree(n, k, m) for m in range(1, _DEGREE_COUNT + 1)],
             "growth": "quadratic" if k else "linear",
         },
         "system": {"rhs": [f"{x[i]}*({row})" for i, row in enumerate(rows)]},
@@ -139,7 +139,7 @@ def family_member(reference: str) -> tuple[str, dict[str, Any]] | None:
         ...
     kahanmaps.errors.InputError: found 'lv(7)', expected lv(n,k) with integers, e.g. lv(7,3)
     """
-    match = _CALL.fullmatch("".join(reference.split()))
+    match = _MEMBER_NAME.fullmatch("".join(reference.split()))
     if match is None or match[1] not in FAMILIES:
         return None
     family = FAMILIES[match[1]]

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 16_000_000
 _TOML = TomlKind("system file", MAX_FILE_BYTES, SystemFileError)
-_MAX_LABEL = 120
+_MAX_LABEL = 120  # maximal number of characters of equations that serve as a name
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
@@ -210,7 +210,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @classmethod
     def from_system(cls, system: QuadraticSystem, name: str = "system") -> SystemFile:
-        """Return the file of a quadratic system without further structure."""
+        """Return the file of a quadratic system, without a Hamiltonian and without claims."""
         rhs = [format_polynomial(polynomial) for polynomial in system.rhs]
         document = {"name": name, "variables": list(system.variables), "system": {"rhs": rhs}}
         return cls(name, "system", {}, KahanFamily(system), None, None, {}, None, document)

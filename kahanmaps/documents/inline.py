@@ -111,7 +111,7 @@ def System(
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-# An alias in the style of other libraries: System.from_sympy([y, x**2], (x, y)).
+# Aliases in the style of other libraries: System.from_sympy([y, x**2], (x, y)).
 vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
 vars(System)["from_hamiltonian"] = lambda H, variables=None, **parameters: System(
     None, variables, hamiltonian=H, **parameters

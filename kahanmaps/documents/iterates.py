@@ -16,7 +16,7 @@ from kahanmaps.algebra.parsing import is_name, parse_polynomial, parse_rational_
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
-MAX_ITERATES = 16
+MAX_ITERATES = 16  # largest number of ~ after a name
 _MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced
 
 
@@ -71,7 +71,7 @@ def parse_with_iterates(
     formula, *definition_texts = pieces
     definitions = {}
     for piece in definition_texts:
-        name, equals, value = (polynomial.strip() for polynomial in piece.partition("="))
+        name, equals, value = (side.strip() for side in piece.partition("="))
         if not equals or not is_name(name):
             expected = "expected what a letter stands for: F0 = x*y~"
             raise InputError(f"found {quoted(piece.strip())} behind a comma, {expected}")

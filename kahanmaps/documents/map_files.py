@@ -47,7 +47,7 @@ def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
 
 
 def without_eps(map_: Map) -> MapFamily:
-    """Convert a map over Q at one eps, or a composition of maps at several, to a map that does not depend on eps."""
+    """Convert a map over Q at one eps, or a composition at several eps, to a map that does not depend on eps."""
     if map_.field is not QQ:
         raise InputError(f"found {map_!r}, expected a map over the rational numbers")
     variables = tuple(map_.variables or (f"x{k + 1}" for k in range(map_.dim)))

@@ -54,7 +54,7 @@ LookUp = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
-    """Reads the parts of a document; collects its names and mistakes."""
+    """Reads the parts of a document, and collects its names (parameters, variables, symbols) and its mistakes."""
 
     def __init__(
         self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], look_up: LookUp | None = None

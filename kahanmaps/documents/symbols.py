@@ -21,7 +21,7 @@ def split_names(names: Sequence[str]) -> Sequence[str]:
 
 
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
-    """Return the map of a file, in which the parameters `symbols` are symbols and the others have their values.
+    """Return the map of a file, in which the parameters `symbols` are symbols and all other parameters have values.
 
     Raises InputError as `with_symbols` does; for maps other than Kahan's only for names that are not parameters.
 
@@ -56,7 +56,7 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
-    """Return the system of a file, in which the parameters `symbols` are symbols and the others have their values.
+    """Return the system of a file, in which the parameters `symbols` are symbols and all other parameters have values.
 
     Args:
         file: the system.

@@ -63,7 +63,7 @@ class TomlKind(NamedTuple):
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
-    """Write a document: first the keys `top`, then the tables `sections`, in this order; other entries are omitted.
+    """Write a document as TOML: first the keys `top`, then the tables `sections`; other entries are omitted.
 
     >>> print(to_toml({"name": "a", "system": {"rhs": ["x^2"]}}, ["name"], ["system"]), end="")
     name = "a"

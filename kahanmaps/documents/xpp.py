@@ -77,7 +77,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
 
 
 class _OdeReader:
-    """The content of the lines read so far."""
+    """A reader of lines of an XPP file, and what the lines read so far contain."""
 
     def __init__(self) -> None:
         self.equations: list[tuple[str, list[str]]] = []  # the left side as text, the right side as tokens

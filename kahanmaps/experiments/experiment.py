@@ -36,7 +36,7 @@ DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY = "family"
-_MAX_FILES = 10_000
+_MAX_FILES = 10_000  # that match one pattern
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
@@ -62,7 +62,7 @@ _LIMITS = (
     "a table with time, memory, digits",
     {"time": read_time, "memory": read_memory, "digits": _read_digits},
 )
-_ZIP = 'a list of lists of axes, e.g. [["m", "steps"]]'
+_ZIP_TEXT = 'a list of lists of axes, e.g. [["m", "steps"]]'
 _EXPERIMENT = (
     dict,
     "a table",
@@ -71,14 +71,14 @@ _EXPERIMENT = (
         "system": _read_system,
         "options": (dict, "a table of options with their values"),
         "axes": (dict, "a table of options with lists or ranges of values"),
-        "zip": (list, _ZIP, (list, _ZIP, (str, _ZIP))),
+        "zip": (list, _ZIP_TEXT, (list, _ZIP_TEXT, (str, _ZIP_TEXT))),
         "on_error": _ON_ERROR,
         "limits": _LIMITS,
     },
 )
 _EXPERIMENTS = (dict, "at least one table [experiments.NAME]", _EXPERIMENT)
 _SPEC = {"name": (str, "text"), "on_error": _ON_ERROR, "limits": _LIMITS, "experiments": _EXPERIMENTS}
-_REQUIRED = ("experiments", "task")
+_REQUIRED_KEYS = ("experiments", "task")
 _SYSTEM_FILE_KEYS = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
@@ -112,7 +112,7 @@ def _find_mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyP
         for name, inner_shape in shapes.items():
             if name in value:
                 yield from _find_mistakes(value[name], inner_shape, (*path, name))
-            elif name in _REQUIRED:
+            elif name in _REQUIRED_KEYS:
                 yield (*path, name), f"missing, expected {inner_shape[1]}"
         for name in (name for name in value if name not in shapes):
             unknown_path = (*path, name)
@@ -127,10 +127,10 @@ def key_of(path: KeyPath) -> str:
 
 
 class SpecDocument:
-    """A spec, whose paths of system files are relative to `folder`.
+    """A spec as plain data; paths of system files in it are relative to `folder`.
 
     `mistakes` are pairs of a key and a sentence; wrong shapes come first. `documents` contains the documents of the
-    systems that were read. With `skip_bad` all experiments skip systems that cannot be read, as with on_error = "skip".
+    systems that were read. If `skip_bad`, all experiments skip systems that cannot be read, as with on_error = "skip".
     """
 
     def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
     from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
-POISSON = {"symbolic": "symbols", "max_degree": "degree"}
+POISSON_ARGUMENTS = {"symbolic": "symbols", "max_degree": "degree"}
 _ENDINGS = ("constant", "singular")  # ends of a degree sequence that is known for all iterates without a recurrence
 
 
@@ -125,7 +125,7 @@ def density(search: DensitySearch) -> Result:
 @analysis(
     "find-poisson",
     "preserve.poisson.poisson_tensors:find_poisson",
-    renamed=POISSON,
+    renamed=POISSON_ARGUMENTS,
     eps=None,
     symbolic=None,
     max_degree=None,

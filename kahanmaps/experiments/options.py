@@ -22,11 +22,11 @@ from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.random_members import MAX_M, parse_chi
 
 _MAX_INTEGER = 2**63 - 1
-_PRIME_BITS = 192
+_MAX_PRIME_BITS = 192  # of the option prime
 _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 _MAX_SECONDS, _MAX_BYTES = 10**9, 10**18  # limits of system calls
-_NONE = "none"
+_NO_LIMIT = "none"
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 
@@ -36,8 +36,8 @@ class Option:
     """An option of tasks.
 
     `read` converts a value in a spec to plain data or raises InputError; `make` converts plain data to an argument of
-    the library. The plain value None means that the option is not given. `numbers` says whether ranges "a..b step c"
-    are allowed.
+    the library. The plain value None means that the option is not given. If `numbers` is true, the values are numbers,
+    and ranges "a..b step c" are allowed.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Option:
 
 
 def exact(name: str, help: str, *, zero: bool = True) -> Option:
-    """Return an option whose value is a rational number; its canonical form is text in lowest terms."""
+    """Return an option with a rational value (0 only if `zero`), whose canonical form is text in lowest terms."""
 
     def read(value: Any) -> str:
         number = number_of(value)
@@ -128,8 +128,8 @@ def _read_arithmetic(value: Any) -> str:
 
 
 def _read_prime(value: Any) -> str:
-    expected = f"a prime of at most {_PRIME_BITS} bits"
-    number = _read_integer(value, expected, range(2, 1 << _PRIME_BITS))
+    expected = f"a prime of at most {_MAX_PRIME_BITS} bits"
+    number = _read_integer(value, expected, range(2, 1 << _MAX_PRIME_BITS))
     GF(number)
     return str(number)  # as text: JSON and databases may be unable to represent long integers
 
@@ -199,7 +199,7 @@ def read_memory(value: Any) -> int | None:
 
 
 def _read_amount(value: Any, units: Mapping[str, int], expected: str, least: Fraction, maximum: int) -> Fraction | None:
-    if value == _NONE:
+    if value == _NO_LIMIT:
         return None
     text = value if isinstance(value, str) else show(value)
     match = re.fullmatch(r"\s*([0-9]{1,18}(?:\.[0-9]{1,9})?(?:[eE][+-]?[0-9]{1,2})?)\s*([A-Za-z]*)\s*", text)
@@ -225,11 +225,11 @@ VOCABULARY = {
         integer("steps", "number of steps of the orbit", maximum=10**9),
         integer("orbits", "number of orbits", 1, 10**6),
         exact("box", "bound R for the coordinates of random initial points, from -R to R"),
-        integer("every", "use every N-th step only", 1, 10**9),
-        integers("at", "iterates to compute directly", "integers from 0 to 10^18", range(10**18 + 1)),
+        integer("every", "measure every N-th point only", 1, 10**9),
+        integers("at", "numbers of the iterates to compute", "integers from 0 to 10^18", range(10**18 + 1)),
         integer("seed", "random seed"),
         integer("error_bits", "test random points until the error probability is below 2^-BITS", 1, 10_000),
-        integer("max_digits", "digit budget of exact orbits", minimum=1),
+        integer("max_digits", "stop an orbit at longer numbers", minimum=1),
         choice("method", "method of exact orbits", ("generic", "normal-form", "doubling")),
         Option("arithmetic", "exact, float, mod:P or ball:BITS", _read_arithmetic, str),
         Option("prime", "prime of modular arithmetic", _read_prime, int),
@@ -239,14 +239,14 @@ VOCABULARY = {
             "integers from 1 to 11",
             range(1, 12),
         ),
-        integer("order", "order in eps^2 of the series of the integrals", 1, 20),
+        integer("order", "number of terms of the series of integrals in eps^2", 1, 20),
         integer("ball_bits", "also compute over complex balls of this number of bits", 32, 100_000),
         flag("controls", "also check every claim on input that violates one hypothesis"),
         flag("report", "store the full report, as printed by --json"),
         integer("m", "half the dimension", 1, 16),
         integer(EFFORT, "work limit of the search: each increment by 1 doubles it", LEAST_EFFORT, MOST_EFFORT),
-        integer("terms", "compute this number of degrees (default: until a recurrence is certain)", 1, 10_000),
-        integer("max_degree", "largest degree to try", maximum=10**6),
+        integer("terms", "number of degrees to compute (default: until a recurrence is certain)", 1, 10_000),
+        integer("max_degree", "largest degree that is searched or measured", maximum=10**6),
         Option(
             "symbolic",
             "parameters that stay symbolic in formulas, e.g. a1,a2",
@@ -260,20 +260,20 @@ VOCABULARY = {
         ),
         choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
         integer("samples", "follow this number of random points instead of all points", 1, 100_000),
-        integer("transient", "initial steps to discard (default: a tenth)", maximum=10**9),
+        integer("transient", "steps before those averaged (default: steps/10)", maximum=10**9),
     )
 }
 
-DRAWS = ("eigenvalues", "generic")
+CHI_CHOICES = ("eigenvalues", "generic")
 # Options of a random member of the family, apart from the option seed, which is in VOCABULARY.
 FAMILY = {
     option.name: option
     for option in (
         VOCABULARY["m"],
-        choice("draw", "eigenvalues (the default): distinct integers; generic: a random integer chi", DRAWS),
+        choice("draw", "eigenvalues (the default): distinct integers; generic: random chi over Z", CHI_CHOICES),
         point("eigenvalues", "the eigenvalues of A", MAX_M),
         Option("chi", "the polynomial chi in t", _read_chi, parse_chi),
-        integer("size", "bound for the random integer coefficients (default 2, or 1 for generic and chi)", 1, 10**6),
+        integer("size", "bound for the random integers that give H (default 2, or 1 for generic and chi)", 1, 10**6),
         integers(
             "signs",
             "signs of the associated system: 1 or -1 for each factor of chi",

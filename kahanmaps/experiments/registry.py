@@ -29,13 +29,13 @@ from kahanmaps.errors import InputError, quoted, suggestion
 from kahanmaps.experiments.options import OTHER, VOCABULARY, Option
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
-LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
+LIBRARY_MODULES = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
 REPORT = "report"
 Result = dict[str, Any]
 FullResult = tuple[Result, Any]  # a result, and the object whose `to_json` gives the full report
-Function = Callable[..., Result | FullResult]
-Summary = Callable[[Any], Result]
-ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options, and other names of the same library arguments
+TaskFunction = Callable[..., Result | FullResult]
+Summarizer = Callable[[Any], Result]
+ARGUMENT_NAMES = {"symbolic": "symbols", "terms": "max_terms"}  # option -> parameter of library functions
 
 # The kinds of systems that tasks may need.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
@@ -43,11 +43,11 @@ SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
 
 @dataclass(frozen=True)
 class TaskKind:
-    """A kind of task: name, summary, function, options with defaults, and the kind of system it needs."""
+    """A kind of task, with options, defaults and the kind of system it needs; if it `reports`, with a full report."""
 
     name: str
     summary: str
-    function: Function
+    function: TaskFunction
     options: Mapping[str, Option]
     defaults: Mapping[str, Any]
     needs: str | None
@@ -85,14 +85,14 @@ _KINDS: dict[str, TaskKind] = {}
 
 def task(
     name: str, needs: str = SYSTEM, *, options: Mapping[str, Any] | None = None, reports: bool = False
-) -> Callable[[Function], Function]:
-    """Register a function as a kind of task. Raises TypeError for an unknown parameter.
+) -> Callable[[TaskFunction], TaskFunction]:
+    """Register a function as a kind of task. Raises TypeError for a parameter that is not an option.
 
     `options` with their defaults replace the signature of a function with arbitrary keywords. A function that `reports`
     returns a pair of a result and its full report, which the option "report" stores.
     """
 
-    def register(function: Function) -> Function:
+    def register(function: TaskFunction) -> TaskFunction:
         names, defaults, takes_system = list(options or ()), dict(options or {}), True
         if options is None:
             parameters = dict(inspect.signature(function).parameters)
@@ -121,15 +121,15 @@ def task(
 
 
 def analysis(
-    name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENTS, **defaults: Any
-) -> Callable[[Summary], Summary]:
+    name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENT_NAMES, **defaults: Any
+) -> Callable[[Summarizer], Summarizer]:
     """Register a function of the laboratory ("module:name", imported when it is called) as a kind of task.
 
     The arguments are the system file (or its attribute `of`) and the options; `renamed` maps options to parameter
     names. The `defaults` are given here, not in the library, since they enter the keys of tasks.
     """
 
-    def register(summarize: Summary) -> Summary:
+    def register(summarize: Summarizer) -> Summarizer:
         def perform(system: Any, **options: Any) -> FullResult:
             module, _, attribute = function.partition(":")
             argument = getattr(system, of) if of else system
@@ -146,7 +146,7 @@ def analysis(
 
 def task_kinds() -> Mapping[str, TaskKind]:
     """Return a dict from the names to all kinds of tasks, including tasks of users (KAHANMAPS_TASKS)."""
-    for library_module in LIBRARY:
+    for library_module in LIBRARY_MODULES:
         import_module(library_module)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:

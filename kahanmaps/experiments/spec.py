@@ -32,10 +32,10 @@ from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import SystemFileError, reading
 from kahanmaps.experiments.experiment import Experiment, ExperimentReader, SpecDocument
 
-MAX_BYTES = 4_000_000
-MAX_TASKS = 1_000_000
+MAX_BYTES = 4_000_000  # of a spec file
+MAX_TASKS = 1_000_000  # of all experiments of a spec, unless the caller allows more
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
-_MAX_LISTED = 3
+_MAX_LISTED = 3  # maximal number of experiments in a message
 
 
 class SpecError(SystemFileError):
@@ -62,7 +62,7 @@ class Spec:
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
     """Read the spec in a TOML file; paths of system files in it are relative to the folder of the spec.
 
-    With `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
+    If `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
     SpecError with all mistakes, and InputError if the file cannot be read.
     """
     data = _TOML.read(path)

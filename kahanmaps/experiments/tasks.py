@@ -32,10 +32,10 @@ from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
 _MIN_COMPILED_WORK = 5_000_000  # orbits times steps
-_MAX_POINT = 400  # maximal number of characters of a stored last point; a longer point is stored as its hash only
+_MAX_POINT = 400  # maximal number of characters of a stored last point; of a longer point only the hash is stored
 
 
-_OPTIONS = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
+_SETTINGS = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
 def _register_check(check: Check) -> None:
@@ -47,7 +47,7 @@ def _register_check(check: Check) -> None:
         return _full_result(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
-    options = {"other": None, "eps": None, "eps2": None, **_OPTIONS} if check.is_of_pair else _OPTIONS
+    options = {"other": None, "eps": None, "eps2": None, **_SETTINGS} if check.is_of_pair else _SETTINGS
     task(check.command, needs=MEMBER_OR_OTHER if check.is_of_pair else SYSTEM, options=options, reports=True)(perform)
 
 

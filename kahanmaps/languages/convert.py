@@ -29,7 +29,7 @@ LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", 
 PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
 
 _MAX_LINE = 100  # maximal number of characters in a line of an expression
-_MAX_SUM = 100  # longer sums are split by brackets: parsers recurse over sums
+_MAX_SUM = 100  # maximal number of terms of a sum: longer sums are split by brackets, as parsers recurse over sums
 _MAX_INTEGER = 2**31  # bound for integers in C and Fortran
 # Names that have no other meaning in any language: a lower-case letter with digits (except i, which may be the
 # imaginary unit, and e), and words with an underscore (except those of GP's debugger). Other words may be functions.

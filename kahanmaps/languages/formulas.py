@@ -28,7 +28,7 @@ from kahanmaps.version import __version__
 
 # Limits for the closed form of the map (all components together) before common factors are removed.
 MAX_TERMS = 4_000
-MAX_DIMENSION_OF_FORMULAS = 8
+MAX_DIMENSION_OF_FORMULAS = 8  # of the map
 
 
 class Formulas:
@@ -115,7 +115,7 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """The messages for integrals or a density that are neither claimed in the file nor given by a theorem."""
+        """What is neither claimed in the file nor given by a theorem ("integrals", "density"), with a message."""
         if self.H is not None:  # the modified H and the density det(I - eps f'(x)) are known
             return {}
         messages = {}
@@ -157,7 +157,7 @@ class Formulas:
                 raise _too_large(f"a polynomial of {len(product)} terms, expected at most {MAX_TERMS} in all")
             return product
 
-        # (M | r) annihilates (x~, -1); so it is proportional to the maximal minors, of which the last is -+det M.
+        # (x~, -1) is in the kernel of (M | r), hence proportional to its signed maximal minors, the last being -+det M.
         *numerators, denominator = kernel_minors(equation, times)
         components = []
         for minor in numerators:

@@ -13,9 +13,9 @@ from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.convention import describe_eps
 
-_MAX_LINE = 140  # maximal number of source characters in a line of a formula
+_MAX_WIDTH = 140  # maximal number of source characters in a line of a formula
 # Symbols for the point and its image, distinct from x, which may be the name of a variable.
-_X, _Y = r"\mathbf x", r"\widetilde{\mathbf x}"
+_POINT, _IMAGE = r"\mathbf x", r"\widetilde{\mathbf x}"
 
 Rows = list[tuple[str, str]]
 
@@ -38,8 +38,8 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
         aligned_rows = []
         for left, right in rows:
             pieces = [""]
-            for term in re.split(r" (?=[+-] )", right) if len(right) > _MAX_LINE else [right]:
-                if pieces[-1] and len(pieces[-1]) + len(term) > _MAX_LINE:
+            for term in re.split(r" (?=[+-] )", right) if len(right) > _MAX_WIDTH else [right]:
+                if pieces[-1] and len(pieces[-1]) + len(term) > _MAX_WIDTH:
                     pieces.append("")
                 pieces[-1] += f" {term}" if pieces[-1] else term
             aligned_rows += [f"{left} &= {pieces[0]}", *(rf"&\quad {piece}" for piece in pieces[1:])]
@@ -47,7 +47,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
         if part == "map" and formulas.rhs:
             lines.pop()
             jacobian = " \\\\\n".join(" & ".join(map(latex_polynomial, row)) for row in formulas.jacobian)
-            lines += ["", "where", r"\[", rf"f'({_X}) = \begin{{pmatrix}}", jacobian, r"\end{pmatrix}.", r"\]", ""]
+            lines += ["", "where", r"\[", rf"f'({_POINT}) = \begin{{pmatrix}}", jacobian, r"\end{pmatrix}.", r"\]", ""]
     return "\n".join([*lines, r"\end{document}", ""])
 
 
@@ -59,9 +59,9 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
         title = r"The system $\dot{\mathbf x} = f(\mathbf x)$"
         return title, list(zip(left, map(latex_polynomial, formulas.rhs), strict=True))
     if part == "map" and formulas.rhs:
-        rows = [(_Y, rf"{_X} + 2 \varepsilon (I - \varepsilon f'({_X}))^{{-1}} f({_X})")]
-        rows.append((_X, f"({', '.join(map(latex_name, formulas.variables))})"))
-        return rf"The Kahan map ${_X} \mapsto {_Y}$", rows
+        rows = [(_IMAGE, rf"{_POINT} + 2 \varepsilon (I - \varepsilon f'({_POINT}))^{{-1}} f({_POINT})")]
+        rows.append((_POINT, f"({', '.join(map(latex_name, formulas.variables))})"))
+        return rf"The Kahan map ${_POINT} \mapsto {_IMAGE}$", rows
     if part == "map":
         rows = []
         for row in formulas.equation:
@@ -74,28 +74,28 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
                 rows.append((" + ".join(terms), latex_polynomial(row[-1])))
         return "The map", rows
     if part == "inverse" and formulas.rhs:
-        return "Its inverse", [(_X, rf"{_Y} - 2 \varepsilon (I + \varepsilon f'({_Y}))^{{-1}} f({_Y})")]
+        return "Its inverse", [(_POINT, rf"{_IMAGE} - 2 \varepsilon (I + \varepsilon f'({_IMAGE}))^{{-1}} f({_IMAGE})")]
     if part == "inverse":
         return "Its inverse", _components(formulas, formulas.inverse_form())
     if part == "jacobian":
-        derivative = rf"(I - \varepsilon f'({_X}))^{{-1}} (I + \varepsilon f'({_Y}))"
-        return "Its Jacobi matrix", [(rf"\frac{{\partial {_Y}}}{{\partial {_X}}}", derivative)]
+        derivative = rf"(I - \varepsilon f'({_POINT}))^{{-1}} (I + \varepsilon f'({_IMAGE}))"
+        return "Its Jacobi matrix", [(rf"\frac{{\partial {_IMAGE}}}{{\partial {_POINT}}}", derivative)]
     if part == "map-formulas":
         title = f"The {'Kahan map' if formulas.rhs else 'map'} as rational functions"
         return title, _components(formulas, formulas.closed_form())
     if part == "density":
         title = r"The invariant measure $\mathrm{d}\mathbf x/\varphi$"
         if formulas.density is None:
-            return title, [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
+            return title, [(r"\varphi", rf"\det(I - \varepsilon f'({_POINT}))")]
         return title + claim_note, _quotient(r"\varphi", formulas.density)
     rows = [row for name, f in formulas.integrals.items() for row in _quotient(_integral_label(name or "I"), f)]
     for k in range(len(formulas.forms)):
         power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
-        rows.append((rf"\widetilde H_{{{k}}}", rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"))
+        rows.append((rf"\widetilde H_{{{k}}}", rf"\tfrac{{1}}{{\varepsilon}} {_POINT}^{{\mathsf T}} J{power} {_IMAGE}"))
     if (member := formulas.file.member) is not None:
         rows += [("A", _matrix(member.A)), ("J", _matrix(member.chosen.hamiltonian.J))]
     elif formulas.H is not None:
-        modified = rf"H({_X}) + \tfrac{{1}}{{3}} (\nabla H({_X}))^{{\mathsf T}} ({_Y} - {_X})"
+        modified = rf"H({_POINT}) + \tfrac{{1}}{{3}} (\nabla H({_POINT}))^{{\mathsf T}} ({_IMAGE} - {_POINT})"
         rows += [(r"\widehat H", modified), ("H", latex_polynomial(formulas.H))]
     return f"Integrals of the map{claim_note if formulas.integrals else ''}", rows
 
@@ -126,7 +126,7 @@ def _integral_label(name: str) -> str:
 def _quotient(left: str, function: RationalFunction) -> Rows:
     """Return the row left = P/Q if it is short, otherwise separate rows for P and Q without fractions."""
     quotient = latex_rational_function(function)
-    if len(quotient) <= _MAX_LINE or function.is_polynomial:
+    if len(quotient) <= _MAX_WIDTH or function.is_polynomial:
         return [(left, quotient)]
     is_negative, numerator, denominator = integer_fraction(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"

@@ -20,7 +20,7 @@ from kahanmaps.plots.style import COLOR_MAP, COLORS, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MAX_CELLS, MAX_STEPS = 2000, 1_000_000
+MAX_CELLS, MAX_STEPS = 2000, 1_000_000  # cells along each axis, steps of each orbit
 STAYS, ENDS = -1, -2  # instead of a direction: the orbit stays in the ball; it ends at a pole or by overflow
 
 
@@ -54,7 +54,7 @@ def survey_escape(
     radius: float = 1000.0,
     progress: Callable[[int], None] | None = None,
 ) -> Escape:
-    """Follow the float orbits of the centers of `cells` x `cells` cells of a window.
+    """Follow the float orbits of the centers of `cells` x `cells` cells of a window in the plane of two variables.
 
     `at` are the coordinates outside the plane (default 0). Orbits of Kahan maps may pass near poles and return: an
     orbit that leaves the ball need not go to infinity.
@@ -92,7 +92,7 @@ def survey_escape(
 
 
 def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time") -> Figure:
-    """Plot the escape times ("time") or the directions ("basin"); orbits that stay are white."""
+    """Plot the escape times ("time") or the directions of escape ("basin"); orbits that stay in the ball are white."""
     style, (x, y) = style or Style(), result.window
     names = [side + label_of(name) for name in result.variables for side in ("+", "\N{MINUS SIGN}")]
     directions, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)

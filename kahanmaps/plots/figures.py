@@ -42,7 +42,7 @@ LETTER_WIDTH = 0.5  # mean width of a letter, in units of the font size
 _MAX_DIGITS = 40  # maximal number of characters of a number in a label
 _MAX_FORMULA = 60  # maximal number of characters of a typeset expression
 _BAND_COLOR, _BAND_SHARE = "#e8e8e8", 0.09  # band for zeros on a log axis, fraction of the height
-_MAX_TICKS = 6
+_MAX_TICKS = 6  # on a logarithmic axis with a band for zeros
 _HANDLE_WIDTH = 5.0  # width of a line or mark in a legend with the space around it, in font sizes
 _ON_ONE_LINE = replace(
     LATEX,

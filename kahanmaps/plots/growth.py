@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 SCALES = ("linear", "log", "loglog")
 _MAX_SYSTEMS = len(COLORS)
 _MAX_FORMULA = 24  # maximal number of letters of d_n in a legend
-_MARKS = 30  # maximal number of marks for one orbit
+_MAX_MARKS = 30  # maximal number of marks for one orbit
 _ASPECT = 0.62  # height over width of the axes
 
 
@@ -122,7 +122,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
-    rate = growth.dynamical_degree
+    dynamical_degree = growth.dynamical_degree
     if growth.growth is Growth.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
     if growth.recurrence is None and growth.proof is None:
@@ -137,9 +137,9 @@ def _degree_label(growth: DegreeGrowth) -> str:
         phrases.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
     elif growth.growth is not Growth.EXPONENTIAL:
         phrases.append(f"{growth.growth}")
-    if rate is not None:
-        is_integer = rate.minimal_polynomial.degree() == 1
-        number = rate.digits if is_integer else rf"{float(rate.digits):.5f}\ldots"
+    if dynamical_degree is not None:
+        is_integer = dynamical_degree.minimal_polynomial.degree() == 1
+        number = dynamical_degree.digits if is_integer else rf"{float(dynamical_degree.digits):.5f}\ldots"
         phrases.append(rf"$\lambda = {number}$")
     return f"{name}: {', '.join(phrases) or str(growth.growth)}"
 
@@ -147,7 +147,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Plot the heights of exact orbits against the step, with the fitted growth, in a color for each eps.
+    """Plot the heights of exact orbits against the step, with the fitted growth; each eps has a color.
 
     Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2 or c n with terms of lower
     degree, or an exponential; orbits with bounded, logarithmic or undecided growth have no line. `scale` is "linear",
@@ -181,10 +181,10 @@ def plot_heights(
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in eps_curves:
                 indices = np.flatnonzero(curve.steps >= (1 if starts_at_one else 0))
-                if len(indices) > _MARKS:
-                    # Only _MARKS marks, evenly spaced along the axis, including the first and the last step.
+                if len(indices) > _MAX_MARKS:
+                    # Only _MAX_MARKS marks, evenly spaced along the axis, including the first and the last step.
                     steps = curve.steps[indices].astype(np.float64)
-                    spaced = (np.geomspace if starts_at_one else np.linspace)(steps[0], steps[-1], _MARKS)
+                    spaced = (np.geomspace if starts_at_one else np.linspace)(steps[0], steps[-1], _MAX_MARKS)
                     indices = indices[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
                 points = curve.steps[indices], curve.bits[indices]
                 axes.plot(*points, color=COLORS[k], linestyle="none", markersize=mark_size, **mark)

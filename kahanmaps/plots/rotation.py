@@ -22,10 +22,10 @@ from kahanmaps.plots.style import COLORS, LINES, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ASPECT = 0.62
-_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
+_ASPECT = 0.62  # height over width of the axes
+_MIN_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
 _MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
-_MAX_POINTS = 10_000
+_MAX_POINTS = 10_000  # initial points
 
 
 def plot_rotation(
@@ -130,13 +130,13 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return fractions p/q between two numbers, spaced, by increasing q: three, or all up to twice the least q."""
+    """Return spaced fractions p/q between two numbers, with q up to twice the least q, then until there are three."""
     resonances: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(resonances) >= _MIN_RESONANCES and q > 2 * resonances[0].denominator:
             break
         for p in range(math.ceil(low * q), math.floor(high * q) + 1):
             value = Fraction(p, q)
-            if low < value < high and all(abs(value - r) >= _SPACING * (high - low) for r in resonances):
+            if low < value < high and all(abs(value - r) >= _MIN_SPACING * (high - low) for r in resonances):
                 resonances.append(value)
     return resonances

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_ASPECT = 0.8
+_ASPECT = 0.8  # height over width of the axes
 _EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
-_CONDITION_SIZE = 0.8  # font size of conditions, relative to the font size of other text
-_POSITIONS, _SAMPLES = 12, 300  # points of a curve: for its condition, and to find labels that it crosses
+_CONDITION_FONT_RATIO = 0.8  # font size of conditions, relative to the font size of other text
+_LABEL_POSITIONS, _SAMPLES = 12, 300  # points of a curve: for its condition, and to find labels that it crosses
 _AXES_SHARE = 0.85  # the axes as a fraction of the width and height of the picture
 _DEFAULT_WINDOW: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -64,7 +64,7 @@ def plot_scan(
         growth = growth_on(components)
         growths.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(components)
     if modulo is not None:
-        sweeps = {component.prime: component for component in scan.sweeps if component.complete}
+        sweeps = {sweep.prime: sweep for sweep in scan.sweeps if sweep.complete}
         if modulo not in sweeps:
             primes = ", ".join(map(str, sweeps)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {primes}")
@@ -85,7 +85,7 @@ def plot_scan(
         return _draw(scan, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
     points = {name: [_position(c) for c in growths[name] if c.is_rational_point] for name in growths}
     if window is None:
-        all_points = [place for components in points.values() for place in components]
+        all_points = [point for points_of_growth in points.values() for point in points_of_growth]
         window = window_of(np.array(all_points)) if len(all_points) > 1 else _DEFAULT_WINDOW
     groups, context = [], ring(["u", "v", "eps"])
     for name, components in growths.items():
@@ -102,8 +102,8 @@ def plot_scan(
         for text, pieces in curves:
             # The label is on the longest piece, preferably off its middle, where curves rarely cross.
             longest = max(pieces, key=len)
-            ends = _resampled(longest, _POSITIONS + 1)
-            indices = sorted(range(1, _POSITIONS), key=lambda k: abs(4 * k - 3 * _POSITIONS))
+            ends = _resampled(longest, _LABEL_POSITIONS + 1)
+            indices = sorted(range(1, _LABEL_POSITIONS), key=lambda k: abs(4 * k - 3 * _LABEL_POSITIONS))
             nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[indices])  # vertices of the curve
             labels.append((text, [tuple(map(float, point)) for point in nearest]))
         every_piece = [piece for _, pieces in curves for piece in pieces]
@@ -113,7 +113,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _ColorGroup:
-    """The objects of one color: points, pieces of curves, and conditions with possible label positions."""
+    """What is drawn in one color: points, pieces of curves, and conditions with possible positions of their labels."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -158,10 +158,10 @@ def _draw(scan: Scan, style: Style, groups: list[_ColorGroup], window: Window, l
 def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: Style) -> None:
     """Write conditions next to their curves, then next to points, if they fit; labels may cover points.
 
-    Points with the fastest growth that is not exponential are labelled first. Among the positions at which a label
+    Points with the fastest growth below exponential are labelled first. Among the positions at which a label
     fits, the position crossed by the fewest curves is chosen.
     """
-    em = _CONDITION_SIZE * style.font_size
+    em = _CONDITION_FONT_RATIO * style.font_size
     em_x, em_y = (em / (72 * _AXES_SHARE * inches) for inches in style.inches(_ASPECT))
     labels = [(*item, COLORS[k % len(COLORS)]) for k, group in enumerate(groups) for item in group.labels]
     labels.sort(key=lambda item: (" = " not in item[0], -COLORS.index(item[2])))

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UP, DOWN, BOTH = "up", "down", "both"
-_NODES = 6  # interpolation nodes: three points on either side of the hyperplane
-_NEWTON_STEPS = 12
+_NODE_COUNT = 6  # interpolation nodes: three points on either side of the hyperplane
+_NEWTON_STEPS = 12  # for the zero of an interpolation polynomial
 _MAX_DIFFERENCE = 0.1  # largest difference of interpolation with four and with six nodes, in steps
-_ASPECT = 0.75
+_ASPECT = 0.75  # height over width of the axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def section_of(
     skipped, last_points = 0, np.empty((0, ensemble.n, ensemble.system.dim))
     for chunk in ensemble.records(steps, 1, progress=progress):
         points = np.concatenate([last_points, chunk])
-        last_points = points[-(_NODES - 1) :]
+        last_points = points[-(_NODE_COUNT - 1) :]
         values = hyperplane(points)
         for k in range(ensemble.n):
             crossings, omitted = crossings_of(points[:, k], values[:, k], direction)
@@ -132,15 +132,15 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     up, down = (signs[:-1] < 0) & (signs[1:] >= 0), (signs[:-1] > 0) & (signs[1:] <= 0)
     is_crossed = {UP: up, DOWN: down, BOTH: up | down}[direction]
     indices = np.flatnonzero(is_crossed)
-    indices = indices[(indices >= _NODES // 2 - 1) & (indices + _NODES // 2 < len(points))]
-    node_rows = indices[:, None] + np.arange(1 - _NODES // 2, _NODES // 2 + 1)
+    indices = indices[(indices >= _NODE_COUNT // 2 - 1) & (indices + _NODE_COUNT // 2 < len(points))]
+    node_rows = indices[:, None] + np.arange(1 - _NODE_COUNT // 2, _NODE_COUNT // 2 + 1)
     is_finite = np.isfinite(values[node_rows]).all(axis=1)
     indices, node_rows = indices[is_finite], node_rows[is_finite]
     node_points, node_values = points[node_rows], values[node_rows]
 
     def interpolate_zero(nodes: slice) -> FloatArray:
         """Return the crossings by interpolation at a subset of the six nodes."""
-        node_steps = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
+        node_steps = np.arange(1 - _NODE_COUNT // 2, _NODE_COUNT // 2 + 1, dtype=np.float64)[nodes]
         inverse = np.linalg.inv(np.vander(node_steps, increasing=True))  # maps values at the nodes to coefficients
         coefficients = node_values[:, nodes] @ inverse.T
         powers = np.arange(len(node_steps))
@@ -158,11 +158,11 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
         return crossings
 
     with np.errstate(all="ignore"):
-        fine_points, coarse_points = interpolate_zero(slice(None)), interpolate_zero(slice(1, _NODES - 1))
+        fine_points, coarse_points = interpolate_zero(slice(None)), interpolate_zero(slice(1, _NODE_COUNT - 1))
         step_lengths = np.linalg.norm(points[indices + 1] - points[indices], axis=1)
         is_trusted = np.linalg.norm(fine_points - coarse_points, axis=1) <= _MAX_DIFFERENCE * step_lengths
         # A function that moves away from 0 on both sides of a change of sign has a pole there.
-        middle = _NODES // 2
+        middle = _NODE_COUNT // 2
         approach, departure = np.diff(np.abs(node_values), axis=1)[:, [middle - 2, middle]].T
         is_trusted &= (approach < 0) | (departure > 0)
     return fine_points[is_trusted], int((~is_trusted).sum())

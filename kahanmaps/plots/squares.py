@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MAX_STEPS = 12
+MAX_STEPS = 12  # of each map
 MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: a step then takes seconds
 
 Point = tuple[fmpq, ...]
@@ -185,8 +185,8 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
 
 
 _F_COLOR, _G_COLOR, _GAP_COLOR = COLORS[1], COLORS[5], COLORS[0]
-_LARGEST = 1e150  # squares of larger numbers would overflow
-_VISIBLE_GAP = 0.06  # fraction of the width of a panel: a smaller gap is magnified
+_MAX_COORDINATE = 1e150  # squares of larger numbers would overflow
+_MIN_VISIBLE_GAP = 0.06  # fraction of the width of a panel: a smaller gap is magnified
 
 
 def plot_squares(
@@ -202,7 +202,7 @@ def plot_squares(
     """
     dim = squares_of_pairs[0].pair.f.dim
     if not all(np.isfinite(_to_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
-        raise InputError(f"found an initial point with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
+        raise InputError(f"found an initial point with coordinates beyond {_MAX_COORDINATE:.0e}: it cannot be drawn")
     shown_axes = widest_axes(squares_of_pairs) if axes is None else axes
     if len(shown_axes) != 2 or not all(0 <= k < dim for k in shown_axes):
         raise InputError(f"found the variables {shown_axes}, expected two numbers from 0 to {dim - 1}")
@@ -224,7 +224,7 @@ def plot_squares(
 
 
 def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
-    """Return the two coordinates that maximize the smallest width of the squares and of their gaps."""
+    """Return the two coordinates in which the narrowest of the squares and of their gaps is as wide as possible."""
     dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0
@@ -279,7 +279,7 @@ def _draw_panel(axes: Axes, squares: Squares, plane: tuple[int, int], caption: s
     axes.set_title(f"{title}\n{squares.verdict}{note}")
     _draw_lattices(axes, gf, fg)
     gap = (fg[-1, -1] - gf[-1, -1]) / np.diff(window, axis=1)[:, 0]
-    is_small = bool(np.hypot(*gap) < _VISIBLE_GAP)
+    is_small = bool(np.hypot(*gap) < _MIN_VISIBLE_GAP)
     if squares.steps == 1:
         corners = [(gf[0, 0], "$x$", ""), (gf[1, 0], r"$\Phi_f x$", ""), (gf[0, 1], r"$\Phi_g x$", "")]
         if squares.closes or (squares.closes is False and is_small):
@@ -380,7 +380,7 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
 
 
 def _to_table(lattice: Lattice) -> Floats:
-    """Return the points as floating-point numbers; nan for missing points and for points that are too large."""
+    """Return the points as floating-point numbers; nan for missing points and coordinates of 1e150 or more."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
-    return np.where(np.abs(table) < _LARGEST, table, np.nan)
+    return np.where(np.abs(table) < _MAX_COORDINATE, table, np.nan)

@@ -18,7 +18,7 @@ COLORS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#CC
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 COLOR_MAP = "cividis"
-_MAX_PIXELS = 1 << 28  # drawing takes a gigabyte
+_MAX_PIXELS = 1 << 28  # drawing so many takes a gigabyte
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
 from kahanmaps.reports.pictures import DEFAULT_EPS
 
-_LARGEST_EPS = 0.5
+_MIN_SLIDER_END = 0.5  # the slider of eps ends there, or at twice the given eps if this is larger
 _DEFAULT_STEPS, _MAX_STEPS = 800, 5000
-_MAX_TERMS = 2000  # terms of all polynomials, which the browser evaluates at every step
-_MAX_VARIABLES = 12
+_MAX_TERMS = 2000  # of all polynomials together that the browser evaluates at every step
+_MAX_VARIABLES = 12  # each has a slider
 
 
 def explore_sections(analysis: Analysis) -> list[Section]:
@@ -38,7 +38,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
     names, bound, eps = data["variables"], data["reach"], data["eps"]
     sliders = [(f"x{k}", name, -bound, bound, data["start"][k], "any") for k, name in enumerate(names)]
     if data["has_eps"]:
-        max_eps = max(_LARGEST_EPS, 2 * abs(eps))
+        max_eps = max(_MIN_SLIDER_END, 2 * abs(eps))
         sliders.insert(0, ("eps", "eps", -max_eps if eps < 0 else 0, max_eps, eps, "any"))
     sliders.append(("steps", "steps", 10, _MAX_STEPS, _DEFAULT_STEPS, "10"))
     scope = "for every eps" if analysis.eps is None else f"at eps = {format_number(analysis.eps)} only"
@@ -65,7 +65,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
 
 
 def explore_data(analysis: Analysis) -> dict[str, Any]:
-    """Return the data for explore.js: the rows of (M | -r), the functions to be plotted, the initial point."""
+    """Return the data for explore.js: the rows of (M | -r) as terms, functions to be plotted, the initial point."""
     file = analysis.file
     map_, n = file.map, file.dim
     if n > _MAX_VARIABLES:

@@ -28,9 +28,9 @@ from kahanmaps.version import __version__
 
 CHARACTERS = 6_000  # approximate limit for one formula, and limit for one line of text
 _MAX_SYSTEM = 200_000  # maximal number of characters of a printed system file
-_MAX_EQUATIONS = 40
+_MAX_EQUATIONS = 40  # maximal number of equations of a system on a page
 # LaTeX commands with their arguments, and words.
-_WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
+_COMMANDS_AND_WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
 # Text commands in names with special characters; latex2mathml would print these commands literally.
 _TEXT_COMMANDS = {
     r"\textbackslash{}": r"\backslash ",
@@ -50,7 +50,7 @@ class Html(str):
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a page with its id, title and content; an empty section is omitted."""
+    """A section of a page with its id, title and content; a section without content is omitted."""
 
     id: str
     title: str
@@ -139,7 +139,7 @@ def mathml(latex: str) -> str:
     from latex2mathml.converter import convert
 
     # A name of several letters would look like a product: set it upright, with spaces around it.
-    source = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
+    source = _COMMANDS_AND_WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
     source = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", source)
     for command, replacement in _TEXT_COMMANDS.items():
         source = source.replace(command, replacement)

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 DEFAULT_EPS = fmpq(1, 20)  # eps of pictures on a page about every eps
 _STYLE = Style(width=14, font_size=11, dpi=150)  # letters are legible on a phone
 _MAX_ELEMENTS = 1_500  # maximal number of points drawn as SVG elements, which take a hundred bytes each
-_STEPS = 600
-_INITIAL_POINTS = 16
-_CURVES = 3
-_CURVE_STEPS = 300
+_STEPS = 600  # of each orbit of a portrait
+_PORTRAIT_STARTS = 16  # random initial points
+_CURVE_COUNT = 3  # orbits on invariant curves
+_CURVE_STEPS = 300  # of each of these orbits
 
 
 class Pictures:
@@ -96,7 +96,7 @@ class Pictures:
             if is_field := real_approximation.is_quadratic:
                 starts = automatic_starts(real_approximation.system, eps_value)
             else:
-                starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
+                starts = starts_in_box(_PORTRAIT_STARTS, file.dim, 2.0, 0)
             orbits = follow_orbits(ensemble_for(real_approximation.map, eps_value, starts, _STEPS), _STEPS)
             functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
             portrait = portrait_of(orbits, functions)
@@ -121,7 +121,7 @@ class Pictures:
         remarks: list[str] = []
 
         def drawing(style: Style) -> Figure:
-            starts = list(islice(random_starts(file.system.dim, 0), _CURVES))
+            starts = list(islice(random_starts(file.system.dim, 0), _CURVE_COUNT))
             curves = find_invariant_curves(file, starts, eps_value, _CURVE_STEPS)
             for k, pole in enumerate(curves.poles, 1):
                 if pole is not None:
@@ -129,6 +129,6 @@ class Pictures:
             return plot_invariant_curves(curves, style)
 
         sentence = f"{eps_suffix(eps_value)}, {_CURVE_STEPS} steps".removeprefix(", ")
-        caption = f"{_CURVES} orbits in the planes of the normal form, and the invariant curves through them: "
+        caption = f"{_CURVE_COUNT} orbits in the planes of the normal form, and the invariant curves through them: "
         alt = f"Invariant plane cubics with orbits on them, {sentence}"
         return self.draw("invariant-curves", f"{caption}{sentence}.", alt, drawing, remarks)

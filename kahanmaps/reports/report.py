@@ -97,7 +97,7 @@ def report_html(
             lead += f"; formulas for every {', '.join(results.symbols)}" if results.symbols else ""
             sections = [*_analysis_sections(results, page_pictures), Section("notes", "Notes", items=left_out)]
     elif explore:
-        raise InputError(f"found {type(results).__name__}, expected an Analysis: it is what can be explored")
+        raise InputError(f"found {type(results).__name__}, expected an Analysis: only its page has sliders")
     else:
         reports = list(results) if isinstance(results, Sequence) else [results]
         if not reports or not all(isinstance(report, Report) for report in reports):
@@ -238,7 +238,7 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
     html_by_text: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
-        text_of_evidence = checks.because(statement.evidence, _LIMITS)
+        text_of_evidence = checks.reason(statement.evidence, _LIMITS)
         return f"<details><summary>evidence</summary>{text_of_evidence}</details>"
 
     for integral in analysis.integrals.integrals if analysis.integrals is not None else ():
@@ -304,11 +304,11 @@ def _claims_sections(
     else:
         groups = [(f"check-{_slug(r.check)}", f"Check: {r.check}", list(r.findings)) for r in reports]
     rows = [
-        (f'<a href="#{section_id}">{text(name)}</a>', text(checks.counts(findings)))
+        (f'<a href="#{section_id}">{text(name)}</a>', text(checks.verdict_counts(findings)))
         for section_id, name, findings in groups
     ]
     verdict = Html(markup.verdict(combined(report.verdict for report in reports)))
-    counts = checks.counts([finding for report in reports for finding in report.findings])
+    counts = checks.verdict_counts([finding for report in reports for finding in report.findings])
     table = wide(markup.table(["part", "claims"], rows))
     sections = [Section("verdict", "Verdict", (verdict, counts), [_LEGEND], pieces=[table])]
     if file is not None:

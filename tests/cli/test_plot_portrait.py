@@ -32,7 +32,7 @@ def drawn(monkeypatch):
 
 
 def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn, monkeypatch):
-    monkeypatch.setattr("kahanmaps.plots.portraits.flow.COUNT", 3)
+    monkeypatch.setattr("kahanmaps.plots.portraits.flow.START_COUNT", 3)
     line = f"{PLOT} lotka_volterra --eps 1/20 --steps 30 --flow -p"
     assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
     near, result = (portrait for portrait, _ in drawn)

@@ -228,8 +228,8 @@ def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_n
 
 
 def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, monkeypatch):
-    monkeypatch.setattr(cluster, "START_UP", 0.5)
-    monkeypatch.setattr(cluster, "START_UP_OF_A_JOB", 0.05)
+    monkeypatch.setattr(cluster, "GROUP_START", 0.5)
+    monkeypatch.setattr(cluster, "JOB_START", 0.05)
     limits = TaskLimits(time=0.05)
     good = jobs_of(12, limits=limits)
     bad = jobs_of(1, limits=limits, sleep=600, claim=0)

@@ -123,7 +123,7 @@ def made():
             os.kill(os.getpid(), 9)
         yield task(number)
 
-store_module._CACHE = 100  # so little memory that pages of what is not committed go to the disk
+store_module._CACHE_KIB = 100  # so little memory that pages of what is not committed go to the disk
 Store.open(path).plan("a", "another", TaskLimits(), made(), {})
 """
     planned(path, 1, 2, 3, records=[ok(2)])

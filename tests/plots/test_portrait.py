@@ -11,7 +11,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.classical import MethodEnsemble, VectorField
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.flow import COUNT, automatic_starts, equilibria, plane_flow, solution
+from kahanmaps.plots.portraits.flow import START_COUNT, automatic_starts, equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, follow_orbits
 from kahanmaps.plots.portraits.windows import count_outside, fullest_axes, window_of
@@ -232,7 +232,7 @@ def test_orbits_from_chosen_starts_stay_and_move_and_are_the_same_every_time(nam
     system = load(name, {}).system
     starts = automatic_starts(system, "1/20")
     points = follow_orbits(ensemble_for(system, "1/20", starts, 300), 300).points
-    assert starts.shape == (COUNT, system.dim)
+    assert starts.shape == (START_COUNT, system.dim)
     assert np.abs(points).max() < 20
     assert (np.ptp(points, axis=0).max(axis=1) > 1e-3).all()
     np.testing.assert_array_equal(automatic_starts(system, "1/20"), starts)
@@ -247,4 +247,4 @@ def test_starts_lie_along_the_plane_that_is_named_and_need_no_equilibrium_and_no
     starts = automatic_starts(load("henon_heiles", {}).system, "1/10", plane=(1, 3))
     assert np.abs(starts[:, 1]).max() == np.abs(starts).max()
     for rhs in ("0", "x^2 + 1"):
-        assert automatic_starts(QuadraticSystem.from_text(["x"], [rhs]), "1/10").shape == (COUNT, 1)
+        assert automatic_starts(QuadraticSystem.from_text(["x"], [rhs]), "1/10").shape == (START_COUNT, 1)

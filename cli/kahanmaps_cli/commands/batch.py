@@ -31,21 +31,21 @@ from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_TASKS_SHOWN = 3  # tasks of each experiment that a dry run prints
-_VALUE_WIDTH = 300  # maximal length of a value that `batch show` prints on a terminal
-_NEEDS = {
+_MAX_TASKS_SHOWN = 3  # of each experiment, by a dry run
+_MAX_VALUE_WIDTH = 300  # maximal length of a value that `batch show` prints on a terminal
+_SYSTEMS_OF_TASKS = {
     None: "none",
     "system": '"family", a name of the catalogue, a file, or a list of these',
     "member": '"family", or files of kind [family]',
     "member or other": '"family", files of kind [family], or any other system together with a second one (other)',
 }
 
-_ONLY = click.option(
+_experiment_option = click.option(
     "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Restrict to this experiment. Repeatable."
 )
 
 
-def _database(required: bool = True) -> Callable[[F], F]:
+def _database_option(required: bool = True) -> Callable[[F], F]:
     return click.option(
         "--db",
         type=click.Path(dir_okay=False),
@@ -58,7 +58,7 @@ def _database(required: bool = True) -> Callable[[F], F]:
 
 @click.group("batch", cls=SuggestingGroup)
 def command() -> None:
-    """Run thousands of experiments from one file in worker processes; store and resume them.
+    """Run thousands of tasks described in one file in worker processes; store their results; resume after a stop.
 
     \b
       kahanmaps batch run study.toml -j 2       # results go to study.db
@@ -75,7 +75,7 @@ def command() -> None:
 
 @command.command("run", short_help="Run the tasks of a spec; store the results in a database.")
 @click.argument("spec", required=False, type=click.Path(dir_okay=False), shell_complete=complete_toml)
-@_database(required=False)
+@_database_option(required=False)
 @click.option(
     "-j",
     "--jobs",
@@ -83,7 +83,7 @@ def command() -> None:
     metavar="N",
     help="Number of worker processes (default: one per processor).",
 )
-@_ONLY
+@_experiment_option
 @click.option("--shard", type=Shard(), metavar="I/N", help="Run the I-th of N parts only (for job arrays).")
 @click.option("--retry-failed", is_flag=True, help="Repeat failed tasks too.")
 @click.option("--dry-run", is_flag=True, help="Check the spec and list its first tasks; run none.")
@@ -100,14 +100,14 @@ def command() -> None:
     metavar="ADDRESS",
     help="Use the workers of a dask scheduler that you trust: tls://host:port, tcp://host:port or its file.",
 )
-@click.option("--worker-python", metavar="PATH", help="Path of Python on those workers (default: as here).")
+@click.option("--worker-python", metavar="PATH", help="Path of Python on those workers (default: as on this machine).")
 @click.option(
     "--group-seconds",
     type=click.FloatRange(0, 86400),
     metavar="T",
     default=5.0,
     show_default=True,
-    help="Run short tasks together in one worker process, or one job of the cluster, for T seconds.",
+    help="Run short tasks together, about T seconds in one worker process or one job of the cluster.",
 )
 @click.option("--jsonl", "as_jsonl", is_flag=True, help="Print each record on standard output when it is finished.")
 @output_options
@@ -161,7 +161,7 @@ def _print_dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
                 "limits": {"time": experiment.limits.time, "memory": experiment.limits.memory},
                 "first": [
                     {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
-                    for task in map(experiment.__getitem__, range(min(_TASKS_SHOWN, experiment.size)))
+                    for task in map(experiment.__getitem__, range(min(_MAX_TASKS_SHOWN, experiment.size)))
                 ],
                 "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
             }
@@ -179,20 +179,18 @@ def _print_dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
         )
         return
     for experiment in experiments:
-        print_stdout(
-            f"{experiment.name}\t{experiment.kind.name}\t{_count_tasks(experiment.size)}\t{experiment.product}"
-        )
-        for k in range(min(_TASKS_SHOWN, experiment.size)):
+        print_stdout(f"{experiment.name}\t{experiment.kind.name}\t{_count_text(experiment.size)}\t{experiment.product}")
+        for k in range(min(_MAX_TASKS_SHOWN, experiment.size)):
             task = experiment[k]
             set_options = {name: value for name, value in task.options.items() if value is not None}
             if "other" in set_options:
                 set_options["other"] = lib.system_words(set_options["other"])
             print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(set_options)}")
-        if experiment.size > _TASKS_SHOWN:
-            print_stdout(f"\t... and {experiment.size - _TASKS_SHOWN} more")
+        if experiment.size > _MAX_TASKS_SHOWN:
+            print_stdout(f"\t... and {experiment.size - _MAX_TASKS_SHOWN} more")
         for system, reason in experiment.skipped:
             print_stdout(f"\tskipped\t{system}\t{reason}")
-    total = _count_tasks(sum(experiment.size for experiment in experiments))
+    total = _count_text(sum(experiment.size for experiment in experiments))
     print_stdout(total if missing is None else f"{total}, {missing} of them without a result")
 
 
@@ -217,11 +215,11 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 )
         for name, plan in planned.items():
             if not plan.is_resumed:
-                phrases = [_count_tasks(plan.total)]
+                phrases = [_count_text(plan.total)]
                 phrases += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
                 phrases += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
                 progress.print(f"{name}: {', '.join(phrases)}")
-        expected_count = f"{_count_tasks(progress.expected_count)} to do, results go to {db}"
+        expected_count = f"{_count_text(progress.expected_count)} to do, results go to {db}"
         progress.print(expected_count if progress.expected_count else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
         if progress.expected_count:
@@ -236,7 +234,7 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                         if batch.was_interrupted and not is_announced:  # the handler may interrupt a line
                             is_announced = True
                             if executor.in_flight:
-                                running = _count_tasks(executor.in_flight)
+                                running = _count_text(executor.in_flight)
                                 progress.print(f"finishing {running} in flight (Ctrl-C again ends at once)")
                         if records:  # store them before the next job is submitted
                             store.add(records)
@@ -254,11 +252,11 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     elif not options["as_jsonl"]:
         _print_status(data)
     if progress.done:
-        progress.print(f"{_count_tasks(progress.done)} in {duration(progress.seconds)}")
+        progress.print(f"{_count_text(progress.done)} in {duration(progress.seconds)}")
     if progress.lost:
         progress.print(
-            f"{_count_tasks(progress.lost)} lost without a result: their worker was killed or could not be started "
-            f"{lib.TRIES} times ({progress.why_lost})"
+            f"{_count_text(progress.lost)} lost without a result: their worker was killed or could not be started "
+            f"{lib.TRIES} times ({progress.last_loss})"
         )
     command_words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
     command_words += ["--db", db, *(word for name in options["only"] for word in ("-e", name))]
@@ -270,16 +268,16 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     same_command = as_typed(command_words)
     if missing:
         prefix = "interrupted: " if is_interrupted else ""
-        progress.print(f"{prefix}{_count_tasks(missing)} without a result yet; to continue: {same_command}")
+        progress.print(f"{prefix}{_count_text(missing)} without a result yet; to continue: {same_command}")
     if failed_count:
         why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-        progress.print(f"{_count_tasks(failed_count)} failed, why: {why}; to try again: {same_command} --retry-failed")
+        progress.print(f"{_count_text(failed_count)} failed, why: {why}; to try again: {same_command} --retry-failed")
     if is_interrupted:
         return 130
     return 3 if failed_count or missing else 0
 
 
-def _count_tasks(number: int) -> str:
+def _count_text(number: int) -> str:
     return counted(number, "task")
 
 
@@ -290,7 +288,7 @@ class BatchProgress(Progress):
         super().__init__(quiet)
         self.expected_count = expected_count
         self.outcomes: Counter[str] = Counter()
-        self.why_lost = ""  # message of the task that was lost last
+        self.last_loss = ""  # message of the task that was lost last
         self._begin = time.monotonic()
 
     @property
@@ -313,10 +311,10 @@ class BatchProgress(Progress):
         for record in records:
             self.outcomes[str(record.outcome)] += 1
             if record.outcome == "lost":
-                self.why_lost = record.message
+                self.last_loss = record.message
         rate = self.done / max(self.seconds, 1e-9)
         failed = self.done - self.outcomes["ok"]
-        phrases = [f"{self.done} of {_count_tasks(self.expected_count)}", f"{rate:.3g} a second"]
+        phrases = [f"{self.done} of {_count_text(self.expected_count)}", f"{rate:.3g} a second"]
         if self.done and self.done < self.expected_count:
             phrases.append(f"about {duration((self.expected_count - self.done) / rate)} left")
         counts = {"running": in_flight, "failed": failed, "lost": self.lost}
@@ -330,8 +328,8 @@ class BatchProgress(Progress):
 
 
 @command.command("status")
-@_database()
-@_ONLY
+@_database_option()
+@_experiment_option
 @json_option
 def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
     """Show the progress of the experiments in a database.
@@ -395,15 +393,15 @@ def _print_status(data: Mapping[str, Any]) -> None:
         for skipped in row["skipped"]:
             print_raw(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
     if data["unplanned"]:
-        click.echo(f"{data['unplanned']} more results belong to tasks of no current experiment")
+        click.echo(f"{data['unplanned']} results in addition belong to tasks of no current experiment")
 
 
 @command.command("show")
 @click.argument("key")
-@_database()
+@_database_option()
 @json_option
 def show(key: str, db: str, as_json: bool) -> None:
-    """Show a task with its options and its result.
+    """Show a task of a database with its options and its result.
 
     \b
       kahanmaps batch show 3fa8 --db study.db
@@ -452,20 +450,20 @@ def show(key: str, db: str, as_json: bool) -> None:
             for name, value in entries.items():
                 text = value if isinstance(value, str) else json.dumps(value)
                 print_stdout(
-                    f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t")
+                    f"{name}\t" + (shorten(text, _MAX_VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t")
                 )
 
 
 @command.command("export", short_help="Export results as CSV, JSON lines or Parquet.")
-@_database()
+@_database_option()
 @click.option("--csv", "form", flag_value="csv", help="Write a table: a column for each option and each result.")
 @click.option("--jsonl", "form", flag_value="jsonl", help="Write one complete JSON object per line.")
 @click.option(
-    "--parquet", "form", flag_value="parquet", help="Write the table of --csv with types (needs pyarrow, -o)."
+    "--parquet", "form", flag_value="parquet", help="Write the table of --csv with typed columns (needs pyarrow, -o)."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions, which differ between runs.")
-@_ONLY
+@_experiment_option
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
     """Export the results of a database in the order of the plan.
 
@@ -496,12 +494,12 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 
 
 @command.command("summary", short_help="Summarize groups of tasks by counts and quantiles.")
-@_database()
-@click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by names, e.g. m,eps.")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="Summarize this number only. Repeatable.")
+@_database_option()
+@click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Defines groups, e.g. m,eps.")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="Summarize only this entry. Repeatable.")
 @click.option("--stable", is_flag=True, help="Omit times and memory.")
 @click.option("--markdown", "as_markdown", is_flag=True, help="Print tables in Markdown.")
-@_ONLY
+@_experiment_option
 @json_option
 def summary(
     db: str, by: str, values: tuple[str, ...], stable: bool, as_markdown: bool, only: tuple[str, ...], as_json: bool
@@ -528,7 +526,7 @@ def summary(
         print_raw(lib.summary_markdown(result), end="")
     elif on_terminal():
         for table in result.tables(digits=4):
-            print_table([table.columns, *table.rows], words=table.words)
+            print_table([table.columns, *table.rows], text_count=table.words)
     else:
         for line in result.lines():
             print_raw(line)
@@ -603,7 +601,7 @@ def tasks(name: str | None, as_json: bool) -> None:
         print_stdout("'kahanmaps batch tasks NAME' lists the options of a kind")
         return
     kind = kinds[0]
-    print_stdout(f"system: {_NEEDS[kind.needs]}")
+    print_stdout(f"system: {_SYSTEMS_OF_TASKS[kind.needs]}")
     for key, option in kind.options.items():
         default = "required" if key in kind.required else f"default {json.dumps(kind.defaults[key])}"
         print_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))

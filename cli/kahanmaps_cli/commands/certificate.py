@@ -128,8 +128,8 @@ def command(system: str | None, checker: str, output: str | None, as_json: bool,
         print_stderr(f"{file.name}: {text.summary}")
     if as_json:
         size = {"lines": len(text.splitlines()), "bytes": len(text.encode()), "seconds": float(f"{text.seconds:.2g}")}
-        more = {"for": checker, "claims": list(text.claims), **size, "text": str(text) if output is None else None}
-        print_json({**envelope("certificate"), "system": file.name, **more})
+        entries = {"for": checker, "claims": list(text.claims), **size, "text": str(text) if output is None else None}
+        print_json({**envelope("certificate"), "system": file.name, **entries})
     if output is not None or not as_json:
         write_text(text, f"{file.name}: a certificate for {checker}", output, quiet)
     return 0

@@ -20,7 +20,7 @@ from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import print_report
 
 _ARGUMENT_IS_FIRST = "kahanmaps: the argument stands before the inline system"
-_STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
+_EXIT_STATUSES = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 
 
 def command(name: str) -> click.Command:
@@ -97,7 +97,7 @@ def command(name: str) -> click.Command:
     lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
     indented = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
     examples = "\n".join(["\b", *(f"  {line}" for line in indented)])
-    help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
+    help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _EXIT_STATUSES.format(check.outcome)])
     click_command: click.Command = click.command(name, cls=kind, help=help_text)(run)
     return click_command
 

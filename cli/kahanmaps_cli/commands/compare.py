@@ -19,8 +19,8 @@ from kahanmaps_cli.screen.terminal import print_stdout, print_table
 
 @click.command("compare")
 @comparison_options
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel; it affects only the speed.")
-@click.option("--timings", is_flag=True, help="Measure the seconds of each method (with compilation).")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Code of steps; it affects only the speed.")
+@click.option("--timings", is_flag=True, help="Print the seconds of each method (with compilation).")
 @click.option(
     "-o", "--output", type=OutputFile(), metavar="FILE", help="Write the measured curves to FILE.csv or FILE.parquet."
 )
@@ -41,10 +41,11 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
     integral whose limit for eps -> 0 is a constant is normalized. The limits for eps -> 0 are compared as well: the
     flow conserves them, and the Kahan map in general does not.
 
-    error is the difference at a fixed time from a Taylor solution in balls; the column measured has the order, the
-    slope of the error between two step sizes. Equations of implicit methods are solved by Newton's method to rounding;
-    orbits in which this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian T(p) + V(q).
-    yoshida4, suzuki4 and yoshida6 are compositions of Kahan's method, which is symmetric.
+    error is the difference at a fixed time from a Taylor solution in balls; the column measured has the order, log_2 of
+    the ratio of errors at two time steps with the ratio 2. Equations of implicit methods are solved by Newton's method
+    to rounding; orbits in which this method fails are counted. symplectic-euler and stormer-verlet need a Hamiltonian
+    T(p) + V(q). yoshida4, suzuki4 and yoshida6 are compositions of Kahan's method, which is symmetric. The work is
+    given as evaluations of f and solutions of linear systems per step.
 
     FILE has the columns kind (drift or error), method, function, eps, step, value and evaluations of f.
 

@@ -14,7 +14,7 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-_MAX_SHOWN = 8  # maximal number of degrees in a line of a table
+_MAX_DEGREES_SHOWN = 8  # maximal number of degrees in a line of a table
 
 
 # These options are shared with `plot degrees`.
@@ -30,7 +30,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
         metavar="D",
         default=lib.ITERATE_DEGREE,
         show_default=True,
-        help="Measure no larger degree.",
+        help="Stop before a degree above D.",
     ),
     opt.seed_option,
 )
@@ -40,7 +40,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
 @opt.system_options
 @degree_options
 @click.option(
-    "--steps", type=int, metavar="N", help="Follow singularities for N steps (default: as the command singularities)."
+    "--steps", type=int, metavar="N", help="Follow singularities for N steps (default: that of singularities)."
 )
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
@@ -77,8 +77,8 @@ def command(system: str | None, **options: Any) -> int:
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         growth = measure(file, eps, options, search)
-        ellipsis = ", ..." if len(growth.degrees) > _MAX_SHOWN else ""
-        line = f"{', '.join(map(str, growth.degrees[:_MAX_SHOWN]))}{ellipsis}\t{growth.kind_text}"
+        ellipsis = ", ..." if len(growth.degrees) > _MAX_DEGREES_SHOWN else ""
+        line = f"{', '.join(map(str, growth.degrees[:_MAX_DEGREES_SHOWN]))}{ellipsis}\t{growth.kind_text}"
         undecided = ""
         if not is_done(growth, options["terms"]):
             undecided = f"undecided: {growth.unconfirmed}" if growth.unconfirmed else f"stopped early: {growth.message}"

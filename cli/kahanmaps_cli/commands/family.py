@@ -21,16 +21,16 @@ from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
 F = TypeVar("F", bound=Callable[..., Any])
 
 # The options that determine a random member of the family.
-draw_options: Callable[[F], F] = opt.stack(
+random_member_options: Callable[[F], F] = opt.stack(
     click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
-    click.option("--generic", is_flag=True, help="Draw a random integer polynomial chi, typically irreducible over Q."),
-    click.option("--chi", metavar="EXPR", help="The polynomial chi in t, e.g. '(t-1)*(t^2-2)'."),
+    click.option("--generic", is_flag=True, help="Choose chi at random, integer and mostly irreducible over Q."),
+    click.option("--chi", metavar="EXPR", help="Polynomial chi, chi(t)^2 = det(t I - A), e.g. '(t-1)*(t^2-2)'."),
     click.option(
         "--size",
         type=int,
         metavar="N",
-        help="Bound for the random integer coefficients (default 1 with --generic or --chi, else 2).",
+        help="Bound for the random integers from which H is built (default 1 with --generic or --chi, else 2).",
     ),
 )
 MEMBER_OPTIONS = ("m", "eigenvalues", "generic", "chi", "size")
@@ -52,8 +52,8 @@ def command() -> None:
 
 
 @command.command("new")
-@draw_options
-@click.option("--signs", metavar="S1,S2,...", help="Choose an associated system: 1 or -1 for each factor of chi.")
+@random_member_options
+@click.option("--signs", metavar="S1,S2,...", help="Write the associated system of signs 1, -1, one a factor of chi.")
 @opt.seed_option
 @click.option("--name", help="Name of the system in the file.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
@@ -72,7 +72,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
         raise click.UsageError(f"found --name {quoted(name)}, expected printable text")
-    member = draw_member(**options)
+    member = random_member_from(**options)
     if signs is not None:
         pieces = [piece.strip() for piece in signs.split(",")]
         if any(piece not in ("1", "+1", "-1") for piece in pieces):
@@ -90,11 +90,11 @@ def random_member_file(options: dict[str, Any]) -> lib.SystemFile:
     member_options = {name: options[name] for name in MEMBER_OPTIONS}
     if member_options["m"] is None and member_options["eigenvalues"] is None and member_options["chi"] is None:
         member_options["m"] = 3
-    member = draw_member(**member_options, seed=options["seed"])
+    member = random_member_from(**member_options, seed=options["seed"])
     return lib.SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
 
 
-def draw_member(
+def random_member_from(
     m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
 ) -> lib.FamilyMember:
     """Return the random member given by the options."""
@@ -121,9 +121,7 @@ def draw_member(
 
 @command.command("show")
 @opt.system_options
-@click.option(
-    "--normal-form", is_flag=True, help="Also print the normal form: one planar cubic h(X, Y) over K = Q[t]/chi."
-)
+@click.option("--normal-form", is_flag=True, help="Also print the normal form, of a cubic h(X, Y) over K = Q[t]/chi.")
 @opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.

@@ -19,7 +19,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
     "--shape",
     type=click.Choice(["linear", "quadratic"]),
     help="linear: g = B f with a constant matrix B; quadratic: any g of degree at most 2 (the default in dimension 1 "
-    "to 3, where it takes a second).",
+    "to 3, else linear).",
 )
 @opt.seed_option
 @opt.error_bits_option("A statement reported as supported is false with probability below 2^-BITS.")
@@ -36,12 +36,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting pair.toml --json | jq '.solutions[].B'
       kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
 
-    Linear algebra gives all g with [f, g] = 0; the next powers of eps give further equations, which are solved over Q;
-    then it is proved for each solution that the maps commute, or tested at random points. No solution is discarded at
-    any stage, so the list is complete unless the output says otherwise. If a parameter is an algebraic number t of
-    degree r, the search is made for the system over Q of the coefficients x_i in x = x_0 + x_1 t + ... + x_(r-1)
-    t^(r-1); the default is then --shape linear in every dimension. 0, f and -f always commute and are left out; --json
-    has them, marked in "trivial".
+    Linear algebra gives all g with [f, g] = 0; higher powers of eps in Phi_f Phi_g = Phi_g Phi_f give polynomial
+    equations, which are solved over Q; then it is proved for each solution that the maps commute, or tested at random
+    points. No solution is discarded at any stage, so the list is complete unless the output says otherwise. If a
+    parameter is an algebraic number t of degree r, the search is made for the system over Q of the coefficients x_i in
+    x = x_0 + x_1 t + ... + x_(r-1) t^(r-1); the default is then --shape linear in every dimension. 0, f and -f always
+    commute and are left out; --json has them, marked in "trivial".
 
     Exit status: 0 the list is complete, 2 usage error, 3 undecided: there may be more such g.
     """

@@ -16,7 +16,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @click.command("find-density")
 @opt.system_options
 @click.option("--flow", is_flag=True, help="Search for densities of the differential equation instead of the map.")
-@click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
+@click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi (default 12).")
 @search_options("density")
 def command(system: str | None, **options: Any) -> int:
     """Search for denominators phi of invariant volume forms dx/phi of the map of SYSTEM.
@@ -45,7 +45,7 @@ def command(system: str | None, **options: Any) -> int:
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow cannot be combined with --toml, which is for the map")
         result = lib.find_densities(file, **settings, progress=search)
-    further = f"note\t{result.further}" if result.further else ""
-    print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further)
+    further_line = f"note\t{result.further}" if result.further else ""
+    print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further_line)
     status = 0 if result.densities else 3
     return write_certificate(options, file.name, result.certificate, status)

@@ -47,7 +47,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "--max-degree",
     type=click.IntRange(1, 20),
     metavar="D",
-    help="Largest degree of the polynomial relations between the points of an orbit.",
+    help="Largest degree of polynomials that vanish along an orbit (default: by dimension and --effort).",
 )
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:

@@ -20,9 +20,9 @@ from kahanmaps_cli.screen.terminal import print_stdout
     "--degree",
     type=click.IntRange(0, 20),
     metavar="D",
-    help="Largest degree of entries (default: 3 in dimension 3, else 2).",
+    help="Largest degree of the entries P_ij (default: 3 in dimension 3, else 2).",
 )
-@click.option("--denominator", metavar="EXPR", help="Common denominator of all entries, e.g. a density.")
+@click.option("--denominator", metavar="EXPR", help="Common denominator of the entries, e.g. a density (default 1).")
 @search_options("poisson")
 def command(system: str | None, **options: Any) -> int:
     """Search for Poisson tensors that the map of SYSTEM preserves.

@@ -33,8 +33,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Three searches are made: for one-parameter groups and a scaling; in dimension at most 12 for signed permutations of
     the variables, or of scaled variables, with a translation; in dimension at most 3 for all rational matrices S,
-    unless there are one-parameter groups of linear maps. -I reverses every homogeneous quadratic system; it is reported
-    as trivial. A finite group is given by generators; --json lists its elements.
+    unless there are one-parameter groups of linear maps. x -> -x reverses every homogeneous quadratic system; it is
+    reported as trivial. A finite group is given by generators; --json lists its elements.
 
     Exit status: 0 all searches completed, 2 usage error, 3 a search was too large or the work limit was reached.
     """

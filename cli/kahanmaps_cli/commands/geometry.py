@@ -29,15 +29,16 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
 
     For a member of the commuting family, and for systems that are recognized as such, the level set of the integrals is
     a product of elliptic curves, one in each plane of the normal form, and the map is a translation of it. The planes
-    belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the command prints k^3
-    of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, a Weierstrass model with its j-invariant, discriminant and bad
-    primes, the translation point, its order (finite or infinite, proved) and its canonical height. For each real root
-    it prints the rotation numbers of the map (in (0, 1/2], up to sign, with an error bound) and of the flow at the time
-    step 2 eps, and their difference, the phase error, unless the level of the initial point is singular for a smaller
-    eps. For a pair of complex roots it prints two numbers instead: the coordinates of the translation in a reduced
-    basis of the lattice of periods. The last lines say how many real components the level set has (closed at infinity),
-    and whether the orbit is dense in those that it visits: proved for one circle, otherwise supported by the absence of
-    integer relations of the rotation numbers up to the given size.
+    belong to the roots of chi, where chi(t)^2 = det(t I - A) with the matrix A of the member. For each irreducible
+    factor of chi the command prints k^3 of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, a Weierstrass model with its
+    j-invariant, discriminant and bad primes, the translation point, its order (finite or infinite, proved) and its
+    canonical height. For each real root it prints the rotation numbers of the map (in (0, 1/2], up to sign, with an
+    error bound) and of the flow at the time step 2 eps, and their difference, the phase error, unless the level of the
+    initial point is singular for a smaller eps. For a pair of complex roots it prints two numbers instead: the
+    coordinates of the translation in a reduced basis of the lattice of periods. The last lines say how many real
+    components the level set has (closed at infinity), and whether the orbit is dense in those that it visits: proved
+    for one circle, otherwise supported by the absence of integer relations of the rotation numbers up to the given
+    size.
 
     For any other map, in any dimension, the command searches for a curve of genus 1 or 0 that contains the orbit, and
     proves what it finds. For genus 1 it prints a Weierstrass model, the j-invariant, the bad primes, the translation,

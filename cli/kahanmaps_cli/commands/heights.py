@@ -40,7 +40,7 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     "--random",
     "--starts",
     "count",
-    cls=opt.Renamed,
+    cls=opt.RenamedOption,
     type=Whole(1),
     metavar="N",
     help="Number of random initial points (default 3).",

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 
 _MAX_STEPS = 10**9
-_DEFAULT_STARTS = 16
+_DEFAULT_START_COUNT = 16  # random initial points
 
 
 @click.command("lyapunov")
@@ -23,10 +23,10 @@ _DEFAULT_STARTS = 16
 @opt.starts_options
 @opt.eps_options
 @click.option(
-    "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps for the means."
+    "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps averaged in an orbit."
 )
 @click.option(
-    "--transient", type=int, metavar="K", help="Number of steps before these, which are not used (default: N/10)."
+    "--transient", type=int, metavar="K", help="Number of steps before them, which do not count (default: N/10)."
 )
 @opt.seconds_option
 @opt.output_options
@@ -43,7 +43,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     initial points.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
-    those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|.
+    those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|; residual is the
+    largest difference of an orbit, normally round-off.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some orbits ended early or --seconds stopped the run.
     """
@@ -56,7 +57,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         )
     file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
-    starts = requested_starts(file, options, count=_DEFAULT_STARTS)
+    starts = requested_starts(file, options, count=_DEFAULT_START_COUNT)
     with SearchProgress({**options, "quiet": quiet}) as search:
         eps_value = lib.rational(1) if eps is None else eps
         result = lib.lyapunov_exponents(file.map, starts, eps_value, steps, transient=transient, progress=search)

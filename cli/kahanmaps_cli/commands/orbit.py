@@ -18,7 +18,7 @@ from kahanmaps_cli.screen.streams import is_read
 from kahanmaps_cli.signals import interruptible
 
 _FORMATS = ("text", "json", "jsonl", "csv", "npz", "parquet", "npy")
-_STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
+_EXIT_STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
 @click.command("orbit")
@@ -32,7 +32,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="Number of steps.")
-@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Compute only these iterates, instead of --steps.")
+@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Compute only the iterates with these numbers.")
 @click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Write every K-th iterate.")
 @opt.backward_option
 @click.option(
@@ -46,19 +46,19 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option(
     "--method",
     type=click.Choice(("generic", "normal-form", "doubling")),
-    help="Method of computation; by default chosen automatically (-v prints it and the reason).",
+    help="How steps are computed; by default chosen automatically (-v prints the choice and the reason).",
 )
 @click.option(
     "--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="Correct digits for ball:auto (default 15)."
 )
 @click.option(
-    "--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs kahanmaps[fast]."
+    "--kernel", type=click.Choice(("numpy", "numba")), help="Code for float orbits; numba needs kahanmaps[fast]."
 )
 @opt.integral_option(
     "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or the "
     "word 'known': all integrals that follow from theorems (not with --arithmetic float)."
 )
-@click.option("--max-digits", type=Whole(1), metavar="N", help="Stop at numbers of over N digits (default 200000).")
+@click.option("--max-digits", type=Whole(1), metavar="N", help="Stop when a number exceeds N digits (default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Output format (default: by FILE, else text).")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
@@ -159,9 +159,9 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         print_stderr(trajectory.why)
     if output is not None and not quiet:
         print_stderr(f"{output}: {end.text}")
-    elif end.status not in _STATUS and not (quiet or is_unread or is_table):  # a table already ends with this text
+    elif end.status not in _EXIT_STATUS and not (quiet or is_unread or is_table):  # a table already ends with this text
         print_stderr(end.text)
-    return 3 if is_unread else _STATUS.get(end.status, 3)
+    return 3 if is_unread else _EXIT_STATUS.get(end.status, 3)
 
 
 def _requested_format(options: dict[str, Any], output: str | None) -> str:

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
 
 _EXIT_STATUS = {"periodic": 0, "aperiodic": 0}
 _ORBIT_HINT = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
-_LONG_PRIME, _MAX_PRIME = 90, 192  # bits; for primes between these sizes the computation takes seconds to minutes
+_LONG_PRIME_BITS, _MAX_PRIME_BITS = 90, 192  # between these sizes of primes the computation takes seconds to minutes
 
 
 @click.command("period")
@@ -54,10 +54,10 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     indeterminacy points of the map too: if the orbit meets one, the output says so, and gives the period under the
     translation.
 
-    --levels N is about all orbits on a level. In a plane with the cubic Hamiltonian h(u, v) the map conserves c = h/(1
-    + eps^2 D), and the period depends on gamma = 1 - 64 eps^6 disc(h) c^2 only. The command prints the polynomial
-    psi_N, whose roots gamma have the period N or a divisor of N, and the rational gamma with period N. With SYSTEM and
-    eps it also prints c^2 for these gamma, in each plane that belongs to a rational root of chi.
+    --levels N is about all orbits on a level. In a plane with the cubic Hamiltonian h(u, v) and D = h_uu h_vv - h_uv^2
+    the map conserves c = h/(1 + eps^2 D), and the period depends on gamma = 1 - 64 eps^6 disc(h) c^2 only. The command
+    prints the polynomial psi_N, at whose roots gamma the period is N or a divisor of N, and the rational gamma with
+    period N; with SYSTEM and eps also c^2 for these gamma, in each plane of a rational root of chi ("family show").
 
     Exit status: 0 if the period was found, or proved not to exist, 2 for a usage error or a system without a normal
     form, 3 if undecided, or if the orbit cannot be continued at some point.
@@ -84,7 +84,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if not quiet:
         if verbose:
             print_stderr(normal_form.text)
-        if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _MAX_PRIME:
+        if kind == "mod" and _LONG_PRIME_BITS < prime.bit_length() <= _MAX_PRIME_BITS:
             print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     result = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = result.text.splitlines()[0], _EXIT_STATUS.get(result.status, 3)

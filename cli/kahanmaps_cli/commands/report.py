@@ -11,14 +11,14 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
+from kahanmaps_cli.commands.family import MEMBER_OPTIONS, random_member_file, random_member_options
 from kahanmaps_cli.params import Section
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 
-_ONLY_FOR = {
+_SOURCES_OF_OPTIONS = {
     "symbolic": ("analyze",),
     "effort": ("analyze",),
     "seconds": ("analyze",),
@@ -36,14 +36,14 @@ _ONLY_FOR = {
     type=click.Choice(["analyze", "verify", "checks"]),
     default="analyze",
     show_default=True,
-    help="Command whose results the page shows.",
+    help="The command whose results the page shows (checks: all check-... that apply).",
 )
 @click.option("--explore", is_flag=True, help="Add sliders for eps and the initial point of an orbit (JavaScript).")
 @opt.eps_options
 @opt.symbolic_option
 @opt.effort_options
 @opt.seed_option
-@draw_options
+@random_member_options
 @click.option(
     "--section",
     "sections",
@@ -84,7 +84,7 @@ def command(system: str | None, **options: Any) -> int:
 
     The exit status is that of the command named by --from.
     """
-    is_named, is_drawn = _require_consistent(system, options)
+    is_named, is_random = _require_consistent(system, options)
     refuse_certificate_with_eps(options)
     lib.page_template()  # raises InputError for a missing package before the computation
     page_options = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
@@ -109,7 +109,7 @@ def command(system: str | None, **options: Any) -> int:
             status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
-            needs_random_member = not is_named and (is_drawn or options["source"] == "verify")
+            needs_random_member = not is_named and (is_random or options["source"] == "verify")
             file = random_member_file(options) if needs_random_member else opt.load_system(system, options)
             eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
             settings = lib.Settings(eps=eps, seed=options["seed"], progress=search)
@@ -154,7 +154,7 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bo
         for name in names
         if name is not None and context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
     ]
-    for name, sources in _ONLY_FOR.items():
+    for name, sources in _SOURCES_OF_OPTIONS.items():
         if name in typed_options and options["source"] not in sources:
             raise click.UsageError(f"{names[name]} is for --from {' or '.join(sources)}")
     member_options = [name for name in MEMBER_OPTIONS if name in typed_options]

@@ -24,7 +24,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
     "analysis",
     type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
     metavar="E",
-    help="Analyze a member of each class of special members, with this effort.",
+    help="Also analyze one member of each class of special members (equal degrees), with this effort.",
 )
 @click.option("--toml", "as_toml", is_flag=True, help="Print a member of each component as a system file.")
 @click.option(

@@ -20,7 +20,7 @@ from kahanmaps_cli.screen.terminal import abbreviated, print_stdout
     "--steps",
     type=int,
     metavar="N",
-    help="Follow each hypersurface for N steps (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
+    help="Follow each hypersurface for N steps (default: 1000 in dimension 2, 500 in 3, 250 in 4, 100 in 5 and more).",
 )
 @opt.effort_options
 @opt.seed_option

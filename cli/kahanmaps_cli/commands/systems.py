@@ -22,7 +22,7 @@ from kahanmaps_cli.screen.terminal import abbreviated, print_entry, print_stdout
 def command(
     name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
 ) -> None:
-    """List the named systems, or show one: its equations, what is known about it, and references.
+    """List the systems of the catalogue, or show one: its equations, what is known about it, and references.
 
     \b
       kahanmaps systems

@@ -11,7 +11,7 @@ from kahanmaps import internals as lib
 from kahanmaps.display import markup
 from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.family import MEMBER_OPTIONS, draw_options, random_member_file
+from kahanmaps_cli.commands.family import MEMBER_OPTIONS, random_member_file, random_member_options
 from kahanmaps_cli.params import Section
 from kahanmaps_cli.runs.certificates import certificate_option, refuse_certificate_with_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
@@ -46,9 +46,9 @@ _LEGEND = {
 @click.command("verify")
 @opt.system_argument
 @opt.parameter_option
-@draw_options
+@random_member_options
 @opt.eps_options
-@click.option("--universal", is_flag=True, help="Verify the claims for the generic member instead of one member.")
+@click.option("--universal", is_flag=True, help="Verify the claims for the generic member instead of a given one.")
 @click.option(
     "--beyond",
     is_flag=True,
@@ -69,10 +69,10 @@ _LEGEND = {
     metavar="N",
     default=3,
     show_default=True,
-    help="Verify N terms of the series of the integrals in powers of eps^2.",
+    help="Verify the first N terms of the expansions of the integrals in eps^2.",
 )
 @click.option(
-    "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute over complex balls that enclose all roots."
+    "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute with complex balls around the roots of chi."
 )
 @opt.evidence_options
 @click.option("--markdown", "as_markdown", is_flag=True, help="Print the table in Markdown.")

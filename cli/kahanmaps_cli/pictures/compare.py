@@ -11,7 +11,7 @@ from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.runs.comparison import comparison_options, early_messages, requested_comparison
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_START = 160  # characters of a printed initial point
+_MAX_START_CHARACTERS = 160  # characters of a printed initial point
 
 
 @picture(
@@ -55,7 +55,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         settings["integrals"] = ()  # no integrals, so that no search is started
     result = requested_comparison(options, progress, **settings)
     figure = lib.plot_comparison(result, options["style"], show=options["show"], scale=options["scale"])
-    start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START]
+    start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START_CHARACTERS]
     more_starts = f" and {len(result.starts) - 1} more" if len(result.starts) > 1 else ""
     messages = [f"start {start}{more_starts}{lib.eps_suffix(result.eps)}", *result.remarks(), *early_messages(result)]
     for curve in result.curves:

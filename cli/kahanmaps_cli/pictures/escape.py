@@ -19,8 +19,8 @@ from kahanmaps_cli.screen.progress import SearchProgress
     opt.eps_options,
     window_option(),
     click.option("--axes", metavar="X,Y", help="The two variables of the window (default: the first two)."),
-    click.option("--at", type=PointText(), metavar="X", help="The other coordinates, as a point (default: 0)."),
-    click.option("--cells", type=Whole(1), metavar="N", default=300, show_default=True, help="N x N initial points."),
+    click.option("--at", type=PointText(), metavar="X", help="A point with the other coordinates (default: 0)."),
+    click.option("--cells", type=Whole(1), metavar="N", default=300, show_default=True, help="Use N x N points."),
     click.option("--steps", type=Whole(1), metavar="N", default=200, show_default=True, help="Number of steps."),
     click.option(
         "--radius", type=ExactNumber(), metavar="R", default=None, help="The ball is max |x_i| <= R (default 1000)."

@@ -17,7 +17,7 @@ from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_BYTES = 64_000_000
+_MAX_BYTES = 64_000_000  # of a file of --from
 # Statuses of OrbitEnd that count as early ends; a digit limit and a periodic orbit are normal ends.
 _EARLY_STATUSES = ("singular",)
 
@@ -114,7 +114,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     _scale_option,
 )
 def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
-    """Plot the heights of exact orbits, which measure the growth of the numbers.
+    """Plot the heights of exact orbits (the lengths of the numbers) against the step.
 
     \b
       kahanmaps plot heights weierstrass -o heights.png

@@ -29,11 +29,11 @@ from kahanmaps_cli.screen.progress import Progress
     click.option(
         "--steps", type=int, metavar="N", default=120, show_default=True, help="Number of steps of each orbit."
     ),
-    click.option("--original", metavar="X,Y", help="Add a panel with the orbit in these two variables."),
+    click.option("--original", metavar="X,Y", help="Add a panel of orbits in two variables."),
     click.option(
         "--projective", is_flag=True, help="Draw each projective plane as a disc whose rim is the line at infinity."
     ),
-    click.option("--flow", is_flag=True, help="Add dashed level curves of the differential equation."),
+    click.option("--flow", is_flag=True, help="Add orbits of the differential equation, dashed."),
 )
 def command(options: dict[str, Any], progress: Progress) -> Drawing:
     """Draw the invariant curves of a member of the commuting family, plane by plane.

@@ -132,7 +132,7 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
 
 def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
     """Return the option --window."""
-    return click.option("--window", type=PointText(), metavar=numbers, help="Show this part of the plane only.")
+    return click.option("--window", type=PointText(), metavar=numbers, help="Show only this part of the picture.")
 
 
 def window_from(options: dict[str, Any], axes: int) -> lib.Window | None:

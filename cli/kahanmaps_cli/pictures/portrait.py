@@ -17,7 +17,7 @@ from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
 # Orbits in one variable are drawn against the step number, and only their beginning is of interest.
-_STEPS, _STEPS_ON_A_LINE = 1000, 100
+_DEFAULT_STEPS, _DEFAULT_STEPS_IN_ONE_VARIABLE = 1000, 100
 
 
 @picture(
@@ -30,9 +30,9 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     ),
     opt.backward_option,
     click.option(
-        "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions; step is the number of steps."
+        "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions, or step (the step number)."
     ),
-    click.option("--3d", "space", is_flag=True, help="Draw three axes, chosen automatically."),
+    click.option("--3d", "three_axes", is_flag=True, help="Draw three axes, chosen automatically."),
     click.option(
         "--colour-by",
         "--color-by",
@@ -45,7 +45,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     click.option(
         "--lines",
         is_flag=True,
-        help="Join the points of each orbit by lines: neighbors on its curve, or else consecutive steps.",
+        help="Join the points of each orbit: neighbors on the curve that it fills, else consecutive points.",
     ),
     click.option(
         "--levels", metavar="F", help="Draw level curves of an integral or expression in the plane of the axes."
@@ -82,7 +82,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     By default sixteen initial points are chosen around an equilibrium, and the
     projection with the largest spread is drawn. Messages on standard error say
     what was chosen, how many points lie outside the window, and which orbits
-    ended early. Colors go from dark to light; the widest orbits are drawn first.
+    ended early. Colors of many orbits go from dark to light; the widest are drawn first.
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
@@ -93,7 +93,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     notes: list[str] = []
     field = lib.field_of(file)
     starts = initial_points(file, field, eps, options)
-    default_steps = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
+    default_steps = _DEFAULT_STEPS if file.dim > 1 else _DEFAULT_STEPS_IN_ONE_VARIABLE
     steps = default_steps if options["steps"] is None else options["steps"]
     color = options["color_by"]
     if color not in ("orbit", "step"):
@@ -106,7 +106,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         lambda step: progress(f"step {step} of {steps}"),
     )
     if axes is None:
-        count = 3 if options["space"] else 2
+        count = 3 if options["three_axes"] else 2
         axis_names = [file.variables[k] for k in lib.fullest_axes(orbits.points.reshape(-1, file.dim), count)]
         axes = tuple(lib.requested_axis(file, eps, name) for name in axis_names)
         if file.dim > count:
@@ -163,7 +163,7 @@ def _require_consistent(options: dict[str, Any]) -> None:
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:
         raise click.UsageError(f"found --steps {steps}, expected 0 to {_MAX_STEPS} (--backward steps backward)")
-    if options["space"] and options["axes"] is not None:
+    if options["three_axes"] and options["axes"] is not None:
         raise click.UsageError("give --axes A,B,C or --3d, not both")
     if options["levels_at"] is not None and options["levels"] is None:
         raise click.UsageError("--levels-at needs --levels F")
@@ -188,7 +188,7 @@ def _requested_axes(
     file: lib.SystemFile, eps: Any, options: dict[str, Any]
 ) -> tuple[lib.PointFunction | str, ...] | None:
     """Return the requested axes, or the only possible axes; None if the points determine the axes."""
-    text, count = options["axes"], 3 if options["space"] else 2
+    text, count = options["axes"], 3 if options["three_axes"] else 2
     if text is not None:
         texts = [axis_text.strip() for axis_text in text.split(",")]
         if len(texts) not in (2, 3) or not all(texts):

@@ -16,7 +16,7 @@ from kahanmaps_cli.screen.progress import Progress
     "scan",
     scan_options,
     window_option("A0,A1,B0,B1"),
-    click.option("--modulo", type=int, metavar="P", help="Show the special parameters modulo the prime P instead."),
+    click.option("--modulo", type=int, metavar="P", help="Show the plane over GF(P), P a prime, instead."),
 )
 def command(options: dict[str, Any], progress: Progress) -> Drawing:
     """Draw the plane of two parameters with the points and curves where degrees grow more slowly.

@@ -23,14 +23,14 @@ scan_options: Callable[[F], F] = opt.stack(
         "--over",
         required=True,
         metavar="A,B,...",
-        help="Vary these parameters, at most 8; eps may be one of them.",
+        help="Names of the parameters to vary, at most 8; eps may be one of them.",
     ),
     opt.eps_options,
-    click.option("--terms", type=int, metavar="N", help="Compute the degrees d_1, ..., d_N."),
+    click.option("--terms", type=int, metavar="N", help="Compute d_1, ..., d_N (default: at most 7)."),
     click.option(
         "--primes",
         metavar="P,Q,...",
-        help="Compute modulo these primes, at least three (the default depends on the number of parameters).",
+        help="Compute modulo these primes, at least three (default: depends on the number of parameters).",
     ),
     opt.effort_options,
     click.option(

@@ -86,12 +86,12 @@ def print_search(
     search: SearchProgress,
     options: dict[str, Any],
     formulas: Iterable[tuple[str, Any, str]],
-    count: str = "",
+    last_line: str = "",
 ) -> None:
     """Print the result of a search as text, JSON, TOML or LaTeX, as requested.
 
-    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and an origin; `count` is the
-    line printed after them.
+    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and an origin; `last_line` is
+    printed after them.
     """
     if options["as_json"]:
         print_json(record(name, result, search))
@@ -106,8 +106,8 @@ def print_search(
             print_stdout(
                 f"{label}\t{statement.verdict}\t{abbreviated(statement.text)}\n\t{origin}{statement.evidence.summary}"
             )
-        if count:
-            print_stdout(count)
+        if last_line:
+            print_stdout(last_line)
         for text in filter(None, (result.note, result.reason)):
             print_stdout(f"note\t{text}")
 
@@ -115,7 +115,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search, with what is undecided if it is incomplete; return the exit status."""
+    """Print the result of a search, on standard error what is undecided in it; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

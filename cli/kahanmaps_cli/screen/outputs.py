@@ -55,7 +55,7 @@ class _Files:
 
 
 class OutputFile(click.Path):
-    """A file to write to (`-`: standard output); with `grows` it is written in place, otherwise replaced at the end."""
+    """A file to write to (`-`: standard output); if `grows`, it is written in place, else replaced at the end."""
 
     name = "file"
 
@@ -119,7 +119,7 @@ def deliver(path: str, content: bytes) -> bool:
 
 
 def will_write(path: str) -> None:
-    """Refuse a file that this command has read."""
+    """Record a file that this command will write; refuse it if the command has read it."""
     _recorded_files(click.get_current_context()).note(path, is_written=True)
 
 

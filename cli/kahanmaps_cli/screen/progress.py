@@ -23,7 +23,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import printable
 
-_MIN_STEP = 16  # first step with an estimate: earlier steps are too fast to be timed
+_MIN_TIMED_STEP = 16  # first step with an estimate: earlier steps are too fast to be timed
 _MIN_SECONDS = 0.01  # shorter times cannot be measured reliably
 _MAX_LOG_GROWTH = 22.0  # logarithm of the growth of the time beyond which no number is printed
 
@@ -190,7 +190,7 @@ class TimeLeft:
         """Return the estimate as text to append to a progress message; empty if it is too early for an estimate."""
         elapsed = self._clock() - self._start
         self._recent_steps = [*self._recent_steps[-3:], (step, elapsed)]
-        if step >= 2 * self._latest[0] and step >= _MIN_STEP:
+        if step >= 2 * self._latest[0] and step >= _MIN_TIMED_STEP:
             self._reference, self._latest = self._latest, (step, elapsed)
         if step >= self._steps:
             return ""
@@ -200,7 +200,7 @@ class TimeLeft:
         is_exponential = all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent_steps))
         if len(later) == 3 and first_time > _MIN_SECONDS and is_exponential:
             growth = math.log(elapsed / first_time) * (self._steps - step) / (step - first)
-        elif step < _MIN_STEP or t <= 0 or elapsed <= t:
+        elif step < _MIN_TIMED_STEP or t <= 0 or elapsed <= t:
             return ""
         else:
             growth = max(1.0, math.log(elapsed / t) / math.log(step / n)) * math.log(self._steps / step)

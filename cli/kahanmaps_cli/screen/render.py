@@ -115,8 +115,8 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
         # The short table omits hypotheses, further evidence and witnesses.
         hypotheses = list(dict.fromkeys(text for f in shown_findings for text in f.evidence.data.get("hypotheses", ())))
         if hypotheses:
-            more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
-            print_stdout(f"verified: {'; '.join(hypotheses[:8])}{more}")
+            hidden_text = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
+            print_stdout(f"verified: {'; '.join(hypotheses[:8])}{hidden_text}")
         summaries = dict.fromkeys(evidence.summary for f in shown_findings if not f.control for evidence in f.also)
         for summary in list(summaries)[:4]:
             print_stdout(f"also: {summary}")
@@ -139,5 +139,5 @@ def json_number(value: Any) -> Any:
 
 
 def short_float(value: Any) -> str:
-    """Format a number with three digits."""
+    """Format a number with three significant digits."""
     return f"{float(value):.3g}"

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # Maximal number of characters of a number on a terminal.
 NUMBER_WIDTH = 40
-_LABEL_WIDTH = 12
+_LABEL_WIDTH = 12  # of the first cell of a line
 _COLOR_CHOICES = {"auto": None, "always": True, "never": False}
 
 
@@ -122,13 +122,13 @@ def print_entry(head: str, text: str, style: str = "") -> None:
     click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_colored())
 
 
-def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
-    """Print a table, with tabs unless on a terminal; the first `words` columns are text, the others numbers.
+def print_table(rows: Sequence[Sequence[str]], text_count: int = 1) -> None:
+    """Print a table, with tabs unless on a terminal; the first `text_count` columns are text, the others numbers.
 
     Tabs are also used if the terminal is too narrow for the numbers, since a broken number would look like two numbers.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    min_width = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
+    min_width = sum(min(width, 10) for width in widths[:text_count]) + sum(widths[text_count:]) + 3 * len(widths) + 1
     if not on_terminal() or min_width > columns():
         for row in rows:
             print_raw("\t".join(row))
@@ -137,8 +137,8 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
 
     table = Table(header_style="bold")
     for k, heading in enumerate(rows[0]):
-        header, justify = styled(heading, VERDICT_COLORS.get(heading, "")), "left" if k < words else "right"
-        table.add_column(header, justify=justify, overflow="fold", no_wrap=k >= words)  # type: ignore[arg-type]
+        header, justify = styled(heading, VERDICT_COLORS.get(heading, "")), "left" if k < text_count else "right"
+        table.add_column(header, justify=justify, overflow="fold", no_wrap=k >= text_count)  # type: ignore[arg-type]
     for row in rows[1:]:
         table.add_row(*map(styled, row))
     console().print(table)

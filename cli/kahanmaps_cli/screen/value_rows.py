@@ -18,14 +18,14 @@ from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import print_stdout
 
-_MAX_ROWS = 10_000
+_MAX_ROWS = 10_000  # combinations of values
 
 Row = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The result for one combination of values: as a line, as JSON, in full, and the reason if it is undecided."""
+    """The result for one combination of values: a line, its JSON record, a full display, and why it is undecided."""
 
     line: str
     record: Callable[[], dict[str, Any]]

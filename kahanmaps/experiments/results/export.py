@@ -44,7 +44,7 @@ RESERVED = frozenset((*_COLUMNS, "system", "options", "result", "stderr", "versi
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
 _MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
-_MAX_ROWS = 10_000
+_MAX_ROWS = 10_000  # in one row group of Parquet
 _MAX_CHARACTERS = 50_000_000  # in one row group: a fixed number of rows with long lists may take gigabytes
 
 
@@ -250,7 +250,7 @@ class _Layout:
 
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
-# Types of Parquet and the kinds of values that each type represents exactly; a column has the first type that fits.
+# Types of Parquet, and the kinds of values (small: integers up to 2^53) that each represents; the first one that fits.
 _KINDS_OF_TYPE = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},

@@ -192,7 +192,7 @@ class Row:
 
 
 class Executor(Protocol):
-    """Runs jobs: accepts them while it `is_free`; `wait` returns their records, also for tasks with an error."""
+    """Runs jobs: accepts them while `is_free` is true; `wait` returns their records, also for tasks with an error."""
 
     @property
     def is_free(self) -> bool:

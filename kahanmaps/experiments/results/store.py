@@ -80,14 +80,14 @@ PRAGMA user_version = 1;
 """
 PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
 RESULT_CHUNK = 50  # rows read with their results, each of which may take megabytes
-MAX_FOUND = 20
-CONFLICTS_SHOWN = 5
+MAX_FOUND_TASKS = 20  # of one prefix of a key
+MAX_CONFLICTS_SHOWN = 5  # keys of conflicting tasks in the result of a merge
 
-_BUSY_SECONDS = 30.0
+_BUSY_SECONDS = 30.0  # of waiting for a lock of another process
 _MIN_BYTES = 512  # the smallest page that SQLite has
-# In KiB. Planning accesses the index of keys at random: unless the index of a million keys fits into the cache, every
-# key causes the write of a page.
-_CACHE = 128 << 10
+# KiB of cache for SQLite. Planning accesses the index of keys at random: unless the index of a million keys fits into
+# the cache, every key causes the write of a page.
+_CACHE_KIB = 128 << 10
 _MACHINE_CODES = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 # fmt: off
 _COLUMNS = (
@@ -202,7 +202,7 @@ class Store(HtmlDisplay):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """Open the store in a file, for writing unless `readonly`; with `create`, create a missing file."""
+        """Open the store in a file, for writing unless `readonly`; if `create`, create a missing file."""
         if create and readonly:
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
@@ -278,7 +278,7 @@ class Store(HtmlDisplay):
                 finally:
                     if self._lock is None:
                         os.close(descriptor)
-            self._execute(f"PRAGMA cache_size = -{_CACHE}")
+            self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
             if not self._is_initialized(create):  # again: another process may have done it before the lock
                 with self._transaction():
@@ -506,9 +506,9 @@ class Store(HtmlDisplay):
         retry_failed: bool = False,
         shard: tuple[int, int] = (1, 1),
     ) -> Iterator[Job]:
-        """Yield each task without a result once, in plan order; results may be added during the iteration.
+        """Yield a job for each task without a result, once, in plan order; results may be added during the iteration.
 
-        With `retry_failed` failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
+        If `retry_failed`, failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
         i-th of n disjoint parts of the tasks.
         """
         sql, queries = self._pending_query(experiments, retry_failed, shard)
@@ -587,7 +587,7 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """Yield the tasks with their records in plan order; with `missing` also the tasks without a record."""
+        """Yield the tasks with their records in plan order; if `missing`, also the tasks without a record."""
         stored = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED_COLUMNS}
@@ -644,7 +644,7 @@ class Store(HtmlDisplay):
                         self._put_result(task, other_result, attempts + (own_attempts or 0))
                     elif other_result[0] == Outcome.OK and other_result[1:3] != own_result[1:3]:
                         conflicts += 1
-                        conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
+                        conflicting += [key] if conflicts <= MAX_CONFLICTS_SHOWN else []
         return Merged(new_tasks, results, replaced, conflicts, tuple(conflicting))
 
     # Queries
@@ -702,7 +702,7 @@ class Store(HtmlDisplay):
         tasks = self._fetch(
             f"SELECT t.id, t.key, t.text, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
-            (prefix, f"{prefix}g", MAX_FOUND),  # g comes after every hexadecimal digit
+            (prefix, f"{prefix}g", MAX_FOUND_TASKS),  # g comes after every hexadecimal digit
         )
         places_sql = (
             "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "

@@ -29,7 +29,7 @@ RUN_COLUMNS = ("seconds", "peak_memory")
 # 12e34567.
 _TEXT_NAMES = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
 _MAX_SUGGESTIONS = 3  # maximal number of names suggested for an unknown name
-_MAX_LISTED = 60
+_MAX_LISTED = 60  # maximal number of names in a message
 _MAX_WIDTH = 160  # maximal number of characters of a printed cell
 
 
@@ -148,8 +148,8 @@ def summarise(
 
     A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; an entry of the
     system spec (m, parameters.a); or an entry of the result (dimension, heights.max). A name with several meanings has
-    the first one in this order; option.seed, family.seed and result.seed are unambiguous. Rows without the entry form a
-    group with the value None.
+    the meaning that is first in this list; option.seed, family.seed and result.seed are unambiguous. Rows without the
+    entry form a group with the value None.
 
     Numbers (integers, floats, texts such as "7/3" or "21.2031") of the results are summarized, and unless `stable` also
     seconds and peak_memory of all records. Entries in `by` are constant in a group and not summarized. If `values` are

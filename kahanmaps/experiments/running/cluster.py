@@ -4,7 +4,7 @@
 
 is the command that a dask worker runs for a group, with `subprocess.run`. Hence neither the scheduler nor dask's worker
 processes import kahanmaps, and a crashing task does not affect them. The input is {"documents": {DIGEST: TEXT}, "jobs":
-[{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; The record of every job is printed on one line when the
+[{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}. The record of every job is printed on one line when the
 job ends. The exit status is 0 for all outcomes of the jobs. A group takes a few seconds, since the scheduler has a
 constant overhead for each group.
 
@@ -36,18 +36,18 @@ from typing import IO, Any
 
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments.results.records import Documents, Executor, Job, Outcome, Record, Task, TaskLimits, canonical
-from kahanmaps.experiments.running.local import GROUP_SECONDS, TAIL, TRIES, LocalWorkers, ending
+from kahanmaps.experiments.running.local import GROUP_SECONDS, TAIL_LENGTH, TRIES, LocalWorkers, ending
 from kahanmaps.processes import end_with_parent
 
 MODULE = "kahanmaps.experiments.running.cluster"
-PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # environment variables that are passed on to the workers
+PASSED_VARIABLES = ("KAHANMAPS_TASKS", "PYTHONPATH")  # environment variables that are passed on to the workers
 
-START_UP = 60.0  # seconds allowed for a group beyond the limits of its jobs, for a busy worker,
-START_UP_OF_A_JOB = 5.0  # and seconds allowed in addition for each of its jobs
-LARGEST_GROUP = 200  # jobs
-UNFIT_AFTER = 3  # groups that ended by themselves without a record before any group has printed one
-FETCH = 30.0  # seconds to fetch the output of a group that has ended
-COUNT_EVERY = 2.0  # seconds between two counts of the workers
+GROUP_START = 60.0  # seconds allowed for a group beyond the time limits of its jobs, since a worker may be busy
+JOB_START = 5.0  # seconds allowed in addition for each job of a group
+MAX_GROUP_JOBS = 200
+MAX_SILENT_GROUPS = 3  # groups that ended by themselves without a record before any group has printed one
+FETCH_SECONDS = 30.0  # seconds to fetch the output of a group that has ended
+COUNT_INTERVAL = 2.0  # seconds between two counts of the workers
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
 
@@ -91,7 +91,7 @@ class ClusterWorkers(Executor):
         self._group_seconds = group_seconds
         self._on_message = on_message or (lambda text: None)
         # `env=` of subprocess.run would replace the whole environment of the worker.
-        environment = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
+        environment = [f"{name}={os.environ[name]}" for name in PASSED_VARIABLES if name in os.environ]
         self._command = ["/usr/bin/env", *environment, *(command or [python or sys.executable, "-m", MODULE])]
         self._tries: dict[str, int] = {}  # key of a job in flight -> failed attempts in a group of its own
         self._open_group: list[Job] = []
@@ -103,7 +103,7 @@ class ClusterWorkers(Executor):
         self._client = connect(address, connect_seconds)
         self._futures = import_module("distributed").as_completed(loop=self._client.loop)
         self._lost_reason: str | None = None  # reason why the scheduler is lost
-        self._threads, self._counted_at, self._is_reported = 0, -COUNT_EVERY, False
+        self._threads, self._counted_at, self._is_reported = 0, -COUNT_INTERVAL, False
         self._count_threads()
 
     @property
@@ -126,7 +126,7 @@ class ClusterWorkers(Executor):
         self._open_group.append(job)
         # A task of unknown duration is a group of its own.
         seconds = sum(self._mean_seconds.get(job.task.kind, self._group_seconds) for job in self._open_group)
-        if len(self._open_group) >= LARGEST_GROUP or seconds >= self._group_seconds:
+        if len(self._open_group) >= MAX_GROUP_JOBS or seconds >= self._group_seconds:
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
@@ -179,7 +179,7 @@ class ClusterWorkers(Executor):
 
     def _count_threads(self) -> None:
         """Count the threads of the workers from time to time, and report once that there are none."""
-        if not self._is_connected or time.monotonic() - self._counted_at < COUNT_EVERY / (1 if self._threads else 4):
+        if not self._is_connected or time.monotonic() - self._counted_at < COUNT_INTERVAL / (1 if self._threads else 4):
             return
         self._counted_at = time.monotonic()
         with suppress(Exception):  # the scheduler may have been lost
@@ -198,7 +198,7 @@ class ClusterWorkers(Executor):
         group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
         times = [job.limits.time for job in jobs]
         # The command itself enforces the limits of tasks: this timeout ends a command that hangs.
-        timeout = None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
+        timeout = None if None in times else GROUP_START + sum((time or 0.0) + JOB_START for time in times)
         # distributed warns of arguments beyond 10 MB, but a single document may exceed this size.
         with warnings.catch_warnings(action="ignore"):
             try:
@@ -223,7 +223,7 @@ class ClusterWorkers(Executor):
         is_alone = len(unfinished) == 1
         output: Any
         try:
-            output = future.result(timeout=FETCH)
+            output = future.result(timeout=FETCH_SECONDS)
             message = f"the worker's command {ending(output.returncode)}"
             message += " and no record" if output.returncode == 0 else ""
             has_ended_by_itself = output.returncode >= 0
@@ -257,7 +257,7 @@ class ClusterWorkers(Executor):
             mean = self._mean_seconds.setdefault(job.task.kind, record.seconds)
             self._mean_seconds[job.task.kind] += (record.seconds - mean) / 10
             records.append(record)
-        stderr = (getattr(output, "stderr", None) or b"").decode(errors="replace")[-TAIL:]
+        stderr = (getattr(output, "stderr", None) or b"").decode(errors="replace")[-TAIL_LENGTH:]
         for key, job in unfinished.items():
             self._tries[key] += is_alone
             failures.append((job, Record(key, Outcome.LOST, message=message, stderr=stderr)))
@@ -266,7 +266,7 @@ class ClusterWorkers(Executor):
             # missing installation.
             self._jobs_without_record |= unfinished.keys()
             self._groups_without_record += 1
-            if self._groups_without_record >= UNFIT_AFTER and self._tries.keys() <= self._jobs_without_record:
+            if self._groups_without_record >= MAX_SILENT_GROUPS and self._tries.keys() <= self._jobs_without_record:
                 command = " ".join(self._command)
                 sentence = f"the workers cannot run {command!r}: {message}, and none has ever printed a record"
                 raise WorkersUnfit(f"{sentence}\n{stderr.strip()}".strip())

@@ -46,7 +46,7 @@ from kahanmaps.version import __version__
 # and the next run of the batch attempts it again.
 TRIES = 5
 GROUP_SECONDS = 5.0  # seconds of work for one worker process: its start takes about 0.2 s
-TAIL = 2000  # characters stored of a message, a traceback, or the output of a worker
+TAIL_LENGTH = 2000  # characters stored of a message, a traceback, or the output of a worker
 
 # Error messages of Python, FLINT, GMP and OpenBLAS for lack of memory.
 _MEMORY_PHRASES = (
@@ -71,13 +71,13 @@ class WorkersError(KahanmapsError):
 
 @dataclass
 class _Attempt:
-    """A job in flight, with the history of its attempts."""
+    """A job in flight (submitted, its record not yet returned), with the history of its attempts."""
 
     job: Job
     documents: dict[str, str]
     tries: int = 0  # number of attempts in which the worker was killed from outside
-    had_fault: bool = False
-    begun: float = 0.0
+    had_fault: bool = False  # an earlier attempt failed for a reason that may lie in its worker
+    begun: float = 0.0  # time of the start of this attempt
 
 
 class LocalWorkers:
@@ -264,8 +264,8 @@ class _Worker:
 
     def printed(self) -> str:
         """Return the end of the output of the process since its task began."""
-        begin = max(0, os.fstat(self._output.fileno()).st_size - TAIL)
-        return os.pread(self._output.fileno(), TAIL, begin).decode("utf-8", "replace").strip()
+        begin = max(0, os.fstat(self._output.fileno()).st_size - TAIL_LENGTH)
+        return os.pread(self._output.fileno(), TAIL_LENGTH, begin).decode("utf-8", "replace").strip()
 
     def kill(self) -> None:
         """Kill the process and all processes that its tasks have started."""
@@ -401,7 +401,7 @@ def _run_task(text: str, memory: int | None, documents: dict[str, str]) -> str:
     try:
         return canonical(data)
     except (ValueError, TypeError, RecursionError) as error:  # JSON cannot represent nan, Fraction or arrays
-        message = f"the result cannot be kept: {error}"[:TAIL]
+        message = f"the result cannot be kept: {error}"[:TAIL_LENGTH]
         return canonical({"key": data["key"], "outcome": Outcome.FAILED, "message": message})
 
 
@@ -447,9 +447,9 @@ def failure(error: BaseException) -> dict[str, Any]:
     if cause is not None:  # MemoryError or an equivalent error, or an error caused by one
         return {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
     if isinstance(error, InputError):
-        return {"outcome": Outcome.FAILED, "message": str(error)[:TAIL]}
-    data = {"outcome": Outcome.FAILED, "message": f"{type(error).__name__}: {error}"[:TAIL]}
-    return data if isinstance(error, KahanmapsError) else {**data, "stderr": traceback.format_exc()[-TAIL:]}
+        return {"outcome": Outcome.FAILED, "message": str(error)[:TAIL_LENGTH]}
+    data = {"outcome": Outcome.FAILED, "message": f"{type(error).__name__}: {error}"[:TAIL_LENGTH]}
+    return data if isinstance(error, KahanmapsError) else {**data, "stderr": traceback.format_exc()[-TAIL_LENGTH:]}
 
 
 @cache

@@ -18,9 +18,9 @@ from kahanmaps.experiments.results.store import Planned, Store
 from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
-_TICK = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time taken to write the last list
-GRACE = 10.0  # seconds that tasks in flight have after an interrupt
+_WAIT_SECONDS = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time that writing the last list took
+GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
@@ -30,7 +30,7 @@ class Batch:
     took to write the last list. A caller that stores each list at once loses at most one list and the tasks in flight.
     """
 
-    def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
+    def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE_SECONDS) -> None:
         self._jobs = iter(jobs)
         self._executor = executor
         self._grace = grace
@@ -54,7 +54,7 @@ class Batch:
                 if self._deadline is not None and time.monotonic() > self._deadline:
                     self.abandoned = executor.in_flight
                     return
-                records = executor.wait(_TICK)
+                records = executor.wait(_WAIT_SECONDS)
                 collection_end = time.monotonic() + _COLLECTION_FACTOR * write_seconds
                 while records and executor.in_flight and time.monotonic() < collection_end:
                     self._submit_jobs()
@@ -63,7 +63,7 @@ class Batch:
                 write_begin = time.monotonic()
                 yield records
                 if records:
-                    write_seconds = min(time.monotonic() - write_begin, _TICK)
+                    write_seconds = min(time.monotonic() - write_begin, _WAIT_SECONDS)
         finally:
             executor.close()
 

@@ -39,21 +39,21 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
 
 DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
-BINS = 200
+BINS = 200  # of steps, in each of which the largest error is kept
 MAX_STEPS = 10**9
-MAX_FUNCTIONS = 12
-MAX_STARTS = 100_000
-_RANDOM_STARTS = 40
+MAX_FUNCTIONS = 12  # whose drift is measured
+MAX_STARTS = 100_000  # initial points
+_CANDIDATE_STARTS = 40  # initial points that are tried if none is given
 _STARTS_PER_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
-_PROBE_STEPS = 1000
+_PROBE_STEPS = 1000  # steps of RK4 that the orbit of a candidate must complete
 _REFERENCE_STARTS = 4  # maximal number of initial points for which errors are measured
 _MAX_HALVINGS = 6  # number of times tried for the reference solution, each half of the previous time
 _MIN_LOG_STEPS, _MAX_LOG_STEPS = 1, 14  # base-2 logarithms of the smallest and largest number of steps
 _MIN_SIZES = 5  # step sizes needed before the order counts as converged
 _MAX_SLOPE_CHANGE = 0.004  # change of the slope between step sizes below which the order counts as converged
-_ROUNDING = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
-_MIN_COMPILED_STEPS = 20_000
-_MAX_LETTERS = 60  # maximal length of a printed number; JSON output has all characters
+_ROUNDING_ERROR = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
+_MIN_COMPILED_STEPS = 20_000  # of all orbits together: for fewer steps numpy is faster than loading compiled code
+_MAX_NUMBER_CHARACTERS = 60  # maximal length of a printed number; JSON output has all characters
 _COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
 
 
@@ -328,7 +328,7 @@ def compare(
     initial, relative = _initial_values(functions, starts)
     time, references = _references(field, starts[:_REFERENCE_STARTS], eps, progress) if orders else (None, None)
     if orders and time is None:
-        notes.append("no errors: no reference, for the solution moves not at all, or reaches a pole at once")
+        notes.append("no errors are measured: the solution is constant, or reaches a pole at once")
     runs, curves = [], []
     edges = _bin_edges(steps, linear_bins)
     for name in method_names:
@@ -373,7 +373,7 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
     """
     rng = random.Random(f"drift {seed}")
     starts = []
-    for k in range(_RANDOM_STARTS):
+    for k in range(_CANDIDATE_STARTS):
         sizes = ((rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16)) for _ in range(system.dim))
         starts.append(tuple(fmpq(p, q << k // _STARTS_PER_SIZE) for p, q in sizes))
     ensemble = MethodEnsemble(system, eps, starts, "rk4", kernel="numpy")
@@ -384,7 +384,7 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
 
 def _short_number(number: fmpq) -> str:
     text = format_number(number)
-    return text if len(text) <= _MAX_LETTERS else f"about {to_float(number):.6g}"
+    return text if len(text) <= _MAX_NUMBER_CHARACTERS else f"about {to_float(number):.6g}"
 
 
 def _exact_starts(system: QuadraticSystem, points: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
@@ -510,7 +510,7 @@ def _measure_errors(
         error, previous = errors[steps].error, errors.get(steps // 2)
         if not np.isfinite(error):
             continue
-        if error <= _ROUNDING * reference_size * sqrt(steps):
+        if error <= _ROUNDING_ERROR * reference_size * sqrt(steps):
             break
         if previous is not None and np.isfinite(previous.error):
             slopes.append(log2(previous.error / error))

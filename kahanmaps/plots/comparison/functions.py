@@ -25,7 +25,7 @@ from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
-_MAX_NAME = 30  # maximal number of characters
+_MAX_NAME = 30  # maximal number of characters of the name of a function
 _EFFORT = -2  # effort of the search for integrals, which then takes at most a few seconds
 
 
@@ -71,9 +71,9 @@ WatchedFunction = PointFunction | TwoPointFunction
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
-    In this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian; the integrals from the
-    commutant of a member of the family; and H itself, which the Kahan map does not conserve. `eps` is half the time
-    step.
+    They come in this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian; the integrals
+    from the commutant of a member of the family; and H itself, which the Kahan map does not conserve. `eps` is half the
+    time step.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))

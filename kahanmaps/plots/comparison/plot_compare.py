@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
-_PANEL = 5.5  # minimal width in centimetres of panels side by side
-_MIN_CLIPPED = 1e3
-_MAX_PANELS = 6
-_DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the axis if all errors are 0
+_MIN_PANEL_WIDTH = 5.5  # minimal width in centimetres of panels side by side
+_MIN_CLIPPED_ERROR = 1e3  # no smaller error is shown as an arrow
+_MAX_PANELS = 6  # of one picture, each of one function
+_DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the error axis if all errors are 0
 
 
 def plot_comparison(
@@ -106,15 +106,15 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
     count = len(names)
     if not count:
         raise InputError(f"found no known integral of {result.file.name}, expected one: give --integral NAME=EXPR")
-    columns = 1 if count <= 3 else 3 if count > 4 and style.width >= 3 * _PANEL else 2
-    if count <= 3 and style.width >= _PANEL * count:
+    columns = 1 if count <= 3 else 3 if count > 4 and style.width >= 3 * _MIN_PANEL_WIDTH else 2
+    if count <= 3 and style.width >= _MIN_PANEL_WIDTH * count:
         columns = count
     rows = -(-count // columns)
     with drawing(style):
         from matplotlib.lines import Line2D
 
         methods = [run.method for run in result.runs]
-        ended = {run.method: max(mark_style.steps for mark_style in run.early) for run in result.runs if run.early}
+        ended = {run.method: max(end.steps for end in run.early) for run in result.runs if run.early}
         labels = [
             METHODS[method].title + (f" (ended at step {ended[method]})" if method in ended else "")
             for method in methods
@@ -175,7 +175,7 @@ def clipped_from(result: Comparison, name: str) -> float:
     """
     methods = {run.method for run in result.runs if not run.early}
     curves = [curve for curve in result.curves if curve.function == name and curve.method in methods]
-    return max([_MIN_CLIPPED, *(10 * curve.largest for curve in curves if len(curve.errors))])
+    return max([_MIN_CLIPPED_ERROR, *(10 * curve.largest for curve in curves if len(curve.errors))])
 
 
 def _line_style(k: int) -> dict[str, Any]:

@@ -29,12 +29,12 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transform_cubic
 
-MAX_POINTS = 1_000_000
+MAX_POINTS = 1_000_000  # of all orbits together
 MAX_STARTS = 7  # the number of colors
-BITS = 256
-_POLE_BITS = 96
-_PROGRESS_EVERY = 2_000  # steps
-_LARGEST = 1e60  # largest drawn coordinate: its cube does not overflow
+BITS = 256  # of the floating-point numbers
+_POLE_BITS = 96  # a point within 2^-96 of infinity counts as a pole
+_PROGRESS_STEPS = 2_000  # steps between two progress messages
+_MAX_COORDINATE = 1e60  # largest drawn coordinate: its cube does not overflow
 
 Numbers = NDArray[Any]
 
@@ -213,13 +213,13 @@ def _compute_orbit(
         norm = max(abs(entry) for entry in P)
         # An indeterminacy point ends the orbit at the next step, as a pole does.
         P = (U, V, W * 0) if norm == 0 else tuple((entry / norm).mid() for entry in P)
-        if k % _PROGRESS_EVERY == 0:
+        if k % _PROGRESS_STEPS == 0:
             progress(f"{label}, step {k}")
     return np.array(us), np.array(vs)
 
 
 def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> PlaneCubic:
-    """Return the curve through the initial point, with numerator and denominator scaled to moderate size."""
+    """Return the cubic through the initial point, its numerator and denominator scaled: the larger one is 1 or -1."""
     U, V, W = initial_triple
     time_step = 2 * arb(eps)
     u, v = U / W / time_step, V / W / time_step
@@ -233,10 +233,10 @@ def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> 
     distances = float(abs(u)), float(abs(v))
     largest = max(*map(abs, frame.h), *distances, cubic.length)
     smallest = min(cubic.length, max(distances) or cubic.length)
-    if not 1 / _LARGEST < smallest <= largest < _LARGEST:
+    if not 1 / _MAX_COORDINATE < smallest <= largest < _MAX_COORDINATE:
         raise InputError(
             f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "
-            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the initial point, the system or eps"
+            f"{1 / _MAX_COORDINATE:.0e} to {_MAX_COORDINATE:.0e}: scale the initial point, the system or eps"
         )
     return cubic
 

@@ -16,9 +16,9 @@ from kahanmaps.plots.figures import require_matplotlib
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window
 
-MAX_LEVELS = 200
+MAX_LEVELS = 200  # of one function in one picture
 GRID = 301  # grid lines in each direction
-_NEWTON_STEPS = 8
+_NEWTON_STEPS = 8  # for each vertex
 
 
 Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices

@@ -69,9 +69,9 @@ class PlaneCubic:
         return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
     def value_on_sphere(self, angles: Floats, length: float) -> Floats:
-        """Return values of this polynomial at points (..., 2) of a half sphere that represents the projective plane.
+        """Return the polynomial of `value`, made homogeneous, on a half sphere that represents the projective plane.
 
-        The first angle is the direction in the plane, the second the angle from the axis, pi/2 at infinity:
+        `angles` (..., 2) are the direction of a point in the plane, and an angle from the axis, pi/2 at infinity:
         (u, v) = length tan(second) (cos(first), sin(first)). If the curve consists of lines through the origin, or is a
         conic, the factors that vanish at the origin and at infinity are omitted.
         """
@@ -152,7 +152,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 def transform_cubic(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
     """Return the coefficients of the cubic in the coordinates `matrix` (of determinant 1) times the old coordinates."""
     f, g, k, l = matrix.entries()
-    # u = l u' - g v', v = -k u' + f v'
+    # (u', v') are the new coordinates: u = l u' - g v', v = -k u' + f v'
     a, b, c, d = block.a, block.b, block.c, block.d
     slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
     other_u, other_v = 3 * a * g * g - 2 * b * g * f + c * f * f, b * g * g - 2 * c * g * f + 3 * d * f * f

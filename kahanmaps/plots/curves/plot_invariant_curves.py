@@ -41,7 +41,7 @@ def plot_invariant_curves(
 ) -> Figure:
     """Plot the cubics and the orbits on them: one panel for each real plane, two panels for each complex plane.
 
-    With `projective` a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
+    If `projective`, a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
     at infinity. `flow` adds the level curve of the differential equation through each initial point, dashed. `original`
     are the indices of two variables: the first panel then shows the orbit in these variables. `labels` are the names of
     the initial points, if there are several. Raises InputError for invalid indices.
@@ -174,8 +174,8 @@ def _draw_plane(
 
 Cloud = tuple[Floats, Floats]
 
-_SHOWN_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
-_CUT = 0.7390851  # a direction in which no form with simple coefficients vanishes
+_MIN_SHOWN_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
+_CUT_ANGLE = 0.7390851  # a direction in which no form with simple coefficients vanishes
 _MARGIN = 0.08  # fraction of the width added on either side for the numbers beside the dots
 
 
@@ -198,7 +198,7 @@ class Rectangle:
             np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
         )
         distances = np.hypot(*points.T)
-        max_distance = np.quantile(distances, _SHOWN_SHARE, method="higher")
+        max_distance = np.quantile(distances, _MIN_SHOWN_SHARE, method="higher")
         if distances.max() > 2 * max_distance:
             points = points[distances <= max_distance]
         return cls.of(clouds, window_of(points, starts))
@@ -257,7 +257,7 @@ class Disc:
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
         """Return the components (n, 2) of a curve in the panel; each is closed or joins two points of the rim."""
-        domain = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
+        domain = ((_CUT_ANGLE, _CUT_ANGLE + 2 * np.pi), (0.0, np.pi / 2))
         pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), domain)
         directions = [np.concatenate([np.cos(p[:, :1]), np.sin(p[:, :1])], axis=1) for p in pieces]
         return tuple(np.sin(p[:, 1:]) * direction for p, direction in zip(pieces, directions, strict=True))

@@ -27,8 +27,8 @@ SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the origin and (1, ..., 1)
 _ZERO_TOLERANCE = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
-_ARROWS = 21  # number of arrows along each side of the window
-_STEPS_ACROSS = 400  # number of steps of a curve that crosses the window
+_ARROWS_PER_SIDE = 21  # number of arrows along each side of the window
+_STEPS_PER_WINDOW = 400  # number of steps of a curve that crosses the window
 _MAX_STEPS = 6000  # length of a curve: fifteen times the window
 _MIN_SPEED_RATIO = 1e-4  # fraction of the largest speed in the window: curves stop near an equilibrium
 
@@ -120,7 +120,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     permutation = list(plane)  # a permutation of (0, 1), hence its own inverse
     low, high = (np.array(side) for side in zip(*window, strict=True))
     f = VectorField(system)
-    cell_centers = (np.arange(_ARROWS) + 0.5) / _ARROWS
+    cell_centers = (np.arange(_ARROWS_PER_SIDE) + 0.5) / _ARROWS_PER_SIDE
     places = low + (high - low) * np.stack(np.meshgrid(cell_centers, cell_centers), axis=-1).reshape(-1, 2)
     arrows = f(places[:, permutation])[:, permutation] / (high - low)
     lengths = np.linalg.norm(arrows, axis=1, keepdims=True)
@@ -175,7 +175,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     (True, True)
     """
     low, high = (np.array(side, dtype=np.float64) for side in zip(*box, strict=True))
-    size, center, step = high - low, (low + high) / 2, 1 / _STEPS_ACROSS
+    size, center, step = high - low, (low + high) / 2, 1 / _STEPS_PER_WINDOW
     sign = -1.0 if time is not None and time < 0 else 1.0
 
     def speed(x: FloatArray) -> float:
@@ -192,7 +192,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
         current_speed = speed(x)
         elapsed += step / current_speed if current_speed > 0 else np.inf
         # A separatrix (no time limit) starts slowly at its saddle, so a small speed stops only long curves.
-        is_slow = current_speed <= min_speed and (step_number > 2 * _STEPS_ACROSS or not np.isinf(time or 0.0))
+        is_slow = current_speed <= min_speed and (step_number > 2 * _STEPS_PER_WINDOW or not np.isinf(time or 0.0))
         if is_slow or (time is not None and elapsed > abs(time)) or np.abs((x - center) / size).max() > 1.5:
             break
         k1 = direction(x)
@@ -208,13 +208,13 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     return np.array(points)
 
 
-COUNT = 16
-_CENTERS = 4  # maximal number of equilibria tried as centers of initial points
-_MAX_SIZES = 24
-_SHRINK = 0.8
-_TRIAL_STEPS = 300
+START_COUNT = 16  # number of automatic initial points
+_MAX_CENTERS = 4  # maximal number of equilibria tried as centers of initial points
+_MAX_SIZES = 24  # maximal number of distances from a center that are tried
+_SIZE_RATIO = 0.8  # of two successive distances
+_TRIAL_STEPS = 300  # steps for which the orbits must stay near the center
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_MAX_GROWTH = 4.0  # an orbit stays nearby if its distance from the center never exceeds this multiple of the largest
+_MAX_GROWTH = 4.0  # orbits stay near a center if no distance exceeds this multiple of the largest initial distance
 
 
 def automatic_starts(
@@ -224,7 +224,7 @@ def automatic_starts(
 
     The points lie around the most stable equilibrium that is found: on a ray in the plane of the variables `plane` or,
     if f is homogeneous (so that all points of a ray move alike), on a circle; other coordinates are shifted a little.
-    Their distance from the equilibrium is the largest for which all orbits stay nearby for 300 steps.
+    Of the distances from the equilibrium that are tried, the largest is taken for which all orbits stay near it.
 
     >>> lotka_volterra = QuadraticSystem.from_text(["x", "y"], ["x - x*y", "x*y - y"])
     >>> starts = automatic_starts(lotka_volterra, "1/20")
@@ -236,7 +236,7 @@ def automatic_starts(
     sorted_equilibria = sorted(
         equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
     )
-    centers = [equilibrium.point for equilibrium in sorted_equilibria[:_CENTERS]]
+    centers = [equilibrium.point for equilibrium in sorted_equilibria[:_MAX_CENTERS]]
     if all(center.any() for center in centers):
         centers.append(np.zeros(system.dim))
     other_indices = [index for index in range(system.dim) if index not in plane]
@@ -245,14 +245,14 @@ def automatic_starts(
         # For a homogeneous field, smaller initial points around the origin only move more slowly.
         is_scaled = system.is_homogeneous and not center.any()
         for k in range(1 if is_scaled else _MAX_SIZES):
-            size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SHRINK**k
-            starts = np.tile(center, (COUNT, 1))
+            size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SIZE_RATIO**k
+            starts = np.tile(center, (START_COUNT, 1))
             if is_scaled and len(plane) == 2:
-                angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one to another
+                angles = (np.arange(START_COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one to another
                 starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
                 starts[:, other_indices] += size / 5
             else:
-                offsets = np.arange(1, COUNT + 1) / COUNT * size
+                offsets = np.arange(1, START_COUNT + 1) / START_COUNT * size
                 for index, weight in zip(plane, (1.0, 0.25), strict=False):
                     starts[:, index] += weight * offsets
                 for position, index in enumerate(other_indices):
@@ -266,4 +266,4 @@ def automatic_starts(
             if (has_stayed & has_moved).all():
                 return starts
             candidates.append((int((has_stayed & has_moved).sum()), starts))
-    return max(candidates, key=lambda equilibrium: equilibrium[0])[1]
+    return max(candidates, key=lambda candidate: candidate[0])[1]

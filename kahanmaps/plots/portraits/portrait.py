@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.comparison.functions import WatchedFunction
 
-_MAX_NEIGHBOURS = 2000  # points: all pairs are compared; a curve with more points looks smooth without lines
-_MIN_NEIGHBOURS = 8
+_MAX_NEIGHBOURS = 2000  # points, all pairs of which are compared; a curve with more points looks smooth without lines
+_MIN_NEIGHBOURS = 8  # points of an orbit, without which no curve is recognized
 _MIN_CURVE_SHARE = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
-# A longer line is a gap in an orbit that does not fill its curve: in units of the median line, and of the diameter of
-# the orbit. If the rotation number is nearly rational, points form bunches joined by long lines, but shorter than this.
+# A line longer than both multiples, of the median line and of the diameter of the orbit, is a gap in an orbit that does
+# not fill its curve. If the rotation number is nearly rational, bunches of points are joined by long but shorter lines.
 _MAX_LENGTH_RATIO, _MAX_WIDTH_RATIO = 8.0, 0.2
 STEP = "step"
 ORBIT = "orbit"
@@ -80,7 +80,7 @@ def portrait_of(
 ) -> Portrait:
     """Project orbits to two or three axes, each of which is a function of the point or the word "step".
 
-    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. With `join`
+    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. If `join`,
     the neighbours of each point on the curve of its orbit are computed, unless an axis is the step. Raises InputError
     for other axes or colors.
 
@@ -171,12 +171,12 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     return np.asarray(rows[pairs[lengths <= max_length]], dtype=np.int64)
 
 
-_ASPECT = 0.75
+_ASPECT = 0.75  # height over width of the axes
 _EULER_COLOR = "#BBBBBB"
 _LEVEL_STYLE: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
-_MAX_JOINED = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
-_MAX_INITIAL = 40  # maximal number of orbits with marked initial points: more marks would cover the picture
-_MAX_MARKED = 60  # maximal number of points of an orbit that are all drawn as marks
+_MAX_JOINED_POINTS = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
+_MAX_MARKED_ORBITS = 40  # maximal number of orbits with marked initial points: more marks would cover the picture
+_MAX_MARKED_POINTS = 60  # maximal number of points of an orbit that are all drawn as marks
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 _ARROW: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
@@ -198,13 +198,13 @@ _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait as dots or, with `lines`, as joined points; with `equal` both axes have the same unit.
+    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, both axes have one unit.
 
     `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
     """
     count = portrait.points[..., 0].size
-    if lines and count > _MAX_JOINED:
-        raise InputError(f"found {count} points to join by lines, expected at most {_MAX_JOINED}: draw dots")
+    if lines and count > _MAX_JOINED_POINTS:
+        raise InputError(f"found {count} points to join by lines, expected at most {_MAX_JOINED_POINTS}: draw dots")
     in_space = len(portrait.labels) == 3
     with drawing(style):
         import matplotlib as mpl
@@ -278,7 +278,7 @@ def plot_portrait(
             is_beyond = bool((visible_values < low).any()), bool((visible_values > high).any())
             options: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[is_beyond]}
             figure.colorbar(mappable, ax=axes, **options).set_label(portrait.value_label)
-        if portrait.values is None and points.shape[1] <= _MAX_INITIAL:
+        if portrait.values is None and points.shape[1] <= _MAX_MARKED_ORBITS:
             for k in range(points.shape[1]):
                 color = COLORS[k] if points.shape[1] <= len(COLORS) else "white"
                 axes.plot(*points[0, k][:, None], linestyle="none", markerfacecolor=color, zorder=3, **_START_MARK)
@@ -310,7 +310,7 @@ def _draw_few_orbits(axes: Any, points: FloatArray, lines: bool, portrait: Portr
                 path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
             axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **options)
         else:
-            mark = {"markersize": 3.0, "marker": MARKS[k]} if len(orbit) <= _MAX_MARKED else {}
+            mark = {"markersize": 3.0, "marker": MARKS[k]} if len(orbit) <= _MAX_MARKED_POINTS else {}
             draw_points(axes, *orbit.T, **options, **mark, total=count)
 
 
@@ -323,7 +323,7 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Draw the orbits in this order as dots or, with `lines`, as segments, colored by the values.
+    """Draw the orbits in this order as dots or, if `lines`, as segments, colored by the values.
 
     A segment has the color of its first point; `limits` are the least and the largest value of the color bar.
     """

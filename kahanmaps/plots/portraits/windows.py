@@ -14,12 +14,12 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
 _OUTER_PERCENT = 10.0  # percent of the points at either end that are ignored if they are far away
-_FAR = 3.0  # "far away" is farther than this multiple of the range of all other points
+_FAR_RATIO = 3.0  # "far away" is farther than this multiple of the range of all other points
 _MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # in units of the largest initial coordinate
-_MARGIN = 0.04
-_LARGEST = 1e307  # largest number that matplotlib can subtract
+_MARGIN_RATIO = 0.04  # margin at either end, relative to the range
+_MAX_NUMBER = 1e307  # largest number that matplotlib can subtract
 _MAX_POINTS = 4000  # maximal number of points used in the choice of axes
-_MAX_VARIABLES = 16
+_MAX_VARIABLES = 16  # of which two or three are chosen as axes
 _CELLS_PER_AXIS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
 
 
@@ -47,30 +47,30 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
         if 0 < _MAX_RATIO * largest_coordinate < max(-low, high):
             low, high = main_range(column[np.abs(column) <= _SHOWN_RATIO * largest_coordinate], initial_column)
         unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in this unit nothing overflows
-        margin = (high / unit - low / unit) * _MARGIN
+        margin = (high / unit - low / unit) * _MARGIN_RATIO
         window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
     return tuple(window)
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """Return the range of values that `window_of` determines, without a margin; `required` are the initial points.
+    """Return the range of values that `window_of` determines, without a margin; `required` are initial values.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
     """
-    values = np.clip(values[np.isfinite(values)], -_LARGEST, _LARGEST)
+    values = np.clip(values[np.isfinite(values)], -_MAX_NUMBER, _MAX_NUMBER)
     unit = float(np.abs(values).max(initial=0))
     if unit == 0:
         return -1.0, 1.0
     samples = [values]
-    if required is not None and len(required := np.clip(required[np.isfinite(required)], -_LARGEST, _LARGEST)):
+    if required is not None and len(required := np.clip(required[np.isfinite(required)], -_MAX_NUMBER, _MAX_NUMBER)):
         samples.append(required)
     # The inner range, without a tenth of the points at either end, in a unit in which nothing overflows.
     percents = [_OUTER_PERCENT, 100 - _OUTER_PERCENT]
     ranges = [np.percentile(sample, percents, method="nearest") / unit for sample in samples]
     left, right = float(min(first for first, _ in ranges)), float(max(last for _, last in ranges))
     low, high = float(values.min()) / unit, float(values.max()) / unit
-    if low < left - _FAR * (right - left) or high > right + _FAR * (right - left):
+    if low < left - _FAR_RATIO * (right - left) or high > right + _FAR_RATIO * (right - left):
         low = max(low, left - (right - left) / 2)
         high = min(high, right + (right - left) / 2)
     if high - low < 1e-9 * max(abs(low), abs(high)):  # equal values up to rounding: center them
@@ -84,8 +84,8 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
     for low, high in window:
-        if not -_LARGEST <= low < high <= _LARGEST:
-            limits = f", and numbers between -{_LARGEST:g} and {_LARGEST:g}" if low < high else ""
+        if not -_MAX_NUMBER <= low < high <= _MAX_NUMBER:
+            limits = f", and numbers between -{_MAX_NUMBER:g} and {_MAX_NUMBER:g}" if low < high else ""
             raise InputError(f"found the window {low:g} to {high:g}, expected low < high{limits}")
     return window
 
