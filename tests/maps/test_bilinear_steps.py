@@ -11,6 +11,7 @@ from flint import fmpq, fmpz
 from planar_helpers import begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
+import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
@@ -28,7 +29,7 @@ def early(monkeypatch):
 @pytest.fixture
 def no_curves(monkeypatch):
     """Nor are there curves."""
-    monkeypatch.setattr(rational_orbit, "elliptic_steps", lambda *_: None)
+    monkeypatch.setattr(elliptic, "elliptic_steps", lambda *_: None)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves)
         changed.coefficients[k, 0] += 1
         assert changed.step(expected[10:13], 13) is None
         assert right.step(expected[10:13], 13) == expected[13]
-    monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: changed)
+    monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: changed)
     assert walked(map_over, begin(map_over), 25)[0] == expected
 
 

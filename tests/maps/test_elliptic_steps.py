@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_helpers import START, begin, over, single_steps, walked
 
+import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_search as search
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
@@ -36,7 +37,7 @@ def early(monkeypatch):
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
     monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
-    monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
+    monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: None)
     monkeypatch.setattr(elliptic, "_BITS_PER_PRIME", 1)
 
 

@@ -10,8 +10,6 @@ from typing import Protocol
 
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
-from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
 # The search for relations starts when the steps so far took about as long as the search will take (which depends on the
 # bit length of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: for faster growth
@@ -104,6 +102,9 @@ class RationalOrbit:
                 and image.approximate_bits < _SLOW_GROWTH * previous_point.approximate_bits
                 and search_bits <= image.bits < min(max_search_bits, _SLOW_GROWTH * previous_point.bits)
             ):
+                # Imported here and in `relations`, since only long orbits need these modules: short ones start faster.
+                from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation
+
                 try:
                     self.relations = relations(self.map, self.start, image)
                     search_bits = inf
@@ -117,4 +118,7 @@ def relations(map_over: Map, start: IntegerPoint, point: IntegerPoint) -> Relati
 
     Raises TooLongRelation if there are relations, but their coefficients are longer than the points so far.
     """
+    from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
+    from kahanmaps.maps.orbits.relations.elliptic_orbit import elliptic_steps
+
     return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)
