@@ -168,7 +168,7 @@ def NameValue(name_is_optional: bool = False) -> ParameterKind:
             return name, value
         if name_is_optional and not equals and name:
             return "", name
-        hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
+        hint = f" (for a prime use --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
         raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
 
     return ParameterKind("name=value", read)

@@ -120,14 +120,14 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
     if isinstance(gamma, fmpq):
         curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
-    K, denominator = gamma.field, leading_coefficient(gamma)
-    # Primes in the denominator of j are bad. For a number field these are the primes that divide this integer.
-    pole_norm = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
+    K, denominator = gamma.field, norm_of_denominator(gamma)
+    # The primes below the denominator of j are bad. They are the primes that divide the norm of this denominator.
+    norm_of_j_denominator = norm_of_denominator(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()
     polynomial, field_discriminant = fmpq_poly(delta.matrix.charpoly()), K.chi.discriminant().p
     for p in sorted(primes | {2, 3}):
-        if pole_norm % p == 0:
+        if norm_of_j_denominator % p == 0:
             bad.append(p)
         elif p < 5:
             undecided.append(p)
@@ -139,16 +139,16 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
                 bad.append(p)
             elif any(n.p % 6 != 0 for possible_valuations in valuations for n in possible_valuations):
                 undecided.append(p)
-    bad_composites = {n for n in composites if coprime_part(fmpz(n), pole_norm) == 1}
+    bad_composites = {n for n in composites if coprime_part(fmpz(n), norm_of_j_denominator) == 1}
     return BadPrimes(
         tuple(bad), tuple(undecided), tuple(sorted(bad_composites)), tuple(sorted(composites - bad_composites))
     )
 
 
-def leading_coefficient(element: Any) -> fmpz:
-    """Return the leading coefficient of the primitive polynomial over Z whose roots are the conjugates of an element.
+def norm_of_denominator(element: Any) -> fmpz:
+    """Return the norm of the denominator of an element of a number field.
 
-    This coefficient is the norm of the denominator of the element.
+    It is the leading coefficient of the primitive polynomial over Z whose roots are the conjugates of the element.
     """
     return fmpq_poly(element.matrix.charpoly()).denom()
 

@@ -269,8 +269,8 @@ class _Solver:
 
     def _solve_finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         """Branch on the rational values of a linear form if the Groebner basis shows finitely many solutions."""
-        free_variables = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
-        quotient = quotient_monomials(basis, free_variables)
+        unknowns = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
+        quotient = quotient_monomials(basis, unknowns)
         if quotient is None:
             self._give_up(basis, values, "the solutions are not isolated points, and not linear families")
             return
@@ -278,7 +278,7 @@ class _Solver:
             self._give_up(basis, values, f"there are {len(quotient)} solutions over the complex numbers")
             return
         gens = basis[0].context().gens()
-        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free_variables)), basis[0].context().constant(0))
+        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(unknowns)), basis[0].context().constant(0))
         context, monomial_index = form.context(), {m: k for k, m in enumerate(quotient)}
         matrix = fmpq_mat(len(quotient), len(quotient))  # multiplication by the form in the quotient ring
         for k, m in enumerate(quotient):
@@ -408,10 +408,13 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in vector.autoreduction()]
 
 
-def quotient_monomials(basis: Sequence[fmpq_mpoly], free_variables: Sequence[int]) -> list[tuple[int, ...]] | None:
-    """Return the monomials that no leading monomial of the basis divides; None if there are infinitely many."""
+def quotient_monomials(basis: Sequence[fmpq_mpoly], unknowns: Sequence[int]) -> list[tuple[int, ...]] | None:
+    """Return the monomials in the unknowns that no leading monomial of the basis divides; None for infinitely many.
+
+    `unknowns` are indices of variables. A list of more than 4 `MAX_QUOTIENT` monomials is incomplete.
+    """
     leads = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
-    for i in free_variables:
+    for i in unknowns:
         if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leads):
             return None
     count = len(leads[0])
@@ -421,7 +424,7 @@ def quotient_monomials(basis: Sequence[fmpq_mpoly], free_variables: Sequence[int
         monomials += layer
         if len(monomials) > 4 * MAX_QUOTIENT:
             return monomials
-        next_layer = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free_variables))
+        next_layer = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, unknowns))
         layer = list(dict.fromkeys(next_layer))
     return monomials
 

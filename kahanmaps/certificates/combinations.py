@@ -1,8 +1,9 @@
 """Claims that follow from the equation of a map by linear combinations, without solving for x~.
 
 Let e(x, y) = M(x) y - r(x), which is 0 if y is the image of x. A claim G = 0 is proved by polynomials c with G = c . e,
-an identity for arbitrary points. With three consecutive points x, y, z of an orbit, and a symmetric trilinear form T
-with H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H with J constant and skew,
+an identity for arbitrary points. Let x, y, z be three consecutive points of an orbit, with 1 as an additional
+coordinate, T the symmetric trilinear form with H(x) = T(x, x, x), and g(a, b) = T(a, b, .). For f = J grad H with J
+constant and skew,
 
     T(y, y, z) - T(x, x, y) = g(x, y) . (e(x, y) + e(y, z)) + g(y, z) . e(x, y),
 
@@ -43,10 +44,10 @@ class OrbitIntegral(EquationClaim):
 
 @dataclass(frozen=True)
 class AffineSymmetry(EquationClaim):
-    """The affine map T(x) = `image`/`divisor` with `multiple` e(T x, T y) = `matrix` e(x, y).
+    """The affine map T(x) = `image`/`divisor`, for which `multiple` times e(T x, T y) is `matrix` times e(x, y).
 
-    If `reversing`, e(T y, T x) is on the left instead. The e on the left belongs to the map `target`, the e on the
-    right to `data`. For a symmetry both maps are equal; otherwise T takes the map `data` to `target`.
+    If `reversing`, e(T y, T x) replaces e(T x, T y). The e of the images belongs to the map `target`, e(x, y) to the
+    map `data`. For a symmetry both maps are equal; otherwise T takes the map `data` to `target`.
     """
 
     target: MapData

@@ -514,8 +514,8 @@ def script_certificate(language: Language, claims: Sequence[Claim], header: Sequ
         claims: the statements to be checked.
         header: the lines of the comment at the beginning.
     """
-    data = max((claim.data for claim in claims), key=lambda data: data.dim)
-    script = _Script(language, data)
+    largest_map = max((claim.data for claim in claims), key=lambda data: data.dim)
+    script = _Script(language, largest_map)
     has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
     for claim in claims:
         script.begin(claim, 2 + has_three_points)
@@ -523,8 +523,8 @@ def script_certificate(language: Language, claims: Sequence[Claim], header: Sequ
     used_names = set(re.findall(r"\w+", "\n".join(script.lines)))
     used_names |= {tool for name in used_names for tool in _REQUIRED_TOOLS.get(name, ())}
     has_entropy = any(isinstance(claim, PositiveEntropy) for claim in claims)
-    unused_letters = set() if has_entropy else {homogenizing(data.names)}
-    unused_letters |= set() if has_three_points else {f"{name}2" for name in data.new}
+    unused_letters = set() if has_entropy else {homogenizing(largest_map.names)}
+    unused_letters |= set() if has_three_points else {f"{name}2" for name in largest_map.new}
     names = [letter for name, letter in script.letters.items() if name not in unused_letters]
     lines = [f"{language.comment}{line}" for line in (*header, f"Check: {language.run}")]
     start = language.start

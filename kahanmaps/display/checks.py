@@ -1,6 +1,6 @@
 """Claims and verdicts as text and as HTML for notebooks and pages; no information is given by color alone.
 
-`print` shows a report as the same text as its command in a pipe: lines that start with a word and a tab.
+`print` shows a report as lines that start with a word and a tab, the same text that its command writes to a pipe.
 """
 
 from __future__ import annotations
@@ -156,10 +156,10 @@ def _escaped(text: str, width: int = _MAX_TEXT) -> str:
 @text_form.register
 def report_text(report: Report) -> str:
     """Return all findings with their evidence, then the verdict."""
-    lines, printed = [headline(report)], set[str]()
+    lines, printed_hypotheses = [headline(report)], set[str]()
     for finding in report.findings:
         lines.append(f"{verdict_text(finding)}\t{finding.claim}")
-        lines += [f"\t{line}" for line in details(finding, printed)]
+        lines += [f"\t{line}" for line in details(finding, printed_hypotheses)]
     lines += [f"note\t{note}" for note in report.notes]
     return "\n".join([*lines, f"verdict\t{report.verdict}"])
 
@@ -190,10 +190,10 @@ def verdict_text(finding: Finding) -> str:
     return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
 
 
-def details(finding: Finding, printed: set[str], width: int | None = None) -> list[str]:
-    """Return the lines that follow a claim; `printed` are the hypotheses that were printed before."""
+def details(finding: Finding, printed_hypotheses: set[str], width: int | None = None) -> list[str]:
+    """Return the lines that follow a claim; `printed_hypotheses` were printed before."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
-    lines.append(summary(finding.evidence, printed))
+    lines.append(summary(finding.evidence, printed_hypotheses))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
     if finding.witness is not None:
         lines += witness_lines(finding.witness, width)
@@ -202,14 +202,14 @@ def details(finding: Finding, printed: set[str], width: int | None = None) -> li
     return [line if width is None else shorten(line, 1200) for line in lines]
 
 
-def summary(evidence: Evidence, printed: set[str] | None = None) -> str:
-    """Return the evidence as a sentence; hypotheses in `printed` are omitted, and new hypotheses are added to it."""
+def summary(evidence: Evidence, printed_hypotheses: set[str] | None = None) -> str:
+    """Return the evidence as a sentence without the `printed_hypotheses`; new hypotheses are added to these."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary
-    new_hypotheses = [text for text in hypotheses if text not in (printed or ())]
-    if printed is not None:
-        printed.update(new_hypotheses)
+    new_hypotheses = [text for text in hypotheses if text not in (printed_hypotheses or ())]
+    if printed_hypotheses is not None:
+        printed_hypotheses.update(new_hypotheses)
     repeated = len(hypotheses) - len(new_hypotheses)
     earlier = f"{repeated} hypotheses as above" if repeated > 1 else "1 hypothesis as above" if repeated else ""
     return f"{evidence.data['theorem']} applies: {'; '.join(new_hypotheses + [earlier] * bool(earlier))}"

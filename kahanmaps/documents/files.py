@@ -332,7 +332,11 @@ def _decode(text: str | bytes) -> str:
 
 
 def _look_up_part(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
-    """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`."""
+    """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`.
+
+    Return its document, what identifies it (its name in the catalogue or its path), and the function that looks up the
+    parts of this part (None for a system of the catalogue).
+    """
     if key == "system":
         generated = family_member(name)
         if generated is not None:

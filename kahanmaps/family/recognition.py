@@ -157,7 +157,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     Returns None if H is not a homogeneous cubic, J is not invertible, or only multiples of I satisfy A Hess(H) =
     Hess(H) A^T. (In dimension 2 the result is A = I for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
     r. The member is verified exactly. If H depends on all variables, no A has more distinct roots (proved); otherwise
-    A is the best of many small combinations.
+    A is the best of many combinations, with small coefficients, of the solutions.
 
     Raises InputError above dimension 32.
 
@@ -188,8 +188,8 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     # A gets as many distinct eigenvalues as possible, and small entries.
     blocks = list(_split_idempotent(space, QQ.identity(hamiltonian.dim)))
     A = fmpq_mat(hamiltonian.dim, hamiltonian.dim)
-    # The idempotent with the longest entries gets the eigenvalue 1. As all idempotents add up to I, A is often I + ...
-    # without a term for this idempotent, and so has shorter entries.
+    # All idempotents E_k add up to I. If all factors are linear, then E_1 + 2 E_2 + 3 E_3 + ... = I + E_2 + 2 E_3 + ...
+    # does not contain E_1: so the idempotent with the longest entries gets the eigenvalue 1.
     linear_blocks = sorted(
         (block for block in blocks if block.factor.degree() == 1), key=lambda block: -_total_bits(block.E)
     )

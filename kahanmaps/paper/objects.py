@@ -54,7 +54,7 @@ class PaperObjects:
     and `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
     and `error_of_second`, an error of the tensor f''.
 
-    A method whose name ends with an underscore takes the paper's index: `f_(i)` is f_i, and `H_tilde_(i, x)` is H~_i.
+    A method whose name ends with an underscore takes the paper's index: `f_i(i)` is f_i, and `H_tilde_(i, x)` is H~_i.
     """
 
     K: Field
@@ -320,7 +320,7 @@ class PaperObjects:
         return self.base if self.base is not None else self.hamiltonian_system(self.I)
 
     @cache_by_id
-    def f_(self, i: int) -> SystemOver:
+    def f_i(self, i: int) -> SystemOver:
         """The system f_i = J nabla H_i = J A^i nabla H_0."""
         return self.f if i == 0 else self.hamiltonian_system(self.A_to(i))
 
@@ -411,7 +411,7 @@ class PaperObjects:
         """The associated system g = J B nabla H_0 = J nabla K."""
         return self.hamiltonian_system(B)
 
-    def g_(self, i: int) -> SystemOver:
+    def g_i(self, i: int) -> SystemOver:
         """Return g_i, the system associated to f by B_i."""
         return self.g(self.B(i))
 

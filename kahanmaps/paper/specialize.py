@@ -66,7 +66,7 @@ class MemberObjects(PaperObjects):
         gradient = self.member.hamiltonians[i].gradient
         return self.K.column([evaluate(component, self.K, x.entries()) for component in gradient])
 
-    def f_(self, i: int) -> SystemOver:
+    def f_i(self, i: int) -> SystemOver:
         """f_i from the library's chain."""
         return self.member.hamiltonians[i].system.over(self.K)
 

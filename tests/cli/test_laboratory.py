@@ -39,7 +39,7 @@ def test_what_seconds_stopped_says_so_and_nothing_is_begun_after_it(kahanmaps, m
 def test_p_sets_a_parameter_and_the_error_names_the_option_for_a_prime(kahanmaps):
     outcome = kahanmaps("cycles weierstrass -p 31")
     assert outcome.status == 2
-    assert "found '31', expected NAME=VALUE (the prime of cycles is --prime 31)" in outcome.err
+    assert "found '31', expected NAME=VALUE (for a prime use --prime 31)" in outcome.err
 
 
 def test_numbers_are_printed_per_time_and_per_step(kahanmaps):

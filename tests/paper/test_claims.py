@@ -143,14 +143,14 @@ def test_a_control_leaves_the_unbroken_objects_as_they_were():
 LETTERS = {
     "H_i": lambda o, i: o.H(o.x, i),
     "nabla H_i": lambda o, i: o.gradient_of_chain(i, o.x),
-    "f_i": lambda o, i: o.value(o.f_(i), o.x),
-    "f_i'": lambda o, i: o.jac(o.f_(i), o.x),
+    "f_i": lambda o, i: o.value(o.f_i(i), o.x),
+    "f_i'": lambda o, i: o.jac(o.f_i(i), o.x),
     "B_i": lambda o, i: o.B(i),
     "B_s": lambda o, i: o.B_signs([-1 if j <= i else 1 for j in o.each]),
     "x~": lambda o, i: o.step(o.f, o.x, times=i + 1),
-    "dPhi": lambda o, i: o.jacobian_of_step(o.f_(i), o.x),
+    "dPhi": lambda o, i: o.jacobian_of_step(o.f_i(i), o.x),
     "H~": lambda o, i: o.H_tilde(o.x),
-    "K~_i": lambda o, i: o.integral(o.g_(i), o.x),
+    "K~_i": lambda o, i: o.integral(o.g_i(i), o.x),
     "modified H": lambda o, i: o.modified_H(o.x),
     "Pi": lambda o, i: o.Pi(o.x),
 }

@@ -132,13 +132,13 @@ def test_a_claim_with_a_changed_side_fails_at_a_point(claim):
 
 SIGNS = {
     "(27) f'^T J = J f'": lambda o: [(o.df.transpose() * o.J, o.J * o.df)],
-    "(31) g' g = -f' f": lambda o: [(o.jac(o.g_(0), o.x) * o.value(o.g_(0), o.x), -(o.df * o.fx))],
+    "(31) g' g = -f' f": lambda o: [(o.jac(o.g_i(0), o.x) * o.value(o.g_i(0), o.x), -(o.df * o.fx))],
     "(46) with B_i for B_i^T": lambda o: [
         (o.df * o.df, o.sum([o.I * o.p0(o.x), *(o.B(i) * o.q(i, o.x) for i in o.each)]))
     ],
     "(94) nabla K~ = nabla H~": lambda o: [
         (
-            o.slope(lambda o, x: o.integral(o.g_(0), x), o.x, o.vector("v")),
+            o.slope(lambda o, x: o.integral(o.g_i(0), x), o.x, o.vector("v")),
             o.slope(lambda o, x: o.integral(o.f, x), o.x, o.vector("v")),
         )
     ],

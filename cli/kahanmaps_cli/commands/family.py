@@ -278,8 +278,8 @@ def associated(
           associated/paper_m3_irreducible-p-t.toml
 
     If a factor g of chi is irreducible of degree 2 or more, the list also contains the associated systems over Q[t]/g
-    whose sign at one root t of g differs from all other signs: systems with the parameter t, "root of g". All other
-    associated systems are conjugates of these, or belong to products of their matrices B_s.
+    whose sign at one root t of g differs from all other signs. Their files have the parameter t, with the value
+    "root of g". All other associated systems are conjugates of these, or belong to products of their matrices B_s.
     """
     file, member = _get_member(system, parameters)
     files: dict[str, lib.SystemFile] = {}
@@ -358,8 +358,8 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
           --algebra 't^2+1'
 
     A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A parameter t of
-    SYSTEM stands for the generator of K. If chi has degree m, each integral that SYSTEM claims gives m integrals of
-    the map over Q, and its density gives a density.
+    SYSTEM, whatever its value, stands for the generator of K. If chi has degree m, each integral that SYSTEM claims
+    gives m integrals of the map over Q, and its density gives a density.
     """
     output = None if output == "-" else output
     algebra_file, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)

@@ -29,7 +29,7 @@ from kahanmaps_cli.screen.progress import Progress
     click.option(
         "--steps", type=int, metavar="N", default=120, show_default=True, help="Number of steps of each orbit."
     ),
-    click.option("--original", metavar="X,Y", help="Add a panel of orbits in two variables."),
+    click.option("--original", metavar="X,Y", help="Add a panel of the orbits in two variables of SYSTEM."),
     click.option(
         "--projective", is_flag=True, help="Draw each projective plane as a disc whose rim is the line at infinity."
     ),

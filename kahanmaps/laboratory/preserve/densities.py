@@ -188,7 +188,8 @@ def find_densities(
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. The absence of densities up to a degree is measured.
+        A `DensitySearch`; formulas are exact, proved or supported. That there are no others up to a degree is
+        measured modulo primes, not proved.
 
     Raises:
         InputError: for unknown symbols, symbols in a [family] file, eps = 0, or a negative degree.

@@ -3,7 +3,7 @@
 The search looks modulo a prime for bilinear functions F_0, F_1, ... of (x, x^(k)) whose values along every orbit span a
 line or a plane (darboux_spaces.py), and interpolates these functions. For a line the ratios of the F are integrals, for
 a plane the ratios of 2 x 2 minors. The identity to be verified says that such a ratio I has the same value one step
-later. It is written with x in the middle of the orbit segment: I(x, x~) = I(x_, x), where x_ is the preimage of x,
+later. It is written with x in the middle of the orbit segment, as I(x, x~) = I(x_, x) with the preimage x_ of x. So it
 contains one step forward and one step backward instead of two forward, which keeps the expansion short.
 
 If there are affine integrals v.x, the search runs on their level sets v.x = c, which have fewer coordinates, so that

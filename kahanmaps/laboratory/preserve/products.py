@@ -214,7 +214,10 @@ class _Line:
 
 
 def _interpolate(function: Callable[[int], list[int]], max_degree: int, p: int) -> list[nmod_poly]:
-    """Interpolate the polynomials of degree at most `max_degree` with these values at t = 1, 2, ... Raises NoPoint."""
+    """Return the polynomials of degree at most `max_degree` with the values `function(t)` at t = 1, 2, ...
+
+    Raises NoPoint if too many of these points are indeterminacy points.
+    """
     nodes, rows, t, failure_count = list[int](), list[list[int]](), 0, 0
     while len(nodes) <= max_degree:
         t += 1

@@ -21,7 +21,8 @@ from kahanmaps.maps.implicit import MapFamily
 
 _TRIES = 200  # the number of random values of the free variables for which a root of the equations is tried
 _PRIMES = 40  # random primes that are tried for a member
-_HEIGHTS = (12, 120)  # of random values; the small height if an equation of higher degree must have a rational root
+_HEIGHT = 120  # of random values, if the equations are linear in their pivots
+_SMALL_HEIGHT = 12  # of random values, if an equation of higher degree must have a rational root
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
@@ -42,7 +43,8 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
         # Solve for the variable of smallest positive degree that is not the pivot of an earlier equation.
         degrees = [int(d) for d in equation.degrees()]
         pivots.append(min((k for k, d in enumerate(degrees) if d and k not in pivots), key=lambda k: degrees[k]))
-    height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
+    is_linear = all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))
+    height = _HEIGHT if is_linear else _SMALL_HEIGHT
     for _ in range(_TRIES if len(equations) < count else 1):
         count_work(10 + 20 * sum(map(len, equations)))
         points = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))

@@ -182,9 +182,9 @@ def linear_symmetries(
 ) -> Symmetries:
     """Find affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
-    The search covers the Lie algebra of affine symmetries, a scaling, and signed permutations of the variables or of
-    scaled variables, with a translation if needed (dimension at most 12). In dimension at most 3 it covers all rational
-    matrices, if the Lie algebra has no linear element.
+    The search covers the Lie algebra of affine symmetries, an affine field X with [X, f] = f (a scaling), and signed
+    permutations of the variables or of scaled variables, with a translation if needed (dimension at most 12). In
+    dimension at most 3 it covers all rational matrices, unless the Lie algebra contains a linear field x' = S x.
 
     Args:
         system: a quadratic system over Q.

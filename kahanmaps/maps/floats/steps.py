@@ -153,14 +153,14 @@ class FloatEquation(NamedTuple):
         for constants, entries in zip(self.constants, self.terms, strict=True):
             rows.append([sum((c * y[k] for k, c in terms), c0) for c0, terms in zip(constants, entries, strict=True)])
 
-        def bound() -> Any:
+        def entry_bound() -> Any:
             size: Any = 0.0
             for k in sorted({k for entries in self.terms for terms in entries[:n] for k, _ in terms}):
                 size = extreme("max", size, abs(y[k]))
             largest_sum = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
             return size * largest_sum + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
 
-        return solve(rows, bound, checks)
+        return solve(rows, entry_bound, checks)
 
 
 def float_equation(map_over: ElementaryMap) -> FloatEquation:

@@ -303,10 +303,10 @@ def _negation(x: Any) -> Any:
     return not x if isinstance(x, bool) else ~x
 
 
-def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
+def solve(rows: Sequence[Sequence[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
     """Write the solution y of M y = r, given the rows of (M | r); y is meaningless if M is singular.
 
-    `bound` returns an upper bound of the entries of M; only fast eliminations need it.
+    `entry_bound` returns an upper bound of the entries of M; only fast eliminations need it.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
@@ -345,7 +345,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
             checks.pivot(0.0, MIN_PIVOT_RATIO)
             continue
         block_rows = [[*(matrix[i].get(j, 0.0) for j in unknown_list), rhs[i]] for i in sorted(block)]
-        values = solve_two(block_rows, checks) if len(block_rows) == 2 else _eliminate(block_rows, bound, checks)
+        values = solve_two(block_rows, checks) if len(block_rows) == 2 else _eliminate(block_rows, entry_bound, checks)
         for j, value in zip(unknown_list, values, strict=True):
             solution[j] = value
     for i, j in reversed(solved_last):
@@ -374,8 +374,11 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
 
-def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
-    """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small."""
+def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
+    """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small.
+
+    `entry_bound` returns an upper bound of the entries of the matrix; only the fast version needs it.
+    """
     n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
     pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(pivots) < n:  # the matrix is singular at all points
@@ -407,7 +410,7 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChec
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
     if not checks.careful:
-        checks.good = checks.good & (smallest_pivot > MIN_PIVOT_RATIO * bound()) & (largest_factor <= MAX_FACTOR)
+        checks.good = checks.good & (smallest_pivot > MIN_PIVOT_RATIO * entry_bound()) & (largest_factor <= MAX_FACTOR)
     solution: list[Any] = [0.0] * n
     for (i, j), inverse in zip(reversed(pivots), reversed(inverses), strict=True):
         solution[j] = M[i][n] * inverse

@@ -20,7 +20,7 @@ from flint import acb, arb, fmpq_poly, fmpz
 from kahanmaps.algebra.elliptic_curves import MAX_BITS, EllipticCurve
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.integers import split_by_primes
-from kahanmaps.algebra.reduction import leading_coefficient
+from kahanmaps.algebra.reduction import norm_of_denominator
 from kahanmaps.errors import PrecisionLost
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
@@ -57,9 +57,9 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
 
     def uncertain_part(Q: Any) -> fmpz:
         """Return the part of the norm of R at the primes at which doubling Q cancels factors; 1 if there are none."""
-        # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
-        full_norm = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
-        cancelled_norm = full_norm / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
+        # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; `norm_of_denominator` gives norms of ideals.
+        full_norm = abs(K.norm(4 * Q[1] * Q[1])) * norm_of_denominator(Q[0]) ** 4
+        cancelled_norm = full_norm / norm_of_denominator(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
         return split_by_primes(norm, cancelled_norm.p)[1]
 
     multiples, Q = list[tuple[fmpz, int, Any]](), T
@@ -122,7 +122,7 @@ def _archimedean_height(x: Any, b: Any, resultant: Any) -> arb:
     K = x.field
     for bits in (1 << 9, 1 << 11, 1 << 13, MAX_BITS):
         with RR(bits).working():
-            total = arb(leading_coefficient(x)).log()
+            total = arb(norm_of_denominator(x)).log()
             for root, _ in K.chi.complex_roots():
                 X, b2, b4, b6, b8, R = (value_at_root(element, acb(root)) for element in (x, *b, resultant))
                 Z, scale = acb(1), arb(1)

@@ -291,10 +291,10 @@ def fields_associated_to_an_associated_one(o: PaperObjects) -> Pairs:
     """These three fields are associated to g_i for m = 3
     B_1^T g_1 = f_0, B_2^T g_1 = -g_3, B_3^T g_1 = -g_2"""
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        g = o.value(o.g_(i), o.x)
+        g = o.value(o.g_i(i), o.x)
         yield o.B(i).transpose() * g, o.fx
-        yield o.B(j).transpose() * g, -o.value(o.g_(k), o.x)
-        yield o.B(k).transpose() * g, -o.value(o.g_(j), o.x)
+        yield o.B(j).transpose() * g, -o.value(o.g_i(k), o.x)
+        yield o.B(k).transpose() * g, -o.value(o.g_i(j), o.x)
 
 
 @claim("Lemma 8 (46)", "f'f' thru B", "H B")
@@ -322,7 +322,7 @@ def mixed_traces(o: PaperObjects) -> Pairs:
     """The two forms of q_i agree
     q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')"""
     for i in o.tested_indices:
-        yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_(i), o.x)) * o.number(1, 8)
+        yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_i(i), o.x)) * o.number(1, 8)
 
 
 @claim("Lemma 8 (49)", "char pol f'-g'", "f roots")
@@ -331,7 +331,7 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
     det(t I - (f_0'-g_i')) = t^{2m} - 1/2 t^{2m-2} tr (f_0'-g_i')^2"""
     t = o.scalar("t")
     for i in o.tested_indices:
-        difference = o.df - o.jac(o.g_(i), o.x)
+        difference = o.df - o.jac(o.g_i(i), o.x)
         t_power = o.K.one
         for _ in range(2 * o.m - 2):
             t_power = t_power * t
@@ -345,7 +345,7 @@ def cayley_hamilton(o: PaperObjects) -> Pairs:
     """f_0' - g_i' satisfies its characteristic equation (Cayley-Hamilton)
     (f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0"""
     for i in o.tested_indices:
-        difference = o.df - o.jac(o.g_(i), o.x)
+        difference = o.df - o.jac(o.g_i(i), o.x)
         square = difference * difference
         power = o.power(square, o.m - 1)
         yield power * square, power * (o.trace(square) * o.number(1, 2))

@@ -51,7 +51,7 @@ def linear_flows(o: PaperObjects) -> Pairs:
         E = o.projector(i).transpose()
         f_in_plane = o.value(o.f, E * o.x)
         for k in range(o.m):
-            yield E * o.value(o.f_(k), o.x), f_in_plane * o.lam[i] ** k
+            yield E * o.value(o.f_i(k), o.x), f_in_plane * o.lam[i] ** k
 
 
 @claim("Level varieties of the flow", "", "inhomogeneous", blockwise=True)

@@ -131,7 +131,7 @@ def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
     for i in o.tested_indices:
         j, k = (other for other in o.each if other != i)
         right = P_times(o, K[i]) - factor * Q[i] * o.H(o.x) + factor * Q[j] * K[k] + factor * Q[k] * K[j]
-        yield o.integral(o.g_(i), o.x), right
+        yield o.integral(o.g_i(i), o.x), right
 
 
 @claim("(107)", "tK thru H K", "H B")
@@ -143,7 +143,7 @@ def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
         right = P_times(o, o.Kf(o.B(i), o.x))
         for j in o.each:
             right = right - factor * o.Q(j, o.x) * o.Kf(o.B(i) * o.B(j), o.x)
-        yield o.integral(o.g_(i), o.x), right
+        yield o.integral(o.g_i(i), o.x), right
 
 
 @claim("Lemma 17 (108)", "grads PQ", "H B")
@@ -190,7 +190,7 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
         right = right - eps_squared * (Q[j] * dK[k] + K[j] * dQ[k])
         right = right - eps_squared * (Q[k] * dK[j] + K[k] * dQ[j])
         yield left, right
-        yield right, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
+        yield right, o.slope(lambda o, x: o.integral(o.g_i(i), x), o.x, v) * o.number(-1, 6)
 
 
 @claim("Theorem 15, proof", "", "B", only_m=3)

@@ -21,7 +21,7 @@ def H_tilde_is_shared(o: PaperObjects) -> Pairs:
 def K_tilde_is_shared(o: PaperObjects) -> Pairs:
     """Every K~ is an integral of f and of every single-index g_i: the class shares m independent ones
     K~(x~) = K~(x), K~(x^) = K~(x)"""
-    images = [o.x_tilde, *(o.step(o.g_(i), o.x) for i in o.each)]
+    images = [o.x_tilde, *(o.step(o.g_i(i), o.x) for i in o.each)]
     for B in o.associates():
         for image in images:
             yield o.integral(o.g(B), image), o.integral(o.g(B), o.x)
@@ -39,7 +39,7 @@ def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
     """Two integrals of a pair f, g are independent; the class has exactly m independent ones
     rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
-    gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
+    gradients += [o.gradient(lambda o, x: o.integral(o.g_i(i), x), o.x) for i in o.each]
     if o.m > 1:
         for gradient in gradients[1:]:
             yield o.rank(o.columns([gradients[0], gradient])), 2
@@ -74,7 +74,7 @@ def terms_of_the_series(o: PaperObjects) -> Pairs:
 def series_of_the_integrals(o: PaperObjects) -> Pairs:
     """H~ and K~ have these series up to the requested order, with the exact remainder
     H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})"""
-    for g in [o.f, *(o.g_(i) for i in o.each)]:
+    for g in [o.f, *(o.g_i(i) for i in o.each)]:
         jacobian = o.jac(g, o.x)
         square, squared_eps = jacobian * jacobian, o.eps * o.eps
         vector, eps_power, total = jacobian * o.x, o.K.one, o.K.zero
@@ -224,4 +224,4 @@ def even_terms(o: PaperObjects) -> Pairs:
 def sum_of_the_integrals(o: PaperObjects) -> Pairs:
     """The K~_i satisfy the sum rule; for m = 3 their sum is H~
     sum K~_i = (m-2) H~"""
-    yield o.sum([o.integral(o.g_(i), o.x) for i in o.each]), o.H_tilde(o.x) * o.number(o.m - 2)
+    yield o.sum([o.integral(o.g_i(i), o.x) for i in o.each]), o.H_tilde(o.x) * o.number(o.m - 2)

@@ -91,7 +91,7 @@ def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
 def maps_of_the_chain_do_not_commute(o: PaperObjects) -> Pairs:
     """In general the maps of J nabla H_0 and J nabla H_1 do not commute
     Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}"""
-    f, g = o.f, o.f_(1)
+    f, g = o.f, o.f_i(1)
     yield o.step(g, o.step(f, o.x)), o.step(f, o.step(g, o.x))
 
 
@@ -140,7 +140,7 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
     differ, or agree; so all are different, up to sign, if no part of f vanishes, that is, if g_i != f for all i.
     """
     for i in o.each:
-        yield o.value(o.g_(i), o.x), o.fx
+        yield o.value(o.g_i(i), o.x), o.fx
 
 
 @claim(
@@ -172,7 +172,7 @@ def integrals_are_in_involution(o: PaperObjects) -> Pairs:
     """The integrals are in involution with respect to the invariant symplectic structure
     {K~_i, K~_j} = 0 for the bracket of Pi"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
-    gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
+    gradients += [o.gradient(lambda o, x: o.integral(o.g_i(i), x), o.x) for i in o.each]
     for k, gradient_1 in enumerate(gradients):
         for gradient_2 in gradients[:k]:
             yield o.dot(gradient_1, o.Pi(o.x) * gradient_2), o.K.zero

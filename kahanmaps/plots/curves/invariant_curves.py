@@ -219,7 +219,11 @@ def _compute_orbit(
 
 
 def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> PlaneCubic:
-    """Return the cubic through the initial point, its numerator and denominator scaled: the larger one is 1 or -1."""
+    """Return the cubic through the initial point.
+
+    It is the level of the integral h/(1 + eps^2 D) with the value `numerator`/`denominator`. These two are scaled: the
+    larger one is 1 or -1 (both are 0 at a base point).
+    """
     U, V, W = initial_triple
     time_step = 2 * arb(eps)
     u, v = U / W / time_step, V / W / time_step
@@ -230,9 +234,9 @@ def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> 
     numerator, denominator = (float(value / scale) if scale > 0 else 0.0 for value in fraction)
     a, b, c, d = (entry.real for entry in frame.h)
     cubic = PlaneCubic((a, b, c, d), float(arb(eps)), numerator, denominator)
-    distances = float(abs(u)), float(abs(v))
-    largest = max(*map(abs, frame.h), *distances, cubic.length)
-    smallest = min(cubic.length, max(distances) or cubic.length)
+    coordinate_sizes = float(abs(u)), float(abs(v))
+    largest = max(*map(abs, frame.h), *coordinate_sizes, cubic.length)
+    smallest = min(cubic.length, max(coordinate_sizes) or cubic.length)
     if not 1 / _MAX_COORDINATE < smallest <= largest < _MAX_COORDINATE:
         raise InputError(
             f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "

@@ -131,6 +131,7 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
             free.append(j)
     coordinates = fmpq_mat([*rows[len(integrals) :], *rows[: len(integrals)]])  # (y, z) as forms of x
     inverse = coordinates.inv()
+    # The columns of the inverse that belong to y and to z: x = section y + shift z.
     section, shift = (
         fmpq_mat(n, len(columns), [inverse[i, j] for i in range(n) for j in columns])
         for columns in (range(len(free)), range(len(free), n))

@@ -178,8 +178,8 @@ def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) 
 def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
     """Return the H with grad_y H = K f_y and H = 0 for y = 0.
 
-    H(x) is the integral of y . K f_y along the segment from x - S y, where y = 0, to x. The integrand is a polynomial
-    of degree 2 in the parameter of the segment, so Simpson's rule is exact.
+    With S = `quotient.section`, H(x) is the integral of y . K f_y along the segment from x - S y, where y = 0, to x.
+    The integrand is a polynomial of degree 2 in the parameter of the segment, so Simpson's rule is exact.
     """
     context = ring(system.variables)
     gens = context.gens()
