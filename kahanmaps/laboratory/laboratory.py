@@ -79,7 +79,7 @@ Spaces = Sequence[DarbouxSpace]
 
 @dataclass(frozen=True)
 class ClosedForms:
-    """Bases of spaces as polynomials in the variables, the symbols and eps, or None with a reason."""
+    """Bases of spaces as polynomials in the variables, the symbols and eps, or None and the reason why."""
 
     bases: list[list[fmpq_mpoly]] | None
     reason: str = ""
@@ -88,7 +88,7 @@ class ClosedForms:
 class Laboratory:
     """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (half the time step, exact) both reductions are at that eps. With `flow` they are reductions of the flow:
+    If `eps` (half the time step, exact) is given, both reductions are at it. If `flow` is True, the flow is reduced:
     for an adjusted Kahan map of the field at eps = 0, and for a polarised map `map` is then x + eps f. If `algebraic`
     and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
 
@@ -259,7 +259,7 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Certify that the map preserves I or dx/phi, as the function `verdict_on` does; for a flow, by expansion.
+        """Decide whether the map preserves I = `function`, or dx/phi, as `verdict_on` below; for a flow, by expansion.
 
         A function is not expanded if an earlier one with at most as many terms was too long to expand.
         """

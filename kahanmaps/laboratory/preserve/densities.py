@@ -58,7 +58,7 @@ class FoundDensity(FoundFunction):
     product: str = ""
 
     def degree(self, dim: int) -> int:
-        """The larger of the degrees of numerator and denominator in the variables."""
+        """The larger of the degrees of numerator and denominator of phi in the variables."""
         return max(degree_in(polynomial, dim) for polynomial in (self.function.numerator, self.function.denominator))
 
     @property
@@ -188,7 +188,7 @@ def find_densities(
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. The absence of densities up to a degree is measured.
+        A `DensitySearch`; formulas are exact, proved or supported. That there are none is only measured.
 
     Raises:
         InputError: for unknown symbols, symbols in a [family] file, eps = 0, or a negative degree.

@@ -53,8 +53,8 @@ from kahanmaps.maps.implicit import MapFamily
 class RatioOfIterates:
     """A function I of an orbit segment: the ratio of two `functions` or, for rank 2, of two minors of them.
 
-    The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `numerator` and
-    `denominator` are indices into `functions`: one index a for F_a, two indices a, b for F_a F_b~ - F_b F_a~.
+    The functions F_a are polynomials in (variables, variables of the k-th iterate, symbols, eps), F_a~ is F_a one step
+    later. `numerator` and `denominator` are indices: one index a stands for F_a, two for F_a F_b~ - F_b F_a~.
     """
 
     two_point_basis: TwoPointBasis

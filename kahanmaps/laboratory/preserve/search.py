@@ -176,7 +176,7 @@ def repeat_search(
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NO_BRANCHES,
 ) -> SpaceSearch | None:
-    """Repeat the steps of a search on another map; return None if its spaces have other zero patterns (special values).
+    """Repeat the steps of a search on another map; return None if the spaces there have other zero patterns.
 
     `reference` is the prime of the given search. Spaces with the same zero pattern are in any order unless `branches`
     has an entry for them.

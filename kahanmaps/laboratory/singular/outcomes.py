@@ -63,7 +63,7 @@ FIRST_STEPS = 12  # the number of steps that are printed
 class CriticalPoint:
     """A point modulo p at which the differential degenerates, with its multiplicity as a zero of E and the gradient.
 
-    For a pole, E stands for det(I - eps f').
+    E is det M' at the image, where M' is the matrix of the inverse map. For a pole, E stands for det(I - eps f').
     """
 
     point: tuple[int, ...]

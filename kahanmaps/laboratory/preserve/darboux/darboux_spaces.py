@@ -51,7 +51,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span
 
 _SPARE = 8  # points beyond the number of unknowns
 _MAX_MATRICES = 12  # antisymmetric matrices A that are used
-# Bounds of s = dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
+# Bounds of the number s of rows of A: its s (s - 1)/2 unknown entries take 0.2 seconds for s = 30, 10 for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
 TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
 
@@ -412,7 +412,7 @@ class TwoPointMap(ModularMap):
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values at a point and at its image, times the two `factors`."""
+        """Return the values of the basis at a point, times factors[0], and at its image, times factors[1]."""
         points = [x, image]
         while len(points) < self.two_point_basis.shift + 2:
             next_point = self.step(points[-1])
