@@ -44,7 +44,7 @@ class Census(PrintableResult):
     each period to the number of sampled points with this period. `indeterminate` counts points at which the map is not
     defined, `pre_indeterminate` points whose orbit reaches such a point, `preperiodic` points whose orbit reaches a
     cycle on which they do not lie, and `open` sampled points whose orbit was not decided within `steps` steps.
-    `stopped` is True if a time limit ended the work. In a complete count without all images `examined` is then 0.
+    `stopped` is True if a time limit ended the work. If all points were still being mapped, `examined` is 0.
     """
 
     prime: int

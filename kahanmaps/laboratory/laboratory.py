@@ -88,7 +88,7 @@ class ClosedForms:
 class Laboratory:
     """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    If `eps` (half the time step, exact) is given, both reductions are at it. If `flow` is True, the flow is reduced:
+    If `eps` (half the time step, exact) is given, both are at this eps. If `flow` is True, the flow is reduced instead:
     for an adjusted Kahan map of the field at eps = 0, and for a polarised map `map` is then x + eps f. If `algebraic`
     and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
 

@@ -188,7 +188,7 @@ def find_densities(
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. That there are none is only measured.
+        A `DensitySearch`; formulas are exact, proved or supported. That a degree has no density is measured.
 
     Raises:
         InputError: for unknown symbols, symbols in a [family] file, eps = 0, or a negative degree.

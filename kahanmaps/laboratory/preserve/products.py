@@ -389,7 +389,7 @@ def _build_products(
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are the vectors with constant 1; `densities` are pairs of c = 1 or -1 and the vectors for it.
+    `constant_one` are the vectors with constant 1; `densities` are pairs of a constant, 1 or -1, and its vectors.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []

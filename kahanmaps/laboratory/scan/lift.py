@@ -52,7 +52,7 @@ def lift_linear(
 ) -> dict[RationalRows, tuple[int, ...]]:
     """Return the affine subspaces over Q, as reduced rows, whose residues occur modulo the primes, with these primes.
 
-    A subspace must occur modulo all primes (all but one up to height 12) or, if `everywhere` is False, three.
+    A subspace must occur modulo all primes (all but one up to height 12); if `everywhere` is False, three suffice.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lift_linear(modulo)

@@ -76,10 +76,10 @@ def critical_points(
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """Return the critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
-    `equations` are the equations of the factors of the map over the field, linear in the point, and `inverses` the
-    equations of their inverses; for several factors E is the product of the E of all factors. Without inverses det M
-    replaces E, and the points are the poles that are not at infinity. Returns the points and, for each multiplicity,
-    the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
+    `equations` are the equations of the factors of the map over GF(p), linear in the point, and `inverses` those of the
+    inverse maps. E is the product of det M' at the images, for the matrices M' of the inverse maps. Without inverses
+    det M replaces E, and the points are the poles that are not at infinity. Returns the points and, for each
+    multiplicity, the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))

@@ -39,7 +39,7 @@ _NAMES_BY_DIMENSION = {1: "line", 2: "plane"}
 
 @dataclass(frozen=True)
 class FixedPoints(ResultPart):
-    """A set of fixed points: `coordinates` are functions of some of the variables, on which `equations` hold.
+    """A set of fixed points: `coordinates` are functions of some variables, and these variables satisfy `equations`.
 
     `dimension` is the dimension of the set, `count` the number of its points over the complex numbers (None: infinitely
     many); `eigenvalues` is the characteristic polynomial of f' there; its coefficients may contain these variables.

@@ -57,7 +57,7 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Exact affine Darboux functions; if it is unknown whether they are all over Q (not `complete`), with the `reason`.
+    """Exact affine Darboux functions. `complete`: whether they are all over Q; if this is unknown, `reason` says why.
 
     Constants and the affine integrals (cofactor 0) are left out. A `complete` list is wrong only if the random line of
     the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, this
