@@ -248,7 +248,7 @@ class _Account:
         return result, reason, budget.spent
 
     def book(self, step: AnalysisStep, spent: int) -> None:
-        """Remove a completed step from the pending ones, and subtract the units that the step took."""
+        """Remove a completed step from the pending ones, and subtract the units that it took from the budget."""
         self.waiting.remove(step)
         self.units -= spent
 

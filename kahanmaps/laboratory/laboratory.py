@@ -93,7 +93,7 @@ class Laboratory:
     and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
 
     `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
-    `field` is the system or, with `flow`, the field of any degree. `free_symbols` are the symbols with random values.
+    `field` is the system or, for a flow, its field of any degree. `free_symbols` are the symbols with random values.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -376,7 +376,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     if root is None:
         return reconstruct(black_box, names, **options)
     m = root.degree
-    assert m <= MAX_DEGREE  # suitable primes are too rare for larger degrees, which Laboratory refuses
+    assert m <= MAX_DEGREE  # for larger degrees suitable primes are too rare; Laboratory refuses them
 
     def draw_splitting_prime(rng: random.Random) -> int:
         while True:
@@ -546,7 +546,7 @@ def verdict_on(
     n, root = map_.dim, map_.root
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q; for a density, multiplied by the sides of det dPhi(x)."""
+        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times denominator and numerator of det dPhi."""
         x, symbols = point[:n], point[n:]
         map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)

@@ -44,7 +44,7 @@ class Ended(StrEnum):
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, but not all singularity patterns have settled
     TERMS = "terms"  # the requested number of terms was computed
     BUDGET = "budget"  # the budget was spent
-    STOPPED = "stopped"  # a TimeLimit stopped it
+    STOPPED = "stopped"  # a TimeLimit stopped the computation
     DEGREE = "degree"  # the next degree exceeds the limit
     CONSTANT = "constant"  # the iterate is a constant map
     SINGULAR = "singular"  # the next iterate is nowhere defined

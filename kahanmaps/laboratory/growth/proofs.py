@@ -87,7 +87,7 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
         if len(rows_by_variable) < n:
             return None
         product = fmpz_mat([rows_by_variable[j] for j in range(n)]) * product
-    return None if product.det() == 0 else product  # it is singular only at special eps
+    return None if product.det() == 0 else product  # the matrix is singular only at special eps
 
 
 def monomial_degree(matrix: fmpz_mat) -> int:

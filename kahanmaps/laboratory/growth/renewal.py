@@ -109,7 +109,7 @@ def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
     >>> needed_hypersurfaces([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))]) is None
     True
     """
-    # Each hypersurface, followed by those onto which it is mapped, in this order.
+    # Each hypersurface, followed by those onto which later iterates map it, in this order.
     chains = [[k] for k in range(len(patterns))]
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:

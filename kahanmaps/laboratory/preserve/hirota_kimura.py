@@ -401,7 +401,7 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leading = []  # leading monomials of relations of lower degree, which imply the relations of their multiples
+    leading = []  # monomials: relations of lower degree with these leading monomials imply those of their multiples
     if degree > 1:
         lower_exponents = _descending_exponents(maps[0].dim, degree - 1)
         leading = [

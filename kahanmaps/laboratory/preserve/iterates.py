@@ -272,7 +272,7 @@ def _bilinear_function(P: fmpq_mpoly, two_point_basis: TwoPointBasis, map_: MapF
 
 
 def _restrict_map(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
-    """Restrict the map to level sets of its affine integrals, whose values become symbols.
+    """Restrict the map to level sets of its affine integrals; the values of these integrals become symbols.
 
     Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result, or
     None if there are no affine integrals or fewer than two coordinates remain.

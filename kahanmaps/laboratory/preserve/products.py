@@ -129,7 +129,7 @@ def _irreducible_factors(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | 
 
 @counted_cache(4)  # may take half a second; the searches for integrals and for densities call it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, has_map_itself: bool) -> dict[str, fmpq_mpoly]:
-    """Return the factors of numerator and denominator of det dPhi^-1 and, with `has_map_itself`, of det dPhi."""
+    """Return the factors of numerator and denominator of det dPhi^-1 and, if `has_map_itself`, also of det dPhi."""
     n, fractions = map_.dim, list[Function]()
     for is_inverse in (False, True) if has_map_itself else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
@@ -295,7 +295,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
 
 
 def _reduce_basis(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
-    """Return a short basis (LLL) of the lattice of the vectors; for the length entry i is multiplied by weights[i]."""
+    """Return a basis (LLL) of the lattice of the vectors, short if entry i of a vector is multiplied by weights[i]."""
     if not vectors:
         return []
     reduced_rows = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()

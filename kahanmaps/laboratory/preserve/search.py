@@ -69,7 +69,7 @@ _SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction o
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern: their coefficients at `position` differ, and that of the space i is `roots[i]`."""
+    """Spaces of one zero pattern that differ in the coefficient at `position`; for the i-th space it is `roots[i]`."""
 
     position: tuple[int, int]
     roots: tuple[RationalFunction, ...]

@@ -110,7 +110,7 @@ _PRECISION = 8  # of the series for the orders before the first step
 _BITS = 31  # of primes; for larger primes python-flint does not order the factors of multivariate polynomials
 
 
-Key = tuple[Any, ...]  # whether it is contracted; the orders in the poles, in Z and in all forms; its first rows
+Key = tuple[Any, ...]  # of a hypersurface: contracted or not; orders in the poles, in Z and in all forms; first rows
 
 
 class OrbitDataUnknown(ArithmeticError):

@@ -60,7 +60,7 @@ class OrbitData:
 
     @property
     def compared(self) -> tuple[object, ...]:
-        """The data that must be equal for two points on one hypersurface."""
+        """The rows and other data that must agree for two points on one hypersurface."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property

@@ -63,7 +63,7 @@ FIRST_STEPS = 12  # the number of steps that are printed
 class CriticalPoint:
     """A point modulo p at which the differential degenerates, with its multiplicity as a zero of E and the gradient.
 
-    E is det M' at the image, where M' is the matrix of the inverse map. For a pole, E stands for det(I - eps f').
+    E is det M' at the image, M' the matrix of the inverse map; for a pole E is det M, for Kahan maps det(I - eps f').
     """
 
     point: tuple[int, ...]
@@ -365,7 +365,7 @@ def outcomes_of_points(
 ) -> list[Hypersurface]:
     """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.
 
-    At one exact `eps` (half the time step), on lines modulo random primes. With `poles` the poles are returned, and
+    At one exact `eps` (half the time step), on lines modulo random primes. If `poles` is True, the poles are returned,
     otherwise all exceptional hypersurfaces except poles and infinity. If no point with some multiplicity was found, a
     hypersurface of this multiplicity is returned as undecided. Source: zander-2021.
     """

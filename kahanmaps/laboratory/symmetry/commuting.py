@@ -63,7 +63,7 @@ MAX_SPACE = 24  # dimension l: the cubic equations have up to C(l + 2, 3) + l te
 
 @dataclass(frozen=True)
 class CommutingField(ResultPart):
-    """A system g whose Kahan map commutes with that of f, the matrix B if g = B f is required, and the verdict.
+    """A system g whose Kahan map commutes with that of f, the verdict, and the matrix B with g = B f if required.
 
     `trivial` is "0", "f" or "-f" if g is one of these, else empty.
     """

@@ -143,7 +143,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
 
 
 def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
-    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)); if it is too large, det dPhi."""
+    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)); only det dPhi if it is too large."""
     n = map_.dim
     D = determinant_polynomial(map_)
     if D is None:

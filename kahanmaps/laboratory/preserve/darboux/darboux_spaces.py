@@ -212,7 +212,7 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
         blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_MATRICES)]
     rows = []
     count_work(n**3 + n**4 / 100)
-    for A in blocks[:2]:  # two A leave few E with E A = A E^T, which are then restricted by the other A
+    for A in blocks[:2]:  # two A leave few E with E A = A E^T; the other A then restrict these E
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -244,7 +244,7 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
 
 
 def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
-    """Return the row space of the combination sum c_s A_s of rank 2 of few matrices A_s, if there is exactly one.
+    """Return the row space of the only combination sum c_s A_s of rank 2 of few matrices A_s; [] if it is not unique.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
     symmetric matrices that all these forms annihilate are the multiples of c c^T.
@@ -401,7 +401,7 @@ class TwoPointMap(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return the values along an orbit, its first point, and its period (None if the orbit does not close)."""
+        """Return the values of the basis along an orbit, its first point, and its period (None if it is too long)."""
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         is_closed = len(points) < count + shift
         shifted_points = points[shift % len(points) :] + (points[: shift % len(points)] if is_closed else [])
