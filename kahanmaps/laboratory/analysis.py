@@ -211,7 +211,7 @@ def analyze(
                     outcome = connection.recv()
             account = accounts[step.is_independent]
             result, reason, spent = outcome or account.run(step)
-            account.book(step, spent)  # includes the forked process, whose remaining steps this one may have to run
+            account.book(step, spent)  # also for forked steps: this process may have to run the rest of them
             analysis.units += spent
             if reason:
                 skip_messages[step.name] = f"{step.name}: {reason}"
@@ -248,7 +248,7 @@ class _Account:
         return result, reason, budget.spent
 
     def book(self, step: AnalysisStep, spent: int) -> None:
-        """Remove a completed step from the pending ones, and subtract the units that the step took."""
+        """Remove a completed step from the pending ones, and subtract the units that it took from the budget."""
         self.waiting.remove(step)
         self.units -= spent
 

@@ -85,7 +85,7 @@ class AnalysisResult:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates of `normal_form`; None without it, or if the Hamiltonian has no centre."""
+        """The origin of the coordinates of `normal_form`; None without a normal form or a centre of the Hamiltonian."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
         return None if self.normal_form is None else (fmpq(0),) * self.dim

@@ -176,7 +176,7 @@ def _if_entropy_positive(facts: _Facts) -> _Verdict | None:
 
 
 def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
-    """Return the verdict on a map whose orbits lie on curves; unproved integrals count only for unknown growth."""
+    """Return the verdict on a map with orbits on curves; unproved integrals count only if the growth is unknown."""
     result, proved_count = facts.result, 0  # the number of independent integrals that are proved
     if result.integrals is not None:
         proved_count = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
@@ -202,7 +202,7 @@ def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
 def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
     """Return the verdict that follows from exponential or polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals_text
-    is_exponential = facts.growth is Growth.EXPONENTIAL  # if not, the text says that the growth is estimated
+    is_exponential = facts.growth is Growth.EXPONENTIAL  # if False, exponential growth is only estimated
     if is_exponential or (facts.degrees is not None and facts.degrees.looks_exponential):
         clause = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
         growth = f"{facts.growth_text}{facts.basis_text if is_exponential else ''}"

@@ -30,7 +30,7 @@ from kahanmaps.maps.projective import homogeneous_map
 
 MAX_POINTS = 2_000_000  # in a space that is examined completely, up to dimension 6; halved for each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
-MAX_DIMENSION = 12  # the minors at the points are up to 2^(n + 1) arrays
+MAX_DIMENSION = 12  # in dimension n the minors at the points fill up to 2^(n + 1) arrays
 MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
 DEFAULT_SAMPLES, MAX_SAMPLES, DEFAULT_STEPS = 500, 100_000, 10_000
 DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3", "5", "4", "6")
@@ -40,11 +40,11 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 class Census(PrintableResult):
     """The orbits of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
 
-    `lengths` maps each length to the number of cycles if all points were followed (`complete`), and otherwise each
-    period to the number of sampled points with this period. A point is `indeterminate` where the map is not defined,
-    `pre_indeterminate` if its orbit reaches such a point, `preperiodic` if its orbit reaches a cycle on which it does
-    not lie, and `open` if its orbit was not decided within `steps` steps (samples only). If a time limit `stopped` the
-    work before the images of all points were known, `examined` is 0.
+    `lengths` maps each length to the number of cycles if `complete` is True (all points were followed), and otherwise
+    each period to the number of sampled points with this period. `indeterminate` counts points at which the map is not
+    defined, `pre_indeterminate` points whose orbit reaches such a point, `preperiodic` points whose orbit reaches a
+    cycle on which they do not lie, and `open` sampled points whose orbit was not decided within `steps` steps.
+    `stopped` is True if a time limit ended the work. If all points were still being mapped, `examined` is 0.
     """
 
     prime: int

@@ -79,7 +79,7 @@ Spaces = Sequence[DarbouxSpace]
 
 @dataclass(frozen=True)
 class ClosedForms:
-    """Bases of spaces as polynomials in the variables, the symbols and eps, or None with a reason."""
+    """Bases of spaces as polynomials in the variables, the symbols and eps, or None and the reason why."""
 
     bases: list[list[fmpq_mpoly]] | None
     reason: str = ""
@@ -88,12 +88,12 @@ class ClosedForms:
 class Laboratory:
     """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (half the time step, exact) both reductions are at that eps. With `flow` they are reductions of the flow:
+    If `eps` (half the time step, exact) is given, both are at this eps. If `flow` is True, the flow is reduced instead:
     for an adjusted Kahan map of the field at eps = 0, and for a polarised map `map` is then x + eps f. If `algebraic`
     and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
 
     `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
-    `field` is the system or, with `flow`, the field of any degree. `free_symbols` are the symbols with random values.
+    `field` is the system or, for a flow, its field of any degree. `free_symbols` are the symbols with random values.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -259,7 +259,7 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Certify that the map preserves I or dx/phi, as the function `verdict_on` does; for a flow, by expansion.
+        """Decide whether the map preserves I = `function`, or dx/phi, as `verdict_on` below; for a flow, by expansion.
 
         A function is not expanded if an earlier one with at most as many terms was too long to expand.
         """
@@ -376,7 +376,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     if root is None:
         return reconstruct(black_box, names, **options)
     m = root.degree
-    assert m <= MAX_DEGREE  # suitable primes are too rare for larger degrees, which Laboratory refuses
+    assert m <= MAX_DEGREE  # for larger degrees suitable primes are too rare; Laboratory refuses them
 
     def draw_splitting_prime(rng: random.Random) -> int:
         while True:
@@ -546,7 +546,7 @@ def verdict_on(
     n, root = map_.dim, map_.root
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q; for a density, multiplied by the sides of det dPhi(x)."""
+        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times denominator and numerator of det dPhi."""
         x, symbols = point[:n], point[n:]
         map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)

@@ -125,7 +125,7 @@ class ModularMap:
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values of all monomials up to a degree at a point and at its image, times the two `factors`."""
+        """Return the values of all monomials up to a degree: at x times factors[0], at the image times factors[1]."""
         layers, p = _layers(self.dim, degree), self.prime
         return _layered_values(x, layers, p, factors[0]), _layered_values(image, layers, p, factors[1])
 
@@ -185,7 +185,7 @@ class ModularFlow(ModularMap):
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values of all monomials P up to a degree and of P + f . grad P, times the two `factors`."""
+        """Return the values at x of all monomials P, times factors[0], and of all P + f . grad P, times factors[1]."""
         p = self.prime
         values = monomial_values(x, degree, p)
         count_work(len(values) * self.dim / 4)

@@ -60,7 +60,7 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield formulas, measurements and relations along orbits, and the level curves of a planar integral."""
+    """Yield statements on integrals, on relations along orbits, and on the level curves of a planar integral."""
     if (search := result.integrals) is not None:
         for integral in search.integrals:
             yield Statement(integral.verdict, f"{integral.name} = {integral.short_text}  [{integral.origin}]")
@@ -185,7 +185,7 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the verdict on the singularities, and the longest confined pattern, if all values of eps agree."""
+    """Yield the verdict on the singularities and the longest confined pattern; if verdicts differ, that they do."""
     if not result.singularities:
         return
     verdicts = {run.verdict for run in result.singularities}

@@ -42,8 +42,8 @@ class AnalysisStep:
     title: str = ""
     statements: Callable[[Any], Iterable[Statement]] | None = None
     applies_to: MapKinds = MapKinds.VECTOR_FIELDS
-    weight: float = 0.1  # its share of the budget, relative to the weights of the other steps
-    key: str = ""  # of the result; by default the name of the step
+    weight: float = 0.1  # the share of the step in the budget, relative to the weights of the other steps
+    key: str = ""  # the key of the result; by default the name of the step
     requires: tuple[str, ...] = ()
     # Above this dimension the step is slow: it runs last, with a quarter of its weight; no other step uses its result.
     slow_above: float = inf

@@ -41,7 +41,7 @@ _POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities; in h
 
 
 def _find_normal_form(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form of a member of the commuting family, in coordinates with the centre as origin."""
+    """Return the normal form of a member of the commuting family, with the centre of its Hamiltonian as origin."""
     structures = context.result.hamiltonian
     if structures is None or structures.hamiltonian is None:
         return system_normal_form(context.field)
@@ -52,7 +52,7 @@ def _find_normal_form(context: AnalysisContext, **_: Any) -> SystemNormalForm | 
 
 
 def _normal_form_json(result: AnalysisResult) -> dict[str, Any]:
-    """Return the structure of a member of the commuting family: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
+    """Return data on a member f = J grad H of the commuting family: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
     data = None
     if isinstance(result.normal_form, SystemNormalForm):
         form = result.normal_form.form
@@ -76,7 +76,7 @@ def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable
 def _measure_degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
     """Return the degrees of the iterates, derived from the singularity patterns if these are known."""
     singularity_runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
-    # Used only if known for all steps, and thus equal to the patterns that `degree_growth` would compute.
+    # Only patterns that are known for all steps are passed on: `degree_growth` would compute the same ones.
     computed_patterns = patterns_of(singularity_runs) if singularity_runs else None
     patterns = None if computed_patterns is None or computed_patterns.running else computed_patterns
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
@@ -91,7 +91,7 @@ def _find_pencil(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil |
 
 
 def _pencil_json(result: AnalysisResult) -> dict[str, Any]:
-    """Return the curves and the action of the map on them; null if the degrees contradict the curves."""
+    """Return the invariant curves and the action of the map on them; None if the degrees exclude such curves."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     if result.pencil is None or result.pencil.contradiction(growth):
         return {"invariant_curves": None}
@@ -154,7 +154,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "a larger algebra",
-        # An algebra larger than Q over which f is defined, unless f has a normal form, which says more.
+        # An algebra larger than Q over which f is defined; if f has a normal form, this says more and is enough.
         lambda context, **_: (
             None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
         ),
@@ -227,7 +227,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "densities",
-        # Polynomials, or products of powers of factors of the integrals.
+        # The densities are polynomials, or products of powers of factors of the integrals.
         lambda context, **options: with_factors(
             find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
         ),
@@ -256,7 +256,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "commuting systems",
-        # All commuting g of one shape, for every eps.
+        # All g of one shape whose Kahan maps commute with that of f, for every eps.
         lambda context, **options: (
             find_commuting(context.system or context.map, seed=context.seed, **options)
             if context.result.eps is None

@@ -44,7 +44,7 @@ class Ended(StrEnum):
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, but not all singularity patterns have settled
     TERMS = "terms"  # the requested number of terms was computed
     BUDGET = "budget"  # the budget was spent
-    STOPPED = "stopped"  # a TimeLimit stopped it
+    STOPPED = "stopped"  # a TimeLimit stopped the computation
     DEGREE = "degree"  # the next degree exceeds the limit
     CONSTANT = "constant"  # the iterate is a constant map
     SINGULAR = "singular"  # the next iterate is nowhere defined
@@ -65,9 +65,9 @@ def reduce_map(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
 
 
 class Line:
-    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z) without common factor, Z the denominator.
+    """The image of a line a + b t under n steps, as coprime polynomials (X : Z) in t over GF(p), Z the denominator.
 
-    The map is over GF(p); the line a + b t is random or given as `start`.
+    The map is over GF(p); the line is random or given as `start`.
     """
 
     def __init__(
@@ -164,7 +164,7 @@ class Line:
         count_work(series_units(length) + len(x) * product_units(length, length))
         reciprocal = denominator.inverse_series_trunc(length)
         x = [entry.mul_low(reciprocal, length) for entry in x]
-        # The polynomials (X : Z) with X/Z = x.
+        # Find the polynomials (X : Z) whose quotients X/Z have the power series x.
         for _ in range(2):
             numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)

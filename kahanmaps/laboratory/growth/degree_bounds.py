@@ -152,7 +152,7 @@ def is_birational(map_: Map, rng: random.Random) -> bool:
 
 
 def degree_above(max_line_degree: int, line_count: int) -> int:
-    """Bound the degree D of a birational map of the plane by the largest of its degrees along tangents of a conic.
+    """Bound the degree D of a birational map of the plane by its largest degree along `line_count` tangents of a conic.
 
     `line_count` is above 6. Returns the largest D with line_count (D - max_line_degree) <= 6 (D - 1).
 
@@ -163,7 +163,7 @@ def degree_above(max_line_degree: int, line_count: int) -> int:
 
 
 def lower_bound(lower: int, upper: int, steps: int) -> arb | None:
-    """Bound the dynamical degree from below, given D_2n >= `lower` and D_n <= `upper` for n = `steps`.
+    """Bound the dynamical degree of f from below, given deg f^(2n) >= `lower` and deg f^n <= `upper` for n = `steps`.
 
     Returns a ball that contains the bound, or None if it is at most 1: if lower - 1 <= 4 (upper - 1).
 

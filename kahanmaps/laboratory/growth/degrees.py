@@ -300,7 +300,7 @@ def degree_growth(
         eps: half the time step, an exact number; None for generic eps.
         time_step, h: the time step 2 eps, instead of eps.
         effort: each increase by 1 doubles the work limit. With a Budget this is a stage of another computation.
-        max_terms: if given, the degrees d_1, ..., d_max_terms are measured instead.
+        max_terms: if given, d_1, ..., d_max_terms are measured, even if a recurrence is confirmed earlier.
         max_degree: the search stops before an iterate of a higher degree.
         seed: the random seed.
         steps: the number of steps for which singularities are followed.
@@ -456,7 +456,7 @@ class _Search:
         return DegreeGrowth(tuple(self.degrees), self.eps, ending, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
-        """Compute the singularity patterns when useful. With `may_stop` a confirmed recurrence raises Stopped."""
+        """Compute the singularity patterns when useful. If `may_stop`, a confirmed recurrence raises Stopped."""
         term_count = len(self.degrees)
         if term_count < 2 or (term_count > _DENSE_TERMS and term_count % _SEARCH_INTERVAL):
             return

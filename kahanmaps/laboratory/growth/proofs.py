@@ -53,7 +53,7 @@ class GrowthProof:
 
 
 def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
-    """Return the matrix A of a monomial map x~_i = c_i x^(a_i), at one eps or (None) over Q(eps); None for other maps.
+    """Return the matrix with the rows a_i of a monomial map x~_i = c_i x^(a_i), at eps or (None) over Q(eps), or None.
 
     A composition of monomial maps is monomial, and its matrix is the product of their matrices.
 
@@ -87,7 +87,7 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
         if len(rows_by_variable) < n:
             return None
         product = fmpz_mat([rows_by_variable[j] for j in range(n)]) * product
-    return None if product.det() == 0 else product  # it is singular only at special eps
+    return None if product.det() == 0 else product  # the matrix is singular only at special eps
 
 
 def monomial_degree(matrix: fmpz_mat) -> int:
@@ -104,7 +104,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 
 
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
-    """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
+    """Return how the degrees of a monomial map Phi with exponent matrix A grow; None in dimensions above 8.
 
     The reason: deg(Phi^n) divided by the largest modulus of the entries of A^n lies between two positive constants.
     """
@@ -120,7 +120,7 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
 
 
 def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
-    """Prove that a monomial map with this exponent matrix is periodic; return None if it is not, or is the identity.
+    """Prove that a monomial map with exponent matrix A is periodic; return None if it is not, or is the identity.
 
     If A^n = 1, the n-th iterate multiplies each variable by a number or a function of eps. The map is then periodic
     only if this iterate has order 1 or 2.

@@ -30,8 +30,8 @@ def degree_series(
     Args:
         degrees: the degree d_1 of the map; for a composition, whose maps are applied periodically, the degree of each
             of its maps.
-        hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
-            columns nu are in the same order. Multiplicities that are not known must not belong to needed hypersurfaces.
+        hypersurfaces: for each exceptional hypersurface its degree and its settled orbit data, with a column for each
+            hypersurface in this order. Multiplicities that are not known must not belong to needed hypersurfaces.
         stages: for a composition, the index (from 0) of the map that contracts each hypersurface. The series then has
             the degrees of the iterates of the whole composition only, while the exponent of z counts single maps.
 
@@ -51,7 +51,7 @@ def degree_series(
     indices = needed_hypersurfaces(patterns)
     if indices is None:
         raise ValueError("expected known multiplicities of all hypersurfaces that are needed")
-    # Unknowns: the series S_i of the needed C_i, then the series D of the stages 1, 2, ..., 0. Constants come last.
+    # Unknowns: series S_i of the needed hypersurfaces, then series D of the stages 1, 2, ..., 0. Constants come last.
     period, rows = len(degrees), []
     stages = stages or [0] * len(patterns)
 
@@ -68,7 +68,7 @@ def degree_series(
         mu = []
         for j in indices:
             series, first_exponent = _continued_series(patterns, j, 0), (stage - stages[j]) % period
-            if period > 1:  # the terms with the exponents first_exponent + k maps
+            if period > 1:  # keep the terms with the exponents first_exponent + k period
                 numerator, denominator = (f(z**period) for f in every_nth(series, period, first_exponent))
                 series = numerator * z**first_exponent, denominator
             mu.append(series)
@@ -109,7 +109,7 @@ def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
     >>> needed_hypersurfaces([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))]) is None
     True
     """
-    # Each hypersurface, followed by those onto which it is mapped, in this order.
+    # Each hypersurface, followed by those onto which later iterates map it, in this order.
     chains = [[k] for k in range(len(patterns))]
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
@@ -169,7 +169,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
 
 
 def _continued_series(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
-    """Return the generating function of a column of pattern `start`, continued according to `continues_as`."""
+    """Return the generating function of a column of the pattern with index `start` and of those that continue it."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}

@@ -58,7 +58,7 @@ class FoundDensity(FoundFunction):
     product: str = ""
 
     def degree(self, dim: int) -> int:
-        """The larger of the degrees of numerator and denominator in the variables."""
+        """The larger of the degrees of numerator and denominator of phi in the variables."""
         return max(degree_in(polynomial, dim) for polynomial in (self.function.numerator, self.function.denominator))
 
     @property

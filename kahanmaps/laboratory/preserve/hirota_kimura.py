@@ -64,7 +64,7 @@ class OrbitRelations:
     """The space of the polynomials up to a degree that vanish along one orbit; `dimension` is its dimension.
 
     On the orbit, `independent` monomials are linearly independent. `form` is the reduced echelon form of the values of
-    the monomials in `exponents_up_to`. If multiples of leading monomials were left out, it has only the other
+    the monomials in `exponents_up_to`. If multiples of leading monomials were left out, `form` has only the other
     monomials, whose relations imply all relations. `leading` are the monomials that depend linearly on earlier ones;
     all multiples of leading monomials are leading. `normals` is a basis of the span of the gradients at `point`.
     `period` is the number of points of a closed orbit, otherwise None.
@@ -93,9 +93,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimensions` are the codimensions of the varieties that these polynomials define; `with_known` is the
-    largest one with known integrals included. `period` is the number of points of closed orbits, else None.
-    `agree`: all maps gave the same numbers. `complete`: all requested degrees were tried; if not, `cut` says why.
+    `codimensions` are the codimensions of the varieties that these polynomials define, and `with_known` is the largest
+    codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. `agree`
+    says whether all maps gave the same numbers, `complete` whether all requested degrees were tried, `cut` why not.
     """
 
     dim: int
@@ -164,7 +164,7 @@ def relations_on_orbit(
 
 
 def _indices_of_non_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
-    """Return the indices in `exponents_up_to` of the monomials that are no proper multiples of one in `leading`."""
+    """Return the indices in `exponents_up_to` of the monomials that are no proper multiples of any in `leading`."""
     exponents = exponents_up_to(dim, degree)
     is_multiple: list[bool] = []  # of a leading monomial, or equal to one
     support = []
@@ -270,7 +270,7 @@ class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
     `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
-    entries are integrals. `agree`: all orbits gave the same dimension. `period` is the period if orbits close.
+    entries are integrals. `agree`: whether all orbits gave this `dimension`. `period` is the period if orbits close.
     """
 
     functions: tuple[str, ...]
@@ -401,7 +401,7 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leading = []  # leading monomials of relations of lower degree, which imply the relations of their multiples
+    leading = []  # monomials: relations of lower degree with these leading monomials imply those of their multiples
     if degree > 1:
         lower_exponents = _descending_exponents(maps[0].dim, degree - 1)
         leading = [

@@ -53,8 +53,8 @@ from kahanmaps.maps.implicit import MapFamily
 class RatioOfIterates:
     """A function I of an orbit segment: the ratio of two `functions` or, for rank 2, of two minors of them.
 
-    The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `numerator` and
-    `denominator` are indices into `functions`: one index a for F_a, two indices a, b for F_a F_b~ - F_b F_a~.
+    The functions F_a are polynomials in (variables, variables of the k-th iterate, symbols, eps), F_a~ is F_a one step
+    later. `numerator` and `denominator` are indices: one index a stands for F_a, two for F_a F_b~ - F_b F_a~.
     """
 
     two_point_basis: TwoPointBasis
@@ -272,7 +272,7 @@ def _bilinear_function(P: fmpq_mpoly, two_point_basis: TwoPointBasis, map_: MapF
 
 
 def _restrict_map(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
-    """Restrict the map to level sets of its affine integrals, whose values become symbols.
+    """Restrict the map to level sets of its affine integrals; the values of these integrals become symbols.
 
     Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result, or
     None if there are no affine integrals or fewer than two coordinates remain.

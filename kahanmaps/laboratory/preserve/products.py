@@ -129,7 +129,7 @@ def _irreducible_factors(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | 
 
 @counted_cache(4)  # may take half a second; the searches for integrals and for densities call it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, has_map_itself: bool) -> dict[str, fmpq_mpoly]:
-    """Return the factors of numerator and denominator of det dPhi^-1 and, with `has_map_itself`, of det dPhi."""
+    """Return the factors of numerator and denominator of det dPhi^-1 and, if `has_map_itself`, also of det dPhi."""
     n, fractions = map_.dim, list[Function]()
     for is_inverse in (False, True) if has_map_itself else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
@@ -165,7 +165,7 @@ class _Line:
         map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
-            """Return the point of the curve at t, its image and Z."""
+            """Return the point X/Z of the curve at t, the image of the point, and Z."""
             count_work(30 + 15 * n)
             *X, Z = (factor.field.convert(int(entry(t))) for entry in curve)
             if Z == 0:
@@ -298,7 +298,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
 
 
 def _reduce_basis(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
-    """Return a short basis (LLL) of the lattice; each entry of a vector is multiplied by its weight in the length."""
+    """Return a basis (LLL) of the lattice of the vectors, short if entry i of a vector is multiplied by weights[i]."""
     if not vectors:
         return []
     reduced_rows = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
@@ -336,7 +336,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         return _build_products(polynomials, n, constant_one, [(one, constant_one)], time_dependent)
     line = _Line(laboratory.maps[0])
     values_on_line, values_on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
-    # det dPhi and the C_i on a random line, as vectors over a coprime base.
+    # det dPhi and the quotients C_i = g_i(x~)/g_i(x) on a random line, as vectors over a coprime base.
     base = coprime_base([*values_on_line, *values_on_image, line.image[-1], line.numerator, line.denominator])
     Z, N, M = (_exponents(P, base) for P in (line.image[-1], line.numerator, line.denominator))
     rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]
@@ -392,7 +392,7 @@ def _build_products(
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are the vectors with constant 1; `densities` are pairs of a constant, 1 or -1, and vectors of phi.
+    `constant_one` are the vectors with constant 1; `densities` are pairs of a constant, 1 or -1, and its vectors.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
@@ -429,7 +429,7 @@ def _build_products(
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:
-    """Interpolate `constants`, whose values on every map are known, in the symbols and eps; None for failures."""
+    """Interpolate the numbers that `constants` returns for a map, in the symbols and eps; None for each failure."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
 

@@ -69,7 +69,7 @@ _SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction o
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern: their coefficients at `position` differ, and that of the space i is `roots[i]`."""
+    """Spaces of one zero pattern that differ in the coefficient at `position`; for the i-th space it is `roots[i]`."""
 
     position: tuple[int, int]
     roots: tuple[RationalFunction, ...]
@@ -176,7 +176,7 @@ def repeat_search(
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NO_BRANCHES,
 ) -> SpaceSearch | None:
-    """Repeat the steps of a search on another map; return None if its spaces have other zero patterns (special values).
+    """Repeat the steps of a search on another map; return None if the spaces there have other zero patterns.
 
     `reference` is the prime of the given search. Spaces with the same zero pattern are in any order unless `branches`
     has an entry for them.

@@ -52,7 +52,7 @@ def lift_linear(
 ) -> dict[RationalRows, tuple[int, ...]]:
     """Return the affine subspaces over Q, as reduced rows, whose residues occur modulo the primes, with these primes.
 
-    A subspace must occur modulo all primes (all but one up to height 12), or if not `everywhere` modulo three of them.
+    A subspace must occur modulo all primes (all but one up to height 12); if `everywhere` is False, three suffice.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lift_linear(modulo)
@@ -62,7 +62,7 @@ def lift_linear(
     lifted_subspaces: dict[RationalRows, tuple[int, ...]] = {}
     pair_counts = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
     pair_count = 0
-    # Pairs of primes with the fewest pairs of subspaces first: the first pair that has a subspace over Q gives it.
+    # Pairs of primes with few pairs of subspaces first: one pair of residues suffices to lift a subspace.
     for p, q in sorted(pair_counts, key=pair_counts.__getitem__):
         pair_count += pair_counts[p, q]
         if pair_count > _MAX_PAIRS:
@@ -195,9 +195,9 @@ def lift_conjugate_points(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
-    """Return equations of points with their conjugates, one for each parameter, and the primes where all of them occur.
+    """Return, for sets of conjugate points, one equation for each parameter and the primes at which all points occur.
 
-    For all but one of the primes modulo which the equations have solutions, these must be among the `points`.
+    For all but one of the primes modulo which equations have solutions, the solutions must be among the `points`.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
     >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))
@@ -245,7 +245,7 @@ def lift_conjugate_points(
 def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
     """Return a relation of least degree in each coordinate; None if there are no relations with small coefficients."""
     context = ring(names)
-    basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products with residues
+    basis = [(context.constant(1), 1)]  # products of powers of earlier coordinates, with residues
     equations = []
     for x, value in zip(context.gens(), values, strict=True):
         lower_monomials, (power, residue) = list(basis), (x, value)

@@ -28,9 +28,9 @@ _MAX_POINTS = 24  # rational point components from which shifts and factors are 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
     """Return generators of the group of all changes of parameters that were found, as images of the parameters.
 
-    Each change preserves the degrees of the special members, modulo each prime for which all members were tried, and
-    the degrees of hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a
-    component, or preserve a component that is not affine, are reported.
+    Modulo each prime for which all members were tried, a change maps special members to members with equal degrees of
+    iterates, or to infinity. It does the same with hypersurfaces over Q. Only changes that move a component,
+    or preserve a component that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]
@@ -106,7 +106,7 @@ def _images_of_parameters(change: Change, names: Sequence[str]) -> list[fmpq_mpo
 
 
 def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
-    """Return whether a change preserves hypersurfaces with degrees, and some component moves or is not affine."""
+    """Return whether hypersurfaces go to ones with equal degrees of iterates, and some component moves or is curved."""
     *images, denominator = _images_of_parameters(change, names)
 
     def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:
@@ -126,14 +126,14 @@ def _is_reportable(change: Change, components: Sequence[Component], names: Seque
         is_affine = all(equation.total_degree() == 1 for equation in component.equations)
         if component.values is None:
             is_fixed = set(map(str, preimage)) == set(map(str, component.equations))
-        else:  # tested at one member, for a point at the point itself
+        else:  # tested at one member: for a single point this is the point itself
             is_fixed = replace(component, equations=tuple(preimage)).contains([*component.values.values()])
         is_reportable = is_reportable or not (is_affine and is_fixed)
     return is_reportable
 
 
 def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
-    """Return the group, finite since it permutes points, that changes generate; stop at 2000 or more elements."""
+    """Return the group that changes generate (finite, since it permutes points), or 2000 or more of its elements."""
 
     def compose(first: Change, second: Change) -> Change:
         rows = tuple(zip(*(_apply_change(second, column) for column in zip(*first, strict=True)), strict=True))

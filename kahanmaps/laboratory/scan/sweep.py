@@ -60,7 +60,7 @@ class Sweep:
 
 
 def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.Random) -> Iterator[Point]:
-    """Yield all points of GF(p)^count, or the points of random affine subspaces, with number and dimension `on`."""
+    """Yield all points of GF(p)^count; if `on` = (number, dimension) is given, those of random affine subspaces."""
     if on is None:
         yield from product(range(prime), repeat=count)
         return

@@ -110,7 +110,7 @@ _PRECISION = 8  # of the series for the orders before the first step
 _BITS = 31  # of primes; for larger primes python-flint does not order the factors of multivariate polynomials
 
 
-Key = tuple[Any, ...]  # whether it is contracted; the orders in the poles, in Z and in all forms; its first rows
+Key = tuple[Any, ...]  # of a hypersurface: contracted or not; orders in the poles, in Z and in all forms; first rows
 
 
 class OrbitDataUnknown(ArithmeticError):
@@ -119,7 +119,7 @@ class OrbitDataUnknown(ArithmeticError):
 
 @dataclass(frozen=True)
 class _Forms:
-    """Z, the factors over Q of det M (evaluated at a point) and of det M' (evaluated at the image of the point)."""
+    """Z, the factors of det M, and those of det M' at the image: M is the matrix of the map, M' that of its inverse."""
 
     poles: tuple[Any, ...]
     images: tuple[Any, ...]
@@ -233,9 +233,9 @@ class _Orders:
     """The rows of `OrbitData`: the orders of hypersurfaces along a curve, computed from the orders of forms.
 
     `exponents` is the matrix of the exponents of hypersurfaces in the forms. Its `left_inverse` turns orders of forms
-    into orders of hypersurfaces, which are checked. If there is no left inverse (None), forms are factored on surfaces:
+    into orders of hypersurfaces (and these are checked). If there is none (None), forms are factored on surfaces:
     `keys_of_kind` has the keys of the hypersurfaces with components of a kind, `keys` all keys in the order of the
-    hypersurfaces, and `multiplicities` the results after each number of steps.
+    hypersurfaces, and `multiplicities` the orders of hypersurfaces by the number of steps.
     """
 
     curve: _Curve

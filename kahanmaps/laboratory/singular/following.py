@@ -43,9 +43,9 @@ Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 @dataclass(frozen=True)
 class OrbitData:
-    """A singularity pattern: the rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and their continuation.
+    """A singularity pattern: for steps 1, 2, ... the power mu of t divided out and the orders nu_k of hypersurfaces.
 
-    If it `is_settled`, the rows are known for all steps, in one of three cases. The columns satisfy the `recurrences`,
+    If `is_settled`, the rows (mu, nu_1, ...) are known for all steps. Either the columns satisfy the `recurrences`,
     given by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th
     hypersurface, whose pattern continues this one. Or all later rows up to the step `followed` are zero, except for
     unknown multiplicities in the hypersurfaces of `eventually_in`, in which the images lie again and again.
@@ -60,7 +60,7 @@ class OrbitData:
 
     @property
     def compared(self) -> tuple[object, ...]:
-        """The data that must be equal for two points on one hypersurface."""
+        """The rows and other data that must agree for two points on one hypersurface."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property
@@ -155,7 +155,7 @@ class TrackedFunctions:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the rows of `OrbitData` for steps along a curve; without tracked functions, the orders of det M(x)."""
+        """Return the rows of `OrbitData`; without functions, `common` and `denominator` of each step instead."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided_powers(run, self.initial_orders, self.common_exponents), run, strict=True)
@@ -163,7 +163,7 @@ class TrackedFunctions:
 
 
 def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], common_exponents: Sequence[int]) -> list[int]:
-    """Return for each step the power of t that the map divides out, without a common factor of the minors.
+    """Return for each step the power of t that the map divides out, not counting the common factor of minors.
 
     The common factor of the minors of the equation is a product of the functions whose orders are measured, with the
     `common_exponents`; it is not part of the map. `initial_orders` are the orders before the first step.

@@ -63,7 +63,7 @@ FIRST_STEPS = 12  # the number of steps that are printed
 class CriticalPoint:
     """A point modulo p at which the differential degenerates, with its multiplicity as a zero of E and the gradient.
 
-    For a pole, E stands for det(I - eps f').
+    E is det M' at the image, M' the matrix of the inverse map; for a pole E is det M, for Kahan maps det(I - eps f').
     """
 
     point: tuple[int, ...]
@@ -76,10 +76,10 @@ def critical_points(
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """Return the critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
-    `equations` are the equations of the factors of the map over the field, linear in the point, and `inverses` the
-    equations of their inverses; for several factors E is the product of the E of all factors. Without inverses det M
-    replaces E, and the points are the poles that are not at infinity. Returns the points and, for each multiplicity,
-    the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
+    `equations` are the equations of the factors of the map over GF(p), linear in the point, and `inverses` those of the
+    inverse maps. E is the product of det M' at the images, for the matrices M' of the inverse maps. Without inverses
+    det M replaces E, and the points are the poles that are not at infinity. Returns the points and, for each
+    multiplicity, the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
@@ -365,7 +365,7 @@ def outcomes_of_points(
 ) -> list[Hypersurface]:
     """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.
 
-    At one exact `eps` (half the time step), on lines modulo random primes. With `poles` the poles are returned, and
+    At one exact `eps` (half the time step), on lines modulo random primes. If `poles` is True, the poles are returned,
     otherwise all exceptional hypersurfaces except poles and infinity. If no point with some multiplicity was found, a
     hypersurface of this multiplicity is returned as undecided. Source: zander-2021.
     """

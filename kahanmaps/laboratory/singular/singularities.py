@@ -540,7 +540,7 @@ def _step_limits(dim: int, steps: int | None, budget: Budget) -> StepLimits:
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
-    """Return the irreducible factors of det M(x), for Kahan maps det(I - eps f'(x)), in Q[x, eps], with multiplicities.
+    """Return the irreducible factors in Q[x, eps], with multiplicities, of det M (M = I - eps f' for Kahan maps).
 
     Exact. None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
 

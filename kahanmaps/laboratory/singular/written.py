@@ -83,7 +83,7 @@ def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceF
 def followed_forms(
     map_: HomogeneousMap, forms: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
-    """Return the forms whose zeros a map contracts, and the forms in the common factor of the minors."""
+    """Return the forms whose zeros a map contracts, and the forms in the common factor of minors of its equation."""
     contracted_forms = [replace(form, stage=stage) for form in forms if form.multiplicity]
     minor_factors = [] if map_.factor.is_constant() else factored(map_.factor)
     return contracted_forms, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in minor_factors]

@@ -63,7 +63,7 @@ MAX_SPACE = 24  # dimension l: the cubic equations have up to C(l + 2, 3) + l te
 
 @dataclass(frozen=True)
 class CommutingField(ResultPart):
-    """A system g whose Kahan map commutes with that of f, the matrix B if g = B f is required, and the verdict.
+    """A system g whose Kahan map commutes with that of f, the verdict, and the matrix B with g = B f if required.
 
     `trivial` is "0", "f" or "-f" if g is one of these, else empty.
     """
@@ -438,7 +438,7 @@ def find_commuting(
     rational_point = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
 
     def descend(G: QuadraticSystem) -> QuadraticSystem:
-        """Return the system over K that a system over Q represents; values at points of Q^n determine it."""
+        """Return the system over the number field that a system over Q represents, from its values at points of Q^n."""
         coordinates = [p.compose(*rational_point, ctx=a.context()) for p in G.rhs]
         rhs = (sum((coordinates[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
         return QuadraticSystem(tuple(rhs), f.symbols)

@@ -100,8 +100,8 @@ class Symmetries(PrintableResult):
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` is a field of weight 1 or None;
     `signed` are all signed permutations (with a translation if needed) of the variables or of scaled variables (see
     signed_permutations.py); `others` are further linear symmetries. `generators` generate the group of `signed` or,
-    without infinitesimal symmetries, of `signed` and `others`; `group_of` says which. It has `order` linear parts
-    (None: unknown).
+    without infinitesimal symmetries, of `signed` and `others`; `group_of` says which. `order` is the number of
+    its linear parts (None: unknown).
     """
 
     _parts, _noun = "generators", ("generator", "generators")
@@ -320,7 +320,7 @@ def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]
 
 
 def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
-    """Add all rational S with f(S x) = sign S f(x), from the polynomial equations of S."""
+    """Add all rational S with f(S x) = S f(x) or f(S x) = -S f(x), from the polynomial equations of S."""
     f = symmetries.system
     n = f.dim
     if any(x.is_linear for x in symmetries.infinitesimal):
@@ -391,7 +391,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     zero = (fmpq(0),) * n
     if is_symmetry(f, S, zero, sign):
         return zero
-    # f''(S x, r) + B S x = sign S B x is linear in r, with one equation for each entry of a matrix.
+    # With B = f'(0), f''(S x, r) + B S x = sign S B x is linear in r: one equation for each entry of a matrix.
     defects = (S * f.B * fmpq(sign) - f.B * S).entries()
     derivatives = [(form * S * fmpq(2)).transpose() for form in f.Q]
     rows = [[*(derivatives[i][j, k] for k in range(n)), -defects[i * n + j]] for i in range(n) for j in range(n)]
@@ -400,7 +400,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
         return None
     (special_solution,) = [v for v in solutions if v[-1] != 0]
     directions = [v for v in solutions if v[-1] == 0]
-    # Among the solutions r the condition f(r) = sign S c decides.
+    # The remaining condition on the solutions r is f(r) = sign S c, where c = f(0).
     parameters = ring([f"t{k + 1}" for k in range(len(directions) + 1)])
     gens = parameters.gens()
     r = [parameters.constant(special_solution[k] / special_solution[-1]) for k in range(n)]

@@ -56,7 +56,7 @@ class Equivalence(ResultPart):
 
     @property
     def system(self) -> QuadraticSystem:
-        """The system g/c in the variables of f; its map at eps is the map of g at eps/c."""
+        """The system g/c in the variables of f, g from the catalogue; its map at eps is the map of g at eps/c."""
         return load(self.name, self.parameters).system.renamed(self.variables).scaled(1 / self.c)
 
     @property

@@ -39,10 +39,10 @@ _NAMES_BY_DIMENSION = {1: "line", 2: "plane"}
 
 @dataclass(frozen=True)
 class FixedPoints(ResultPart):
-    """A set of fixed points: `coordinates` as functions of some of the variables, in which `equations` vanish.
+    """A set of fixed points: `coordinates` are functions of some variables, and these variables satisfy `equations`.
 
     `dimension` is the dimension of the set, `count` the number of its points over the complex numbers (None: infinitely
-    many); `eigenvalues` is the characteristic polynomial of f' there, in `eigenvalue` and these variables.
+    many); `eigenvalues` is the characteristic polynomial of f' there; its coefficients may contain these variables.
     """
 
     coordinates: tuple[fmpq_mpoly, ...]
@@ -138,7 +138,7 @@ class FixedPointSearch(ResultPart):
 def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
     """Compute all equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
-    Each increase of `effort` by 1 doubles the work limit; there is no search above dimension 6. See `undecided`.
+    Each increase of `effort` by 1 doubles the work limit; there is no search above dimension 6.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> print(fixed_points(pendulum))

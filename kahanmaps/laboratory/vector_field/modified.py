@@ -160,7 +160,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))
     integrals, gradients = list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # gradients dependent here by chance lose an integral
     for candidate in candidates:
         integral = primitive_part(candidate - candidate[(0,) * file.dim])[1]
         gradient_at_point = [evaluate(p, QQ, point) for p in gradient(integral)]

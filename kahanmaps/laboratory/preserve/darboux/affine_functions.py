@@ -57,11 +57,11 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Exact affine Darboux functions. `complete`: there are no others over Q; if this is unknown, `reason` says why.
+    """Exact affine Darboux functions. `complete`: whether they are all over Q; if this is unknown, `reason` says why.
 
     Constants and the affine integrals (cofactor 0) are left out. A `complete` list is wrong only if the random line of
-    the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, the
-    probability of this is below 10^-6 for a given hyperplane.
+    the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, this
+    happens with probability below 10^-6 for a given hyperplane.
     """
 
     functions: tuple[AffineDarboux, ...]
@@ -98,10 +98,10 @@ def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
 
 @dataclass(frozen=True)
 class QuotientForms:
-    """The linear forms modulo the affine integrals z = V x, in terms of the coordinates y = (x_i with i in `free`).
+    """The linear forms of x modulo the affine integrals z, as forms of the coordinates y = (x_i with i in `free`).
 
-    `section` is the matrix S = dx/dy at fixed z. A form v is v S modulo the integrals, and the system for y has
-    the Jacobi matrix R S, where R consists of the rows `free` of f'. `shift` is dx/dz, so that x = S y + shift z.
+    `section` is the matrix S = dx/dy at fixed z, and `shift` is dx/dz, so that x = S y + shift z. The form v . x is
+    (v S) . y modulo z. The system for y has the Jacobi matrix R S, where R consists of the rows `free` of f'.
     """
 
     integrals: tuple[tuple[fmpz, ...], ...]

@@ -102,7 +102,7 @@ DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
 def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
-    """Expand det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); return None if it is too large."""
+    """Return det M for the matrix M of the map (I - eps f' for Kahan maps); None if it is too large to expand."""
     if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
         return None
     field = FunctionField(map_.names, _DETERMINANT_BUDGET)
@@ -118,7 +118,7 @@ def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
 def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     """Return cofactors from the irreducible factors over Q of det dPhi(x) and 1/det M(x).
 
-    Returns det dPhi alone if the determinants are too large to expand.
+    M is the matrix of the map. Returns det dPhi alone if the determinants are too large to expand.
     """
     n, D = map_.dim, determinant_polynomial(map_)
     field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
@@ -143,7 +143,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
 
 
 def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
-    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)), or det dPhi if it is too large."""
+    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)); only det dPhi if it is too large."""
     n = map_.dim
     D = determinant_polynomial(map_)
     if D is None:
@@ -153,7 +153,7 @@ def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a function of eps
-        # The determinant is 1 at eps = 0, so every factor is a number there. Dividing by it makes the cofactor 1 there.
+        # At eps = 0 the determinant is 1, and every factor is a number: divided by it, the factor is 1 at eps = 0.
         constant = substitute(factor, {"eps": fmpq(0)})
         cofactors.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(cofactors, key=lambda cofactor: (cofactor.weight, cofactor.name)))
@@ -236,10 +236,10 @@ class Sample:
 def cofactor_space(
     sample: Sample, product: CofactorProduct, degree: int, model: DarbouxSpace | None = None
 ) -> DarbouxSpace:
-    """Return the space of all P of degree at most `degree` with P(x~) = C(x) P(x); its basis may be empty.
+    """Return the space of all P of degree at most `degree` with P(x~) = C(x) P(x), C the `product`.
 
-    A `model` is the space modulo another prime: only the monomials of its elements are then used. The sample must have
-    at least `points_needed` points.
+    Its basis may be empty. `model` is the space modulo another prime: only the monomials of its elements are then used.
+    The sample must have at least `points_needed` points.
     """
     indices = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.indices
     values, image_values = _evaluate_monomials(sample, product, degree, indices)
@@ -251,7 +251,7 @@ def cofactor_space(
 def cofactor_spaces(
     sample: Sample, product: CofactorProduct, degree: int, models: Sequence[DarbouxSpace] = ()
 ) -> list[tuple[int, DarbouxSpace]]:
-    """Return the numbers c with the space of all P with P(x~) = c C(x) P(x), for C known up to a numerical factor.
+    """Return the numbers c, each with the space of all P with P(x~) = c C(x) P(x), where C is the `product`.
 
     If there are `models`, only the monomials of their elements are used. Numbers c outside GF(p) are left out. If the
     cofactors of the sample are known exactly, only c = 1 is tried.
@@ -300,7 +300,7 @@ def cofactor_spaces(
 def _evaluate_monomials(
     sample: Sample, product: CofactorProduct, degree: int, indices: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
-    """Return C m(x) and m(x~) for all monomials m, both times the denominator of C, as one row for each point."""
+    """Return C m(x) and m(x~) for the monomials m, times the denominator of C = `product`: a row for each point."""
     values, image_values, point_count = [], [], len(indices) + _SPARE
     count_work(point_count * len(indices) / 8)
     for (x, image), fraction in zip(sample.pairs[:point_count], sample.values(product, point_count), strict=True):

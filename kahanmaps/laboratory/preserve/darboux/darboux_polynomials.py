@@ -203,7 +203,7 @@ def darboux_polynomials(
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
-    """Return whether products P Q of elements of other spaces span the space of `C`, the product of their cofactors."""
+    """Return whether products P Q from other spaces whose cofactors have the product `C` span the space of `C`."""
     space, (product, c) = spaces[C], C
     other_spaces = {(key[0].powers, key[1]): other_space for key, other_space in spaces.items() if key != C}
     rows = []
@@ -241,7 +241,7 @@ def _find_formulas(
     polynomials = tuple(P for P in bases[0] if not P.is_constant())
 
     def find_scalar(map_: ModularMap) -> list[int]:
-        """Return the number by which the product is multiplied in the cofactor."""
+        """Return, as a list of one residue, the number c for which the cofactor of the first space is c `product`."""
         sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
         [(numerator, denominator)], [pair] = sample.values(product, 1), sample.pairs
         arguments = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)
@@ -254,7 +254,7 @@ def _find_formulas(
     factor, map_, n = c, laboratory.map, laboratory.map.dim
 
     def certify_cofactor(P: fmpq_mpoly) -> Certainty:
-        """Certify that P(x~) = c P(x) prod C^k, with denominators cleared."""
+        """Certify that P(x~) = c C(x) P(x), where C is the `product`; denominators are cleared."""
 
         def sides(field: Field, values: tuple[Any, ...], eps: Any) -> Sides:
             x, symbols = values[:n], values[n:]

@@ -51,7 +51,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span
 
 _SPARE = 8  # points beyond the number of unknowns
 _MAX_MATRICES = 12  # antisymmetric matrices A that are used
-# Bounds of s = dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
+# Bounds of the number s of rows of A: its s (s - 1)/2 unknown entries take 0.2 seconds for s = 30, 10 for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
 TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
 
@@ -212,7 +212,7 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
         blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_MATRICES)]
     rows = []
     count_work(n**3 + n**4 / 100)
-    for A in blocks[:2]:  # two A leave few E with E A = A E^T, which are then restricted by the other A
+    for A in blocks[:2]:  # two A leave few E with E A = A E^T; the other A then restrict these E
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -244,7 +244,7 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
 
 
 def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
-    """Return the row space of the combination sum c_s A_s of rank 2 of few matrices A_s, if there is exactly one.
+    """Return the row space of the only combination sum c_s A_s of rank 2 of few matrices A_s; [] if it is not unique.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
     symmetric matrices that all these forms annihilate are the multiples of c c^T.
@@ -401,7 +401,7 @@ class TwoPointMap(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return the values along an orbit, its first point, and its period (None if the orbit does not close)."""
+        """Return the values of the basis along an orbit, its first point, and its period (None if it is too long)."""
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         is_closed = len(points) < count + shift
         shifted_points = points[shift % len(points) :] + (points[: shift % len(points)] if is_closed else [])
@@ -412,7 +412,7 @@ class TwoPointMap(ModularMap):
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values at a point and at its image, times the two `factors`."""
+        """Return the values of the basis at a point, times factors[0], and at its image, times factors[1]."""
         points = [x, image]
         while len(points) < self.two_point_basis.shift + 2:
             next_point = self.step(points[-1])

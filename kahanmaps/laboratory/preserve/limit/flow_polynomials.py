@@ -258,7 +258,7 @@ class _Search:
         return is_special
 
     def _lift_to_power(self, vector: Sequence[int], p: int) -> list[int]:
-        """Lift the coefficients of P from p to a power of p; return [] if P and K are not a simple solution."""
+        """Lift the coefficients of P from p to a power of p; return [] if P, K is no simple solution of P' = K P."""
         field, context = self.field, self.field.rhs[0].context()
         denominator = lcm(*(int(common_denominator(f)) for f in field.rhs))
         f = [component * denominator for component in field.rhs]

@@ -130,7 +130,7 @@ class FlowAndMap:
         return "\n".join("\t".join(line) for line in self.lines())
 
     def lines(self, *, others: bool = True) -> list[tuple[str, str]]:
-        """Return statements, each as (certainty, sentence); with `others` also the formulas of `other_integrals`."""
+        """Return statements as pairs (certainty, sentence); if `others`, also the formulas of `other_integrals`."""
         statements = [("proved", limit.text) for limit in self.limits]
         for F in self.other_integrals if others else ():
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))
@@ -195,7 +195,7 @@ class FlowAndMap:
 
 
 def _short_text(function: RationalFunction, max_terms: int) -> str:
-    """Return the formula, or the numbers of its terms if there are more than `max_terms`."""
+    """Return the formula, or the numbers of terms of numerator and denominator if there are more than `max_terms`."""
     counts = len(function.numerator), len(function.denominator)
     return format_factored(function) if sum(counts) <= max_terms else f"P/Q with {counts[0]} and {counts[1]} terms"
 

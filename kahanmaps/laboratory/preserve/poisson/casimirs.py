@@ -190,7 +190,7 @@ def _find_linear_relations(
 def _evaluate_fields(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral]
 ) -> tuple[list[int], list[list[int]]]:
-    """Return the values of the integrals at a random point, and P times their gradients.
+    """Return the values of the integrals at a random point, and the tensor times their gradients.
 
     Raises NoPoint if a value is 0 or undefined.
     """

@@ -138,7 +138,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
 
 
 def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
-    """Return a basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
+    """Return a basis of the skew K for which K f_y is a gradient in the coordinates y of the quotient, y' = f_y."""
     m, n = len(quotient.free), system.dim
     count_work(n**4 + 5 * n**3)
     over_Q = system.over(QQ)
@@ -166,7 +166,7 @@ def _skew_matrix(m: int, entries: Mapping[tuple[int, int], int | fmpz]) -> fmpq_
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
-    """Write the system as J grad H with J = S K^{-1} S^T, scaled to coprime integers whose first is positive."""
+    """Write the system as J grad H with J = S K^{-1} S^T, S = dx/dy, scaled to coprime integers, the first positive."""
     J = quotient.section * K.inv() * quotient.section.transpose()
     entries = tuple(J.entries())
     factor = next(
@@ -176,7 +176,7 @@ def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) 
 
 
 def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
-    """Return the H with grad_y H = K f_y and H = 0 for y = 0.
+    """Return the H with grad_y H = K f_y and H = 0 for y = 0, where y' = f_y in the coordinates y of the quotient.
 
     With S = `quotient.section`, H(x) is the integral of y . K f_y along the segment from x - S y, where y = 0, to x.
     The integrand is a polynomial of degree 2 in the parameter of the segment, so Simpson's rule is exact.

@@ -144,7 +144,7 @@ class PoissonSearch(Search):
     """The result of `find_poisson`: tensors up to `degree`, and the reason if there are none.
 
     All tensors up to the degree are combinations of the listed ones and of products of polynomial integrals with
-    tensors of lower degree. `pencil` is the verdict on their combinations being Poisson tensors; None: not tested.
+    tensors of lower degree. `pencil`: whether all combinations of listed tensors are Poisson; None: not tested.
     """
 
     _parts, _noun = "tensors", ("tensor", "tensors")
@@ -219,7 +219,7 @@ def find_poisson(
 
     Returns:
         A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
-        other tensors are left out. The absence of tensors up to a degree is measured.
+        other tensors are left out. That there are no others up to the degree is measured.
 
     Raises:
         InputError: for unknown symbols, eps = 0, a negative degree, or a denominator that vanishes at this eps.
