@@ -59,7 +59,7 @@ class HtmlCell:
         return self.text
 
 
-Line = Sequence[object]  # its cells: `HtmlCell`, or objects that str() converts to text
+Line = Sequence[object]  # the cells of a line: `HtmlCell`, or objects that str() converts to text
 
 
 def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> HtmlCell:
@@ -219,7 +219,7 @@ def _darboux(search: DarbouxSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _structures(structures: ConstantStructures) -> Iterator[Line]:
-    """Yield the Hamiltonian form, or the reason why there is none."""
+    """Yield the form f = J grad H with a constant matrix J, or the reason why there is none."""
     if structures.hamiltonian is None:
         yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return
@@ -301,7 +301,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 @lines_of.register
 def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
-    """Yield one-parameter groups, a scaling, generators of the finite group, and the completed searches."""
+    """Yield one-parameter groups, a flow that rescales eps, generators of the finite group, completed searches."""
     for generator in symmetries.infinitesimal:
         kind = "linear" if generator.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(generator.rhs)})"
@@ -321,7 +321,7 @@ def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
 
 @lines_of.register
 def _commuting(systems: CommutingSystems) -> Iterator[Line]:
-    """Yield the g that commute, except 0, f and -f, each written as options of a command."""
+    """Yield the fields g whose Kahan maps commute with that of f, except 0, f, -f, as options of a command."""
     if systems.dimension is not None:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
@@ -357,7 +357,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
-    """Return g as options of a command, with B if g = B f; a notebook shows the equations of g."""
+    """Return g as options of a command, with the matrix B if g = B f; a notebook shows the equations of g."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:

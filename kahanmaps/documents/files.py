@@ -281,7 +281,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
 
 def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form for float orbits, or the reason why there is none (e.g. `method` is "generic")."""
+    """Return the normal form for float orbits, or a reason why none is used (such as the method "generic")."""
     normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
     if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
         return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")

@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
 MAX_ITERATES = 16  # largest number of ~ after a name
-_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced
+_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced by their formulas
 
 
 def iterates_in(*texts: str) -> int:

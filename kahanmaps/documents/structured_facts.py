@@ -32,7 +32,7 @@ from kahanmaps.sources import SOURCES
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
 FACT_KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
-MAX_MONOMIALS = 100_000  # of one relation
+MAX_MONOMIALS = 100_000  # number of monomials of one relation
 _DEGREE_BOUND = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")
 

@@ -130,7 +130,7 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return spaced fractions p/q between two numbers, with q up to twice the least q, then until there are three."""
+    """Return spaced fractions p/q in (low, high): with q up to twice the least q, larger q until there are three."""
     resonances: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(resonances) >= _MIN_RESONANCES and q > 2 * resonances[0].denominator:

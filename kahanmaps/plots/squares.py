@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MAX_STEPS = 12  # of each map
-MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: a step then takes seconds
+MAX_STEPS = 12  # number of steps of each map
+MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: with so many bits a step takes seconds
 
 Point = tuple[fmpq, ...]
 Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None after an indeterminacy point or if numbers are too long
@@ -56,7 +56,7 @@ class MapPair:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Two lattices for a point x: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
+    """Lattices of a point x and maps F, G: `g_after_f[i][j]` is G^j(F^i x), and `f_after_g[i][j]` is F^i(G^j x).
 
     `stopped` is a sentence that says why points are missing, empty if none are missing.
     """
@@ -224,7 +224,7 @@ def plot_squares(
 
 
 def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
-    """Return the two coordinates in which the narrowest of the squares and of their gaps is as wide as possible."""
+    """Return the two coordinates that maximize the smallest width of all squares and of all gaps between corners."""
     dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0

@@ -19,7 +19,7 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _WAIT_SECONDS = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time that writing the last list took
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time in which the last list was written
 GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
 
 

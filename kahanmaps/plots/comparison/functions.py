@@ -30,7 +30,7 @@ _EFFORT = -2  # effort of the search for integrals, which then takes at most a f
 
 
 class TwoPointFunction:
-    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
+    """An integral that depends on x and its Kahan image x~: the modified H, or x^T M x~/eps with a matrix M."""
 
     of_arrays = True  # ensembles evaluate it at arrays of points
 
@@ -184,13 +184,13 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """Return a function of `functions_of` by its name, or an expression, without eps unless `eps` is given."""
+    """Return the function with this name in `functions_of`, or an expression, free of eps if `eps` is None."""
     function = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if function is None else function
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return the same as `requested_function`. Raises InputError for integrals that depend on the image x~ of x."""
+    """Return a function of x alone, by name or as an expression. Raises InputError if it depends on the image x~."""
     available = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     rational_functions = {
         name: function.function for name, function in available.items() if isinstance(function, PointFunction)

@@ -15,7 +15,7 @@ Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
 _OUTER_PERCENT = 10.0  # percent of the points at either end that are ignored if they are far away
 _FAR_RATIO = 3.0  # "far away" is farther than this multiple of the range of all other points
-_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # in units of the largest initial coordinate
+_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # multiples of the initial coordinates: a larger window is cut; the part shown
 _MARGIN_RATIO = 0.04  # margin at either end, relative to the range
 _MAX_NUMBER = 1e307  # largest number that matplotlib can subtract
 _MAX_POINTS = 4000  # maximal number of points used in the choice of axes
@@ -53,7 +53,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """Return the range of values that `window_of` determines, without a margin; `required` are initial values.
+    """Return the interval that `window_of` finds for these values, without a margin; `required` are initial values.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
