@@ -215,7 +215,7 @@ _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}  # fol
 
 
 def _load_displays(value: object) -> None:
-    """Import the file of kahanmaps.display with the name of the class's folder, or the name given in `_FILES`."""
+    """Import the file of kahanmaps.display for the class of `value`; its name is in `_FILES`, or that of the folder."""
     for base in type(value).__mro__:  # a user's subclass is displayed like its base class
         package, *folders = base.__module__.split(".")
         if package in ("kahanmaps", "flint"):

@@ -88,7 +88,7 @@ class Formulas:
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
-        """Yield the integrals of a Hamiltonian system in x and x~: name, formula as text, function.
+        """Yield the integrals of a Hamiltonian system in x and its image x~ as triples: name, formula (text), function.
 
         For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. They are
         functions of the variables, the coordinates `new` of x~, the symbols and eps.

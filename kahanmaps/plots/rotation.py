@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.62  # height over width of the axes
 _MIN_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
 _MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
-_MAX_POINTS = 10_000  # initial points
+_MAX_POINTS = 10_000  # maximal number of initial points
 
 
 def plot_rotation(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 UP, DOWN, BOTH = "up", "down", "both"
 _NODE_COUNT = 6  # interpolation nodes: three points on either side of the hyperplane
-_NEWTON_STEPS = 12  # for the zero of an interpolation polynomial
+_NEWTON_STEPS = 12  # steps of Newton's method for the zero of an interpolation polynomial
 _MAX_DIFFERENCE = 0.1  # largest difference, in steps, of the zeros interpolated with four and with six nodes
 _ASPECT = 0.75  # height over width of the axes
 
@@ -96,8 +96,8 @@ def section_of(
         direction: "up" for crossings to positive values, "down" to negative ones, or "both".
         progress: called with the current step.
 
-    Crossings are interpolated by polynomials in the step through six consecutive points. Raises InputError for another
-    direction.
+    Crossings are interpolated through six consecutive points by polynomials in the step number. Raises InputError for
+    another direction.
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")

@@ -146,8 +146,8 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
     """Return the pairs of maps to be plotted for a member: two associated systems, and a control.
 
     The first system is the member itself, the second is the associated system with the opposite sign at the last factor
-    of chi. The control is the pair J grad H_0, J grad H_1 or, if m = 1, the pair f, 2 f. Raises InputError if the
-    system is not a member of the family, declared or recognised, in its own coordinates.
+    of chi. The control is J grad H_0, J grad H_1 with grad H_1 = A grad H_0 or, if m = 1, f = J grad H_0 and 2 f.
+    Raises InputError if the system is not a member of the family, declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
@@ -322,7 +322,7 @@ def _draw_lattices(axes: Axes, gf: Floats, fg: Floats) -> None:
 
 
 def _magnify(axes: Axes, gf: Floats, fg: Floats, all_points: Floats, window: Floats, style: Style) -> None:
-    """Draw the last two corners, magnified so that they are distinguishable, in the emptiest corner of the panel."""
+    """Draw both candidates for the last corner, magnified to be distinguishable, in the emptiest part of the panel."""
     lengths = np.diff(window, axis=1)[:, 0]
     relative_points = (all_points - window[:, 0]) / lengths
     if len(gf) == 2:  # the panel also contains the name of the last corner

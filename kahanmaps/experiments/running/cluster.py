@@ -132,8 +132,8 @@ class ClusterWorkers(Executor):
     def wait(self, timeout: float) -> list[Record]:
         """Return the finished records as soon as there is one, or none after `timeout` seconds.
 
-        Raises ClusterLost if the scheduler does not answer. Raises WorkersUnfit if several groups, among them the
-        groups of all jobs in flight, have ended by themselves and none has printed a record.
+        Raises ClusterLost if the scheduler does not answer. Raises WorkersUnfit if no group has printed a record, and
+        several groups, among them those of all jobs in flight, have ended by themselves.
         """
         deadline = time.monotonic() + timeout
         while True:

@@ -24,7 +24,7 @@ GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
-    """An iterable of lists of records as they arrive: at least ten lists a second, some of them empty.
+    """An iterable that yields records in lists as they arrive: at least ten lists a second, some of them empty.
 
     Since writing waits for the disk, records of short tasks are collected in one list, for four times as long as it
     took to write the last list. A caller that stores each list at once loses at most one list and the tasks in flight.

@@ -48,7 +48,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """The kind given by the eigenvalues; a center of the linear part need not be a center of the vector field."""
+        """The kind of the linear part, from its eigenvalues: "center" need not mean a center of the vector field."""
         values, real = self.values, self.values.real
         threshold = _ZERO_TOLERANCE * max(float(np.abs(values).max()), _ZERO_TOLERANCE)
         if (np.abs(values) <= threshold).any():
@@ -94,8 +94,8 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 class Flow:
     """The parts of the phase portrait of x' = f(x) that are drawn under the orbits of the map.
 
-    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f at these points in units of
-    the window. `equilibria` are points (2,) with their kinds; `separatrices` and `solutions` are curves (n, 2 or 3).
+    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f there, in units of the
+    window. `equilibria` are pairs of a kind and a point (2,); `separatrices`, `solutions` are curves (n, 2 or 3).
     """
 
     places: FloatArray

@@ -198,7 +198,7 @@ _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, both axes have one unit.
+    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, the axes have equal units.
 
     `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
     """

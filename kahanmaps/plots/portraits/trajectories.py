@@ -29,7 +29,7 @@ _MAX_NUMPY_WORK, _MAX_NUMPY_STEPS = 10_000_000, 20_000
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,).
+    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,) of the rows.
 
     `ended` maps the reason why orbits ended early, as a phrase after "an orbit", to the number of these orbits.
     """
