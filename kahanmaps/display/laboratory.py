@@ -86,7 +86,7 @@ def _found_tensor(result: FoundTensor | IntegralInIterates) -> str:
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
-    """Return a phrase with the eps of a result and the time step; empty if the map does not depend on eps."""
+    """Return a phrase with the eps of a result and the time step 2 eps; empty if no map depends on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
 
@@ -170,7 +170,7 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """List each formula with its verdict and evidence, then the remarks on the search."""
+    """Yield each integral with its verdict and evidence, then the remarks on the search."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
@@ -182,7 +182,7 @@ def _densities(search: DensitySearch) -> Iterator[Line]:
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """List each tensor with its verdict and properties, then the remarks on the search."""
+    """Yield each Poisson tensor with its verdict and properties, then the remarks on the search."""
     named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named_results, (search.note, search.reason))
 
@@ -239,7 +239,7 @@ def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
 
 @lines_of.register
 def _heights(survey: HeightSurvey) -> Iterator[Line]:
-    """Yield a line for each orbit, and the conclusion from all orbits."""
+    """Yield a line on the heights of each orbit, and the conclusion from all orbits."""
     for orbit in survey.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
         yield "orbit", *([f"eps {orbit.eps}"] if survey.has_eps else []), f"start {point}", orbit.growth.text
@@ -372,7 +372,7 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 
 
 def _title(subject: str, result: Any, *subtitle: str) -> tuple[str, str]:
-    """Return a title that contains the name of the system, and a subtitle that ends with eps."""
+    """Return the title, which contains the name of the system, and the subtitle, which ends with eps."""
     phrases = (*subtitle, eps_sentence(result.eps, result.file.map))
     return f"{subject} of {markup.abbreviate(result.file.name)}", "; ".join(filter(None, phrases))
 

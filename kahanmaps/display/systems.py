@@ -176,7 +176,7 @@ def map_latex(kahan: KahanMap) -> str:
 
 @latex_form.register
 def composition_latex(map_: Map) -> str:
-    """Return a map other than Kahan's as text."""
+    """Return the text of a map other than Kahan's as LaTeX."""
     return rf"$\text{{{_tex(map_)}}}$"
 
 

@@ -219,7 +219,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
 
 
 def _skip_argument(tokens: Sequence[str], position: int) -> int:
-    """Return the position after (t) or [t]; without such an argument, return `position`."""
+    """Return the position after an argument (t) or [t] that begins at `position`; without one, return `position`."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 

@@ -21,7 +21,7 @@ _MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters ar
 
 
 def iterates_in(*texts: str) -> int:
-    """Return the largest number of ~ after a name.
+    """Return the largest number of ~ after a name in texts: 2 if x~~ occurs.
 
     >>> iterates_in("x*y~ - x~~", "x")
     2

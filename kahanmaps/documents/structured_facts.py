@@ -38,9 +38,9 @@ _RELATION_KEYS = ("monomials", "dimension")
 
 
 class ClaimedRelations(NamedTuple):
-    """A Hirota-Kimura basis: along a generic orbit `dimension` independent linear combinations of `functions` vanish.
+    """A Hirota-Kimura basis: `functions` (polynomials over Q in the variables), as written in the file in `text`.
 
-    `text` contains the functions as written in the file; they are polynomials over Q in the variables of the system.
+    `dimension` is the dimension of the space of their linear combinations that vanish along a generic orbit.
     """
 
     text: str

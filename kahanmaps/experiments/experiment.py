@@ -188,7 +188,7 @@ class Experiment:
     def definition(self) -> str:
         """The definition as canonical text: experiments with equal definitions have equal tasks.
 
-        The first task contains all shared values, including defaults, which may change between versions.
+        It contains the first task, hence also the default values, which may change between versions.
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():

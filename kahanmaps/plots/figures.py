@@ -201,7 +201,7 @@ def shortened_name(name: str, suffix: str, style: Style) -> str:
 
 
 def letter_count(label: str) -> int:
-    """Return the approximate number of letters of a typeset label, without the commands of mathtext."""
+    """Return the approximate number of letters of a typeset label, not counting the commands of mathtext."""
     return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
 
 

@@ -377,7 +377,7 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """Return the fitted law as a function of the step; its non-positive values become NaN. None if no law was fitted.
+    """Return the fitted height as a function of the step (NaN where it is not positive); None if nothing was fitted.
 
     For c n^2 and c n, c is `curve.constant`, and the terms of lower degree are a least-squares fit to the heights. The
     exponential goes through the last height.

@@ -130,7 +130,7 @@ class Plot(AttributeHints):
             x0: one initial point or many.
             eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
-            axes: two variables or expressions; by default those along which the crossings spread most.
+            axes: two variables or expressions; by default the variables along which the crossings spread most.
             direction: "up" for crossings to larger values, "down" or "both".
         """
         from kahanmaps.plots.comparison.functions import requested_axis

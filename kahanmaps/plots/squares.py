@@ -73,7 +73,7 @@ class Squares:
 
     @property
     def compared(self) -> list[tuple[Point, Point]]:
-        """The pairs of corresponding points of the two lattices, if both exist."""
+        """The pairs of points with equal indices [i][j] in the two lattices, if both points exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
         pairs = (pair for row, other_row in rows for pair in zip(row[1:], other_row[1:], strict=True))
         return [(p, q) for p, q in pairs if p is not None and q is not None]
@@ -380,7 +380,7 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
 
 
 def _to_table(lattice: Lattice) -> Floats:
-    """Return the points as floating-point numbers; nan for missing points and coordinates of 1e150 or more."""
+    """Return the points of a lattice in doubles; NaN for missing points and for coordinates of 1e150 or more."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _MAX_COORDINATE, table, np.nan)

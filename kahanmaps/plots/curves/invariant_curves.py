@@ -57,7 +57,7 @@ class InvariantPlane:
 
     `h` are the coefficients of the cubic Hamiltonian h(u, v), complex if the root is complex; `shape` is the form of h
     as text, a constant of `plane_cubics`. `index` is the index of the plane in its splitting, `block` the planar
-    Kahan map in the coordinates (u, v), and `matrix` transforms coordinates of the splitting to (u, v).
+    Kahan map in the coordinates (u, v), and `matrix` the 2 x 2 matrix from coordinates of the splitting to (u, v).
     """
 
     index: int

@@ -48,11 +48,11 @@ class PlaneCubic:
         return 4 * p, 4 * q, 4 * r
 
     def h_at(self, u: Any, v: Any) -> Any:
-        """Return the value of h."""
+        """Return h(u, v)."""
         return PlanarBlock(*self.h).h(u, v)
 
     def D_at(self, u: Any, v: Any) -> Any:
-        """Return the value of D."""
+        """Return D(u, v)."""
         p, q, r = self.D
         return p * u * u + q * u * v + r * v * v
 
@@ -104,7 +104,7 @@ THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3
 
 
 def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
-    """Return the shape of the cubic and the matrix of determinant 1 from (u, v) to the symmetric coordinates.
+    """Return the shape of the cubic as text, and the matrix of determinant 1 that brings it to this shape.
 
     The coefficients of the block are real balls. If the ball of the discriminant of h contains 0, the discriminant
     counts as 0, and the matrix is I.

@@ -262,7 +262,7 @@ def plot_portrait(
         if portrait.values is None and points.shape[1] <= len(COLORS):
             _draw_few_orbits(axes, points, lines, portrait)
         elif portrait.values is None:
-            # In the colors of the color map; the widest orbit is drawn first, so that the orbits inside stay visible.
+            # Orbits are colored by the color map; the widest is drawn first, so that the orbits inside stay visible.
             with np.errstate(all="ignore"):
                 extent = np.nanmax(points, axis=0, initial=-np.inf) - np.nanmin(points, axis=0, initial=np.inf)
                 extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
