@@ -115,7 +115,7 @@ def section_of(
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
-    """Return the points of an orbit, interpolated, at which an affine function is 0, and the number of omitted ones.
+    """Return the interpolated points at which an affine function along an orbit is 0, and the number of omitted ones.
 
     Args:
         points: the points of the orbit (count, dim). values: the values of the function (count,).

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
 
 _EXIT_STATUS = {"periodic": 0, "aperiodic": 0}
 _ORBIT_HINT = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
-_LONG_PRIME_BITS, _MAX_PRIME_BITS = 90, 192  # for primes of these sizes the computation takes seconds to minutes
+_LONG_PRIME_BITS, _MAX_PRIME_BITS = 90, 192  # for primes between these sizes the computation takes seconds to minutes
 
 
 @click.command("period")

@@ -99,8 +99,8 @@ class MethodRun:
     `ends` says how the orbit of each initial point ended. The counts over all orbits are `evaluations` of f, solved
     linear `systems`, `repeated` steps (in which an implicit method needed more iterations), and `failures` (orbits that
     ended since Newton's method found no solution). `errors` are measured at the time of the reference solution, by
-    decreasing step size; `order` is the measured order: log2 of the quotient of the last two errors above the rounding
-    error, None if there are no two. `seconds` is None without a clock.
+    decreasing step size; `order` is log2 of the quotient of the errors for a step size and half of it, the smallest
+    ones above the rounding error (None: there are none). `seconds` is None without a clock.
     """
 
     method: str
@@ -445,7 +445,7 @@ def _choose_methods(
 def _initial_values(
     functions: Sequence[WatchedFunction], starts: Sequence[Sequence[fmpq]]
 ) -> tuple[list[tuple[FloatArray, FloatArray]], dict[str, bool]]:
-    """Return a pair of initial values and divisors of errors for each function, and by name: are errors relative?"""
+    """Return pairs (initial values, divisors of errors) of functions, and a dict: name -> are errors relative?"""
     points = np.array([to_floats(start) for start in starts])
     initial, relative = [], {}
     for function in functions:

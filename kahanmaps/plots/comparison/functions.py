@@ -162,7 +162,7 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
 
 
 def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
-    """Return the functions requested by pairs (name, text), text "known", a name in `functions_of`, or a formula.
+    """Return the functions for pairs (name, text): each text is "known", a name in `functions_of`, or a formula.
 
     A formula may contain eps. Raises InputError for invalid text, for a repeated name, and if no integral is known.
     """

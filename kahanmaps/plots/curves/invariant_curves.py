@@ -41,7 +41,7 @@ Numbers = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class PlaneOrbit:
-    """An orbit in one plane: its curve `cubic`, and its coordinates `u` and `v` at the steps 0, 1, ....
+    """An orbit in one plane: its curve `cubic`, and its coordinates `u` and `v` at the steps from 0 on.
 
     In a complex plane u and v are complex, and `cubic` is None.
     """
