@@ -191,7 +191,7 @@ def verdict_text(finding: Finding) -> str:
 
 
 def details(finding: Finding, printed: set[str], width: int | None = None) -> list[str]:
-    """Return the lines printed below a claim, without the hypotheses in the set `printed`, printed before."""
+    """Return the lines printed below a claim, without the hypotheses in `printed`, which were printed before."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]

@@ -151,7 +151,7 @@ def projected_solutions(
 ) -> tuple[FloatArray, ...]:
     """Return the solutions through the initial points of orbits as curves in the coordinates `axes`.
 
-    Each solution lasts as long as the orbits, and ends far away from them. Raises InputError if an axis is the step.
+    A solution ends at the time of the orbits, or far away from them. Raises InputError if an axis is the step.
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
