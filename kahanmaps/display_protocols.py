@@ -51,7 +51,7 @@ class Certified:
     __slots__ = ()
 
     def certificate(self, checker: str) -> str:
-        """Write a proof, checked by another program, of what this result proves about a map for every eps.
+        """Return a script in which another program checks what this result proves about a map for every eps.
 
         Args:
             checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
@@ -60,7 +60,7 @@ class Certified:
             The exact text of the script, a str with the same attributes as the result of `km.certificate`.
 
         Raises:
-            InputError: if there is no certificate, with the reason; for example, eps is fixed or the result measured.
+            InputError: if there is no certificate; its message says why: for example, eps is fixed.
 
         >>> from kahanmaps.checks.conserve import check_integrals
         >>> check_integrals("euler_top").findings[0].certificate("gp").splitlines()[-1]
@@ -71,10 +71,10 @@ class Certified:
 
 
 class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
-    """Base class of results that `print` shows as the output of their command.
+    """Base class of results: `print` shows the lines that the command for such a result prints.
 
-    A result with parts is a sequence of them: `_parts` is the name of the attribute that holds them, `_noun` the word
-    for a part, in the singular and the plural.
+    A result with parts is a sequence of its parts: `_parts` is the name of the attribute that holds them, and `_noun`
+    are the words for one part and for several.
     """
 
     __slots__ = ()
@@ -215,7 +215,7 @@ _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}  # fol
 
 
 def _load_displays(value: object) -> None:
-    """Import the file of kahanmaps.display with the name of the class's folder, or the name given in `_FILES`."""
+    """Import the file of kahanmaps.display for the class of `value`; its name is in `_FILES`, or that of the folder."""
     for base in type(value).__mro__:  # a user's subclass is displayed like its base class
         package, *folders = base.__module__.split(".")
         if package in ("kahanmaps", "flint"):

@@ -15,7 +15,7 @@ from datetime import date, time
 from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
-_MISTAKES_SHOWN = 50  # in one message
+_MISTAKES_SHOWN = 50  # number of mistakes in one message
 _CONTEXT_WIDTH = 72  # characters of a text that are shown around a mistake in it
 # Codes of the operating system for a full or broken disk, or for another exhausted resource.
 _MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
@@ -91,11 +91,11 @@ class SystemFileError(InputError):
 
 
 class HypothesisError(InputError):
-    """The objects do not belong to the commuting family: A is not skew-Hamiltonian, or H is not in its space."""
+    """(A, H) is no member of the commuting family: A is not skew-Hamiltonian, or H is not in the space of A."""
 
 
 class BadPrime(InputError):
-    """The prime divides a denominator, so the object has no reduction modulo it. Attribute: `prime`."""
+    """A prime that divides a denominator: there is no reduction modulo this prime. Attribute: `prime`."""
 
     def __init__(self, message: str, prime: int) -> None:
         self.prime = prime
@@ -116,7 +116,7 @@ class SingularMatrix(KahanmapsError, ZeroDivisionError):
 
 
 class PrecisionLost(KahanmapsError, ArithmeticError):
-    """Balls are too wide to decide whether a number is zero: a higher precision is needed."""
+    """A ball is too wide to decide whether its number is zero: a higher precision is needed."""
 
 
 class UnknownCurve(KahanmapsError):
@@ -187,7 +187,7 @@ def _cut(text: str, max_length: int) -> str:
 def reading(name: object) -> Iterator[None]:
     """Add the name of the source that is being read to an unexpected exception raised in the block.
 
-    The source may be damaged in an unforeseen way, while the exception without its name would suggest a bug.
+    Without this name the exception would suggest a bug, although the source may be damaged.
     """
     try:
         yield

@@ -163,7 +163,7 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def _catch_interrupts() -> Iterator[Callable[[], bool]]:
-    """Within the block, let Ctrl-C or a notebook's stop button end a search like a time limit, keeping its results.
+    """Within the block Ctrl-C, or a notebook's stop button, ends a search as a time limit does: its results are kept.
 
     A second interrupt raises KeyboardInterrupt. An interrupt handler installed by the caller is not replaced.
     """

@@ -22,9 +22,8 @@ class TimeLimit(KeyboardInterrupt):
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Raise TimeLimit within the block after this number of seconds; None means no limit.
 
-    `seconds` is positive. Completed work remains, and the interrupted computation is lost. The block gets a function
-    that returns whether the limit has expired. Raises InputError for an invalid limit, outside the main thread, and on
-    Windows.
+    `seconds` is positive. Results stored before the limit remain. The value after `as` is a function that returns
+    whether the limit has expired. Raises InputError for an invalid limit, outside the main thread, and on Windows.
 
     >>> with time_limit(60) as is_over:
     ...     print(is_over())

@@ -18,7 +18,7 @@ _ORBIT = "km.orbit(system, x0, eps, steps), in floating point with exact=False"
 _SYSTEM = 'km.System("x\' = y; y\' = x^2"), km.System({"x": "y", "y": "x^2"}) or km.load("euler_top")'
 _INTEGRALS = "km.find_integrals(system), or km.check_integrals(system, formula) for a claim"
 
-# What to type instead of a name; system, map, orbit and result stand for the user's values.
+# Name -> what to type instead, where system, map, orbit and result stand for the user's values.
 HINTS = {
     **dict.fromkeys(("parse", "parse_equations", "from_string", "from_sympy", "from_dict", "system", "ode"), _SYSTEM),
     **dict.fromkeys(("ODE", "QuadraticField", "VectorField", "vector_field", "from_text", "from_latex"), _SYSTEM),

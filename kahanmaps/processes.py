@@ -13,7 +13,7 @@ def processors() -> int:
     """Return the number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not every system has this function
+    except AttributeError:  # not every operating system has this function
         return os.cpu_count() or 1
 
 

@@ -52,7 +52,7 @@ def similar_words_of(written: str, words: list[str], cutoff: float = 0.6) -> lis
     return [candidate for candidate, ratio in zip(similar_words, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
-# removed option as (command, option) -> what to use instead
+# (command, removed option) -> what to use instead
 REMOVED_OPTIONS = {
     **{
         ("report", name): "'kahanmaps batch show' shows the results of a batch, 'batch export' writes them for pandas"

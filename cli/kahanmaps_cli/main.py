@@ -32,7 +32,7 @@ SUCCESS, REFUTED, USAGE_ERROR, UNDECIDED, INTERNAL_ERROR = 0, 1, 2, 3, 70
 
 COMPLETION = "_KAHANMAPS_COMPLETE"  # environment variable, set by the shell to request completions
 
-# heading -> name -> (module in kahanmaps_cli.commands, one line for the list of commands)
+# Heading -> name of a command -> (its module in kahanmaps_cli.commands, its line in the list of commands).
 SECTIONS = {
     "Maps and orbits": {
         "systems": ("systems", "List or show the named systems of the catalogue."),
@@ -215,7 +215,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _report_interrupt(stop: BaseException) -> int:
     end_interrupts()
-    is_over = isinstance(stop, TimeLimit)  # --seconds expired at the very end of a search
+    is_over = isinstance(stop, TimeLimit)  # the limit --seconds expired at the very end of a search
     print_stderr(f"stopped: {stop} (--seconds)" if is_over else "interrupted")
     return UNDECIDED if is_over else INTERRUPTED
 

@@ -223,7 +223,7 @@ check_options: Callable[[F], F] = stack(
 
 
 def pick(options: Mapping[str, Any], *names: str, **renamed: str) -> dict[str, Any]:
-    """Return values of options as keyword arguments; `pick(options, "seed", terms="max")` passes max as terms."""
+    """Return a dict of options as keyword arguments; with terms="max" the option max becomes the argument terms."""
     return {name: options[name] for name in names} | {argument: options[name] for argument, name in renamed.items()}
 
 
@@ -239,7 +239,7 @@ def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
 
 
 def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
-    """Return eps from --eps or --time-step, required if the map depends on eps; None if the map has no eps."""
+    """Return eps from --eps or --time-step, which is required if the map depends on eps; None for a map without eps."""
     eps = requested_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
 
@@ -250,12 +250,12 @@ def are_equations(reference: str | None) -> bool:
 
 
 def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
-    """Whether the command line itself contains the system or map."""
+    """Whether the command line contains the system or map itself, as equations or by options such as --rhs."""
     return are_equations(reference) or any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
 
 
 def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) -> tuple[str | None, str | None]:
-    """Return the first and the second system; if the first is inline, SYSTEM names the second."""
+    """Return `system`, `other` as the first and second system; if the first is inline, `system` is the second one."""
     if is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":
@@ -351,7 +351,7 @@ def _load_without_notes(reference: str | None, options: Mapping[str, Any]) -> li
 def load_with_start(
     options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *arguments: str | None
 ) -> tuple[Any, Any]:
-    """Load one or two systems and the initial point, which may contain parameters.
+    """Return the file or the two files that `load` loads, and the initial point, whose text may contain parameters.
 
     An algebraic number given by -p that is not a parameter of the system is used only in the initial point.
     """

@@ -28,7 +28,7 @@ _MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # maximal number of digits of a step nu
 
 
 class ParameterKind(OptionType):
-    """A type whose texts are converted by `read(text, *settings)`; its InputError becomes the message.
+    """A type of option values: `read(text, *settings)` converts a text, and its InputError becomes the message.
 
     Non-string values are defaults and are returned unchanged.
     """
@@ -105,7 +105,7 @@ def Steps() -> ParameterKind:
 
 
 def Shard() -> ParameterKind:
-    """Return the type of I/N, the I-th of N parts."""
+    """Return the type of texts I/N, which mean the I-th of N parts."""
 
     def read(text: str) -> tuple[int, ...]:
         pieces = text.partition("/")[::2]
@@ -158,7 +158,7 @@ def Whole(minimum: int = 0) -> ParameterKind:
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
-    """Return the type of NAME=VALUE; if `name_is_optional`, a text without a name is the value."""
+    """Return the type of NAME=VALUE; if `name_is_optional`, a text without = is the value, and its name is empty."""
 
     def read(text: str) -> tuple[str, str]:
         name, equals, value = (piece.strip() for piece in text.partition("="))

@@ -107,7 +107,7 @@ def systems_sentence(report: Report) -> str:
 
 @html_form.register
 def report_html(report: Report) -> str:
-    """Return the findings of a check as a table; for many claims, counts by section and the unproved claims only."""
+    """Return the findings of a check as a table; for many claims, counts by section and a table of unproved claims."""
     title = f"{report.check}: {systems_sentence(report)}"
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_escaped(verdict_counts(report.findings))})</p>"]
     shown_findings = list(report.findings)
@@ -191,7 +191,7 @@ def verdict_text(finding: Finding) -> str:
 
 
 def details(finding: Finding, printed_hypotheses: set[str], width: int | None = None) -> list[str]:
-    """Return the lines that follow a claim; `printed_hypotheses` were printed before."""
+    """Return the lines printed below a claim, without `printed_hypotheses`, which were printed before."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed_hypotheses))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
@@ -203,7 +203,7 @@ def details(finding: Finding, printed_hypotheses: set[str], width: int | None = 
 
 
 def summary(evidence: Evidence, printed_hypotheses: set[str] | None = None) -> str:
-    """Return the evidence as a sentence without the `printed_hypotheses`; new hypotheses are added to these."""
+    """Return the evidence as a sentence without `printed_hypotheses`, to which all other hypotheses are added."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary

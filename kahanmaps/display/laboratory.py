@@ -59,7 +59,7 @@ class HtmlCell:
         return self.text
 
 
-Line = Sequence[object]  # its cells: `HtmlCell`, or objects that str() converts to text
+Line = Sequence[object]  # the cells of a line: `HtmlCell`, or objects that str() converts to text
 
 
 def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> HtmlCell:
@@ -86,7 +86,7 @@ def _found_tensor(result: FoundTensor | IntegralInIterates) -> str:
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
-    """Return a phrase with the eps of a result and the time step; empty if the map does not depend on eps."""
+    """Return a phrase with the eps of a result and the time step 2 eps; empty if no map depends on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
 
@@ -170,7 +170,7 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """List each formula with its verdict and evidence, then the remarks on the search."""
+    """Yield each integral with its verdict and evidence, then the remarks on the search."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
@@ -182,7 +182,7 @@ def _densities(search: DensitySearch) -> Iterator[Line]:
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """List each tensor with its verdict and properties, then the remarks on the search."""
+    """Yield each Poisson tensor with its verdict and properties, then the remarks on the search."""
     named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named_results, (search.note, search.reason))
 
@@ -219,7 +219,7 @@ def _darboux(search: DarbouxSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _structures(structures: ConstantStructures) -> Iterator[Line]:
-    """Yield the Hamiltonian form, or the reason why there is none."""
+    """Yield the form f = J grad H with a constant matrix J, or the reason why there is none."""
     if structures.hamiltonian is None:
         yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return
@@ -239,7 +239,7 @@ def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
 
 @lines_of.register
 def _heights(survey: HeightSurvey) -> Iterator[Line]:
-    """Yield a line for each orbit, and the conclusion from all orbits."""
+    """Yield a line on the heights of each orbit, and the conclusion from all orbits."""
     for orbit in survey.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
         yield "orbit", *([f"eps {orbit.eps}"] if survey.has_eps else []), f"start {point}", orbit.growth.text
@@ -301,7 +301,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 @lines_of.register
 def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
-    """Yield one-parameter groups, a scaling, generators of the finite group, and the completed searches."""
+    """Yield one-parameter groups, a flow that rescales eps, generators of the finite group, completed searches."""
     for generator in symmetries.infinitesimal:
         kind = "linear" if generator.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(generator.rhs)})"
@@ -321,7 +321,7 @@ def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
 
 @lines_of.register
 def _commuting(systems: CommutingSystems) -> Iterator[Line]:
-    """Yield the g that commute, except 0, f and -f, each written as options of a command."""
+    """Yield the fields g whose Kahan maps commute with that of f, except 0, f, -f, as options of a command."""
     if systems.dimension is not None:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
@@ -357,7 +357,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
-    """Return g as options of a command, with B if g = B f; a notebook shows the equations of g."""
+    """Return g as options of a command, with the matrix B if g = B f; a notebook shows the equations of g."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:
@@ -372,7 +372,7 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 
 
 def _title(subject: str, result: Any, *subtitle: str) -> tuple[str, str]:
-    """Return a title that contains the name of the system, and a subtitle that ends with eps."""
+    """Return the title, which contains the name of the system, and the subtitle, which ends with eps."""
     phrases = (*subtitle, eps_sentence(result.eps, result.file.map))
     return f"{subject} of {markup.abbreviate(result.file.name)}", "; ".join(filter(None, phrases))
 

@@ -176,7 +176,7 @@ def map_latex(kahan: KahanMap) -> str:
 
 @latex_form.register
 def composition_latex(map_: Map) -> str:
-    """Return a map other than Kahan's as text."""
+    """Return the text of a map other than Kahan's as LaTeX."""
     return rf"$\text{{{_tex(map_)}}}$"
 
 
@@ -193,7 +193,7 @@ def birational_latex(map_: MapFamily) -> str:
 
 
 def _polarized_component(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
-    """Return the component Q(x, x~) + B (x + x~)/2 + c of the polarization, 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
+    """Return the polarization 2 f((x + x~)/2) - f(x)/2 - f(x~)/2 of one component f of the vector field as LaTeX."""
     terms_shown = first_terms(polynomial, CHARACTERS // 2)
     context = ring((*variables, *(f"{name}~" for name in variables)))
     x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
@@ -212,7 +212,7 @@ def _tex(text: object) -> str:
 
 @html_form.register
 def orbit_html(orbit: Orbit) -> str:
-    """Return the first points, the last computed point, and how the orbit ended."""
+    """Return the first points of an orbit, its last computed point, and how it ended."""
     variables = orbit.map.variables
     first_points, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
@@ -239,7 +239,7 @@ def orbit_html(orbit: Orbit) -> str:
 
 @html_form.register
 def trajectory_html(orbit: Trajectory) -> str:
-    """Return the first points, and the last point if all points were stored."""
+    """Return the first points of an orbit, and its last point if all points were stored."""
     computed = vars(orbit).get("points")
     points_shown = orbit.preview(_POINTS) if computed is None else [*computed[:_POINTS], *computed[_POINTS:][-1:]]
     variables = orbit.variables
@@ -256,7 +256,7 @@ def trajectory_html(orbit: Trajectory) -> str:
 
 
 def _point_cells(point: OrbitPoint, count: int) -> list[str]:
-    """Return a row: the step, the first of `count` coordinates, and the number of digits."""
+    """Return a row of a table: the step, the first few of `count` coordinates, and the number of digits."""
     is_long = point.digits > _MAX_DIGITS
     texts = [t if len(t) <= 24 else f"{t[:10]}…{t[-10:]}" for t in (["(long)"] * count if is_long else point.text)]
     cells = texts[:_COORDINATES] + ["…"] * (count > _COORDINATES)
@@ -273,7 +273,7 @@ def period_html(period: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(period: OrbitPeriod) -> str:
-    """Return the period, the periods in the planes, and whether the orbit reaches a pole."""
+    """Return the period of an orbit, its periods in the planes, and whether the orbit reaches a pole."""
     lines = [f"period\t{_period_word(period)}"]
     for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]

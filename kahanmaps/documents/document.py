@@ -61,7 +61,7 @@ Values = dict[str, RationalFunction]
 
 
 class _Part(NamedTuple):
-    """A map of a composition, its exponent, the values of its symbols, and its entry of the list as a TOML table."""
+    """A map of a composition, its exponent, the values of its symbols, and its TOML table in the list of maps."""
 
     map: MapFamily
     power: int
@@ -117,7 +117,7 @@ class DocumentReader(PartReader):
             read_structured_facts(catalog, self.variables, self._report)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        # The document, with the name and the current parameter values; long integers are text, as JSON requires.
+        # The document with the name and current parameter values; long integers become text, as JSON requires.
         document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": name, **document}
         if self.parameters:
@@ -141,7 +141,7 @@ class DocumentReader(PartReader):
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
     ) -> tuple[MapFamily | None, CubicHamiltonian | None, FamilyMember | None]:
-        """Read the section that determines the kind of the document; return an empty result for a mistake."""
+        """Return the map of the section [kind], its Hamiltonian and its member; each may be None: absent or invalid."""
         if section is None:
             return None, None, None
         map_, hamiltonian, member = None, None, None
@@ -168,7 +168,7 @@ class DocumentReader(PartReader):
             if self.root is not None:
                 parameter, root = self.root
 
-                def map_at(value: fmpq) -> MapFamily:  # for floats
+                def map_at(value: fmpq) -> MapFamily:  # `value` approximates the algebraic number, for floats
                     overrides = {**self.overrides, parameter: value}
                     reader = DocumentReader(self.document, self.where, overrides, self.look_up)
                     parsed_map: MapFamily = reader.read()["map"]
@@ -330,7 +330,7 @@ class DocumentReader(PartReader):
         return self._make_checked_map(explicit_map, "map", self.variables, image, inverse)
 
     def _make_checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
-        """Return the map if it is defined and dominant and a given inverse is correct; if not, note a mistake."""
+        """Return the map if it is defined and dominant, and a given inverse is correct; otherwise note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None
@@ -359,7 +359,7 @@ class DocumentReader(PartReader):
         return None if H is None else hamiltonian
 
     def _read_symbolic_field(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """Return the Kahan map of J grad H, where J and H may contain symbols."""
+        """Return the Kahan map of f = J grad H, where J and H may contain symbols; None after a mistake."""
         H, n = self._read_polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-MAX_CHARACTERS = 2_000_000  # of all equations together
+MAX_CHARACTERS = 2_000_000  # number of characters of all equations together
 _OPEN, _CLOSE = ("(", "[", "{"), (")", "]", "}")
 _EQUALS = ("=", "==", ":=")
 # In decomposed Unicode a dot above a letter is a separate character; two dots or a double quote mean two primes.
@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 _MAX_TOKENS = 16  # maximal number of tokens of a derivative written without primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
-# Patterns of derivatives (with blanks only between two words) and the order. They are compiled when they are needed.
+# Patterns of derivatives (with blanks only between two words) and their orders; each is compiled when it is needed.
 _DERIVATIVE_PATTERNS = (
     (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
     (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
@@ -54,7 +54,7 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     """Replace equations in [system] by a list of right-hand sides and the variables.
 
     If the variables are not given, they are ordered as their equations; velocities of equations of second order come
-    last. A document without equations is returned unchanged. The second result is a list of notes on new names. Raises
+    last. A document without equations is returned unchanged. The second entry lists notes on new names. Raises
     InputError for a text that is not an equation, and for an equation of a variable that is not among the given ones.
 
     >>> without_left_sides({"system": {"rhs": "x' = x*y, dy/dt = -x"}})
@@ -97,7 +97,7 @@ def tokens_of(text: str) -> list[str]:
 
 
 def pieces_of(text: str) -> list[list[str]]:
-    """Return the tokens of each equation or formula in a list. Raises InputError for unbalanced brackets."""
+    """Return a list of tokens for each equation or formula in a text. Raises InputError for unbalanced brackets."""
     tokens = tokens_of(text)
     positions = [k for k, token in enumerate(tokens) if not token.isspace()]
     # Omit the name and the terminator of a list, as in eqs := [x' = y, y' = -x];
@@ -219,7 +219,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
 
 
 def _skip_argument(tokens: Sequence[str], position: int) -> int:
-    """Return the position after (t) or [t]; without such an argument, return `position`."""
+    """Return the position after an argument (t) or [t] that begins at `position`; without one, return `position`."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
@@ -259,7 +259,7 @@ def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], veloc
 def _replace_indexed_names(
     pieces: Sequence[list[str]], parameters: Collection[str]
 ) -> tuple[list[list[str]], list[str]]:
-    """Replace x[0] by x0 (or x_0 if x0 is taken); return the pieces and notes."""
+    """Replace x[0] by x0 (or x_0 if x0 is taken); return the new pieces, and a note on each new name."""
     used_names = {*parameters, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
     new_pieces: list[list[str]] = []

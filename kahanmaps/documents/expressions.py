@@ -36,7 +36,7 @@ def formula_text(value: Any) -> str:
 
 
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
-    """Replace the irrational number in SymPy expressions by a name, if there is exactly one; also return its value."""
+    """Replace the only irrational number in SymPy expressions by a name; return the sides, {name: number} or {}."""
     from_sympy = [side for side in sides if _is_sympy(side)]
     irrational_numbers = {irrational for side in from_sympy for irrational in _irrational_numbers(side)}
     if len(irrational_numbers) != 1 or any(irrational.is_Float for irrational in irrational_numbers):

@@ -20,7 +20,7 @@ from kahanmaps.errors import InputError, quoted
 
 _MEMBER_NAME = re.compile(r"(\w+)(?:\((.*)\))?")
 _INTEGER = re.compile(r"-?[0-9]{1,6}")
-MAX_SPECIES = 40  # largest n: documents grow like n^2
+MAX_SPECIES = 40  # largest n of LV(n, k): documents grow like n^2
 _DEGREE_COUNT = 4  # number of degrees d_1, d_2, ... in a document
 
 

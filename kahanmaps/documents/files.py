@@ -130,7 +130,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def claim_names(self) -> tuple[str, ...]:
-        """The arguments of claims: the variables, the algebraic parameter if there is one, and eps."""
+        """The names of the arguments of claimed functions: the variables, the algebraic parameter (if any), and eps."""
         return (*self.variables, *(self.map.given.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
 
     @property
@@ -225,7 +225,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
-        """Return the file of a member of the family, or of the associated system given by its signs."""
+        """Return the file of a member of the family; if `member.signs` are not all +, that of an associated system."""
         from kahanmaps.family.cubics import default_variables
 
         section: dict[str, Any] = {"A": _matrix_rows(member.A), "H": format_polynomial(member.H)}
@@ -260,7 +260,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return f"SystemFile({self.name}: {shorten(repr(self.map), 100)}{values})"
 
     def __str__(self) -> str:
-        """Return the equations, with values in place of parameters."""
+        """Return the equations of the system or map as text, with values in place of parameters."""
         return f"{self.name}:\n{self.map}"
 
     def __eq__(self, other: object) -> bool:
@@ -281,7 +281,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
 
 def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form for float orbits, or the reason why there is none (e.g. `method` is "generic")."""
+    """Return the normal form for float orbits, or a reason why none is used (such as the method "generic")."""
     normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
     if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
         return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")
@@ -355,7 +355,7 @@ def _matrix_rows(matrix: fmpq_mat) -> list[list[str]]:
 
 
 def match_variables(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
-    """Return the second of two maps in the variables of the first, and a note if they differ.
+    """Return the map of `other` in the variables of `file`, and a note on the matching ("" for the same variables).
 
     Variables are matched by name if both maps have the same names, otherwise by position. Raises InputError if the
     dimensions differ, and for maps other than Kahan's whose variables have the same names in another order.

@@ -55,7 +55,7 @@ def System(
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
-            of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
+            of SymPy, or a list of SymPy equations Eq(x(t).diff(t), ...).
         variables: for a list of right-hand sides, the names of the variables in this order; otherwise also a dict of
             parameters. For a Hamiltonian the positions, then the momenta in the same order.
         hamiltonian: H, instead of equations: q' = dH/dp, p' = -dH/dq.
@@ -111,7 +111,7 @@ def System(
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-# Aliases in the style of other libraries: System.from_sympy([y, x**2], (x, y)).
+# Other names of System in the style of other libraries, e.g. System.from_sympy([y, x**2], (x, y)).
 vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
 vars(System)["from_hamiltonian"] = lambda H, variables=None, **parameters: System(
     None, variables, hamiltonian=H, **parameters

@@ -17,11 +17,11 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
 MAX_ITERATES = 16  # largest number of ~ after a name
-_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced
+_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced by their formulas
 
 
 def iterates_in(*texts: str) -> int:
-    """Return the largest number of ~ after a name.
+    """Return the largest number of ~ after a name in texts: 2 if x~~ occurs.
 
     >>> iterates_in("x*y~ - x~~", "x")
     2

@@ -32,15 +32,15 @@ from kahanmaps.sources import SOURCES
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
 FACT_KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
-MAX_MONOMIALS = 100_000  # of one relation
+MAX_MONOMIALS = 100_000  # number of monomials of one relation
 _DEGREE_BOUND = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")
 
 
 class ClaimedRelations(NamedTuple):
-    """A Hirota-Kimura basis: along a generic orbit `dimension` independent linear combinations of `functions` vanish.
+    """A Hirota-Kimura basis: `functions` (polynomials over Q in the variables), as written in the file in `text`.
 
-    `text` contains the functions as written in the file; they are polynomials over Q in the variables of the system.
+    `dimension` is the dimension of the space of their linear combinations that vanish along a generic orbit.
     """
 
     text: str

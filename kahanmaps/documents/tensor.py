@@ -17,7 +17,7 @@ from kahanmaps.maps.kahan import SystemLike
 
 
 def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
-    """Convert the system of a file over K = Q[t]/(chi) to a file over Q; a parameter t of the file generates K.
+    """Convert the system of a file over K = Q[t]/(chi) to a file over Q; a parameter t of the file stands for t in K.
 
     The integrals and the density are also converted, unless the results are too large or the file has a parameter t (on
     which these claims may depend). `chi` is not constant and may have repeated roots. The result is exact. Raises

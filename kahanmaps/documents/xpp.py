@@ -39,7 +39,7 @@ def is_ode(text: str) -> bool:
 
 
 def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
-    """Read an XPP file; return the document and notes on skipped lines. `where` names the file in messages.
+    """Return the document in the text of an XPP file, and notes on skipped lines. `where` names it in messages.
 
     Raises SystemFileError with every line that cannot be read.
 

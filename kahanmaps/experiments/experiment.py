@@ -36,7 +36,7 @@ DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY = "family"
-_MAX_FILES = 10_000  # that match one pattern
+_MAX_FILES = 10_000  # number of files that match one pattern
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
@@ -83,7 +83,7 @@ _SYSTEM_FILE_KEYS = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]]:
-    """Return the mistakes in the shape as triples of a path, the key as text, and a sentence.
+    """Return the mistakes in the shape of a spec as triples: the path of the entry, the same path as text, a sentence.
 
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
@@ -188,7 +188,7 @@ class Experiment:
     def definition(self) -> str:
         """The definition as canonical text: experiments with equal definitions have equal tasks.
 
-        The first task contains all shared values, including defaults, which may change between versions.
+        It contains the first task, hence also the default values, which may change between versions.
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():
@@ -362,7 +362,7 @@ class ExperimentReader:
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written_name, names)}")
 
     def _read_axis(self, key: str, option: Option, raw: Any) -> AxisValues | None:
-        """Return the values of one option; None after reporting a mistake."""
+        """Return the values of one option, read from `raw`; None after reporting a mistake at `key`."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):

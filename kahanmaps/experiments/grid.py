@@ -18,7 +18,7 @@ from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import Option
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
-_MAX_VALUES = 2**62  # values of an axis: Python's `len` cannot exceed 2^63
+_MAX_VALUES = 2**62  # maximal number of values of an axis: Python's `len` cannot exceed 2^63
 _TOO_MANY = "too many values"  # for messages
 
 Mistake = tuple[tuple[int, ...], str]  # the position in a list, and a sentence
@@ -92,7 +92,7 @@ def is_range(raw: Any) -> bool:
 
 
 def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisValues | None, list[Mistake]]:
-    """Read the values of an option in a spec; also return the mistakes, with positions in the list counted from 1.
+    """Return the values of an option in a spec (None if invalid), and the mistakes, with positions counted from 1.
 
     `raw` is one value, a range or a list of values and ranges. If `repeats` is true, a value may occur several times.
     """

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 POISSON_ARGUMENTS = {"symbolic": "symbols", "max_degree": "degree"}
-_ENDINGS = ("constant", "singular")  # ends of a degree sequence that is known for all iterates without a recurrence
+_ENDINGS = ("constant", "singular")  # if a degree sequence ends so, all degrees are known without a recurrence
 
 
 @analysis(
@@ -338,7 +338,7 @@ def _state_of_integrals(search: IntegralSearch) -> str:
 
 
 def _state_of_densities(search: DensitySearch) -> str:
-    """Return "found", "none" (measured, up to the largest degree searched) or "open" (undecided, see the reason)."""
+    """Return "found", "none" (measured: up to the largest degree that was searched) or "open" (undecided)."""
     if search.densities:
         return "found"
     return "none" if search.reason.startswith("no polynomial") else "open"

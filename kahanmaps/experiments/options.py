@@ -22,7 +22,7 @@ from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.random_members import MAX_M, parse_chi
 
 _MAX_INTEGER = 2**63 - 1
-_MAX_PRIME_BITS = 192  # of the option prime
+_MAX_PRIME_BITS = 192  # maximal number of bits of the option prime
 _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 _MAX_SECONDS, _MAX_BYTES = 10**9, 10**18  # limits of system calls
@@ -213,7 +213,7 @@ def _read_amount(value: Any, units: Mapping[str, int], expected: str, least: Fra
 
 
 EFFORT = "effort"
-OTHER = "other"  # read with the spec, relative to whose folder paths are resolved; its canonical form is a system spec
+OTHER = "other"  # a second system: paths are relative to the folder of the spec; its canonical form is a system spec
 
 VOCABULARY = {
     option.name: option

@@ -43,7 +43,7 @@ SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
 
 @dataclass(frozen=True)
 class TaskKind:
-    """A kind of task, with options, defaults and the kind of system it needs; if it `reports`, with a full report."""
+    """A kind of task: its options, their defaults, the kind of system it needs, and whether it `reports` in full."""
 
     name: str
     summary: str

@@ -32,8 +32,8 @@ from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import SystemFileError, reading
 from kahanmaps.experiments.experiment import Experiment, ExperimentReader, SpecDocument
 
-MAX_BYTES = 4_000_000  # of a spec file
-MAX_TASKS = 1_000_000  # of all experiments of a spec, unless the caller allows more
+MAX_BYTES = 4_000_000  # maximal size of a spec file
+MAX_TASKS = 1_000_000  # number of tasks of all experiments of a spec, unless the caller allows more
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
 _MAX_LISTED = 3  # maximal number of experiments in a message
 

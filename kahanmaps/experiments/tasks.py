@@ -31,7 +31,7 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
-_MIN_COMPILED_WORK = 5_000_000  # orbits times steps
+_MIN_COMPILED_WORK = 5_000_000  # orbits times steps from which compiled code is used
 _MAX_POINT = 400  # maximal number of characters of a stored last point; of a longer point only the hash is stored
 
 
@@ -39,7 +39,7 @@ _SETTINGS = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": D
 
 
 def _register_check(check: Check) -> None:
-    """Register a task for a check, of one system or of a pair of systems with two time steps."""
+    """Register a task for a check of one system, or of a pair of systems with two time steps."""
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
@@ -242,7 +242,7 @@ def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
 
 
 def _full_result(report: Report) -> FullResult:
-    """Return the verdict, the counts of verdicts, and the refuted or undecided claims with their witnesses."""
+    """Return the verdict, counts of verdicts, and refuted or undecided claims with witnesses; then the full report."""
     findings = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in findings)
     controls = [finding for finding in report.findings if finding.control]

@@ -119,7 +119,7 @@ class _Writer:
         default_names |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
         default_names |= {"kahan_map_formula": default_names["kahan_map"] + "_formula"}
         default_names |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
-        # Names of functions in the file: our name -> name in the file.
+        # Names of functions: name in this module -> name in the file.
         self.names = {key: self._fresh_name(*self.prefix, name) for key, name in default_names.items()}
         for key in (*formulas.integrals, *formulas.forms):
             self.names[f"integral {key}"] = self._fresh_name(*self.prefix, "integral", key)
@@ -242,7 +242,7 @@ class _Writer:
     ) -> None:
         """Write a function; `points` maps each argument that is a point to the names of its coordinates in the body.
 
-        Without `points` the function has one point, used as a vector.
+        Without `points` the function has one point as an argument, used as a vector.
         """
         numbers = [*(self.eps if eps else []), *self.symbols]
         coordinates = {

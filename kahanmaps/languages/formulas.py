@@ -28,15 +28,15 @@ from kahanmaps.version import __version__
 
 # Limits for the closed form of the map (all components together) before common factors are removed.
 MAX_TERMS = 4_000
-MAX_DIMENSION_OF_FORMULAS = 8  # of the map
+MAX_DIMENSION_OF_FORMULAS = 8  # maximal dimension of the map
 
 
 class Formulas:
     """The formulas of a system file; the parameters `symbols` stay symbolic, all other parameters are numbers.
 
-    An algebraic number is also a symbol. `names` are the variables, then the symbols; `rhs`, its derivatives `jacobian`
-    and `H` are polynomials in these names, other formulas in these names and eps. For maps other than Kahan's `rhs` is
-    empty. `new` are names for the coordinates of the image x~ of a point.
+    An algebraic number is also a symbol. `names` are the variables, then the symbols. `rhs`, its derivatives `jacobian`
+    and `H` are polynomials in these names; other formulas also contain eps. For maps other than Kahan's `rhs` is empty.
+    `new` are names for the coordinates of the image x~ of a point.
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
@@ -75,12 +75,12 @@ class Formulas:
 
     @cached_property
     def equation(self) -> list[list[fmpq_mpoly]]:
-        """The rows of (M | r), where M x~ = r defines the map; for Kahan's M = I - eps f'(x), r = M x + 2 eps f(x)."""
+        """The rows of (M | r): M x~ = r defines the map. A Kahan map has M = I - eps f'(x) and r = M x + 2 eps f(x)."""
         return [[*row[:-1], -row[-1]] for row in self.map.rows]
 
     @cached_property
     def forms(self) -> dict[str, fmpq_mat]:
-        """The matrices M = J (A^T)^k, k < m, of a member of the commuting family: x^T M x~/eps is an integral."""
+        """The matrices M = J (A^T)^k, k < m, of a member (A, H), for which x^T M x~/eps are integrals, by name."""
         member = self.file.member
         if member is None:
             return {}
@@ -88,10 +88,10 @@ class Formulas:
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
-        """Yield the integrals of a Hamiltonian system in x and x~: name, formula as text, function.
+        """Yield the integrals of a Hamiltonian system in x and its image x~ as triples: name, formula (text), function.
 
-        For a member these are x^T M x~/eps with the M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3: functions of
-        the variables, the coordinates `new` of x~, the symbols and eps.
+        For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. They are
+        functions of the variables, the coordinates `new` of x~, the symbols and eps.
         """
         if self.H is None:
             return
@@ -115,7 +115,7 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """What is neither claimed in the file nor given by a theorem ("integrals", "density"), with a message."""
+        """A message for "integrals" and for "density" if they are neither claimed in the file nor given by theorems."""
         if self.H is not None:  # the modified H and the density det(I - eps f'(x)) are known
             return {}
         messages = {}

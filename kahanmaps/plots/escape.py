@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_CELLS, MAX_STEPS = 2000, 1_000_000  # cells along each axis, steps of each orbit
-STAYS, ENDS = -1, -2  # instead of a direction: the orbit stays in the ball; it ends at a pole or by overflow
+STAYS, ENDS = -1, -2  # instead of a direction, for an orbit that stays in the ball, or ends at a pole or by overflow
 
 
 @dataclass(frozen=True, eq=False)

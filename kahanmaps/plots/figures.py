@@ -201,7 +201,7 @@ def shortened_name(name: str, suffix: str, style: Style) -> str:
 
 
 def letter_count(label: str) -> int:
-    """Return the approximate number of letters of a typeset label, without the commands of mathtext."""
+    """Return the approximate number of letters of a typeset label, not counting the commands of mathtext."""
     return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
 
 
@@ -266,7 +266,7 @@ def write_beside(
 def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
     """Make the vertical axis logarithmic from `least` to `largest`; return the value at which zeros are drawn.
 
-    Exact zeros are drawn in a gray band at the bottom that is labelled 0. Without zeros it returns None.
+    Exact zeros are drawn in a gray band at the bottom that is labelled 0. If `has_zeros` is false, it returns None.
     """
     axes.set_yscale("log")
     low, high = math.log10(least), math.log10(largest)

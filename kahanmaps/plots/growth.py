@@ -52,7 +52,7 @@ def plot_degrees(
     """Plot the degrees d_n of the iterates against n; `growths` maps the names of systems to their degree growth.
 
     Marks are the measured degrees. A solid line shows degrees that satisfy a checked recurrence. A dotted line joins
-    degrees without one; then the growth in the legend is an estimate. `scale` is "linear", "log" (exponential growth is
+    degrees without a recurrence; their growth is then estimated. `scale` is "linear", "log" (exponential growth is
     a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" if some growth is or
     looks exponential, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises InputError
     unless there are 1 to 7 systems, and for an unknown scale.
@@ -118,7 +118,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """Return the legend text after the name: d_n, the dynamical degree or the growth; it says what is an estimate."""
+    """Return the legend text after the name: d_n, the dynamical degree or the growth, and whether it is an estimate."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -302,8 +302,8 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
 class HeightCurve:
     """Heights in bits of one orbit at some steps, the kind of growth of the orbit, and the fitted numbers.
 
-    `eps` is half the time step (exact); `constant` is c in c n^2 or c n, `ratio` the factor of one step for exponential
-    growth; `status` says how the orbit ended, as in OrbitEnd.
+    `eps` is half the time step (exact); `constant` is c in the fit c n^2 or c n, `ratio` the factor of one step for
+    exponential growth; `status` says how the orbit ended, as in OrbitEnd.
     """
 
     eps: fmpq
@@ -377,7 +377,7 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """Return the fitted law as a function of the step; its non-positive values become NaN. None if no law was fitted.
+    """Return the fitted height as a function of the step (NaN where it is not positive); None if nothing was fitted.
 
     For c n^2 and c n, c is `curve.constant`, and the terms of lower degree are a least-squares fit to the heights. The
     exponential goes through the last height.

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 
 class Plot(AttributeHints):
-    """Pictures of results, as axes: `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other types.
+    """Pictures of results; each method returns matplotlib axes `ax`, and `ax.figure.savefig("a.pdf")` writes a file.
 
-    `km.plot(value)` draws a result, an orbit, or the portrait of a system.
+    `km.plot(value)` draws a result, an orbit, or the portrait of a system. Raises InputError for other types.
     """
 
     def __reduce__(self) -> str:
@@ -72,14 +72,14 @@ class Plot(AttributeHints):
         return _axes(plot_scan(result, Style()))
 
     def compare(self, result: Comparison, *, show: str = "drift", scale: str = "loglog") -> Axes:
-        """Plot a result of `km.compare`: the "drift", or the "error" against the time step or the "work"."""
+        """Plot a result of `km.compare`: "drift", "error" (against the time step) or "work" (evaluations of f)."""
         from kahanmaps.plots.comparison.plot_compare import plot_comparison
 
         _require(result, Comparison, "a result: km.plot.compare(km.compare(...))")
         return _axes(plot_comparison(result, show=show, scale=scale))
 
     def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
-        """Draw x, Phi_f x, Phi_g x, and Phi_g Phi_f x with Phi_f Phi_g x, for two systems or a member of the family."""
+        """Draw x and its images under the Kahan maps of two systems (or associated systems) and their two products."""
         from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, plot_squares, squares
 
         file = as_file(system)
@@ -130,7 +130,7 @@ class Plot(AttributeHints):
             x0: one initial point or many.
             eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
-            axes: two variables or expressions; by default those along which the crossings spread most.
+            axes: two variables or expressions; by default the variables along which the crossings spread most.
             direction: "up" for crossings to larger values, "down" or "both".
         """
         from kahanmaps.plots.comparison.functions import requested_axis

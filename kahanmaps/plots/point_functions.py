@@ -49,12 +49,12 @@ class PointFunction:
         return np.where(np.isfinite(values), values, np.nan)
 
     def at(self, point: Sequence[fmpq]) -> fmpq | None:
-        """Return the exact value at a rational point; None at a pole."""
+        """Return the exact value of the function at a rational point; None at a pole."""
         value: fmpq | None = self.function.value(QQ, [*point, self.eps])
         return value
 
     def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return numerator and denominator at points (..., dim)."""
+        """Return the values of the numerator and of the denominator of the function at points (..., dim)."""
         with np.errstate(all="ignore"):
             return self._value(self.function.numerator, points), self._value(self.function.denominator, points)
 

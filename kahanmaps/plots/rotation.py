@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.62  # height over width of the axes
 _MIN_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
 _MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
-_MAX_POINTS = 10_000  # initial points
+_MAX_POINTS = 10_000  # maximal number of initial points
 
 
 def plot_rotation(
@@ -130,7 +130,7 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return spaced fractions p/q between two numbers, with q up to twice the least q, then until there are three."""
+    """Return spaced fractions p/q in (low, high): with q up to twice the least q, larger q until there are three."""
     resonances: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(resonances) >= _MIN_RESONANCES and q > 2 * resonances[0].denominator:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.8  # height over width of the axes
 _EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
 _CONDITION_FONT_RATIO = 0.8  # font size of conditions, relative to the font size of other text
-_LABEL_POSITIONS, _SAMPLES = 12, 300  # points of a curve: for its condition, and to find labels that it crosses
+_LABEL_POSITIONS, _SAMPLES = 12, 300  # points of a curve: tried for its label; used to find labels that it crosses
 _AXES_SHARE = 0.85  # the axes as a fraction of the width and height of the picture
 _DEFAULT_WINDOW: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -100,7 +100,7 @@ def plot_scan(
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(component.text, [_position(component)]) for component in components if component.is_rational_point]
         for text, pieces in curves:
-            # The label is on the longest piece, preferably off its middle, where curves rarely cross.
+            # The label is on the longest piece, preferably away from the middle: there curves rarely cross.
             longest = max(pieces, key=len)
             ends = _resampled(longest, _LABEL_POSITIONS + 1)
             indices = sorted(range(1, _LABEL_POSITIONS), key=lambda k: abs(4 * k - 3 * _LABEL_POSITIONS))

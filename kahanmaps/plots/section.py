@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 UP, DOWN, BOTH = "up", "down", "both"
 _NODE_COUNT = 6  # interpolation nodes: three points on either side of the hyperplane
-_NEWTON_STEPS = 12  # for the zero of an interpolation polynomial
-_MAX_DIFFERENCE = 0.1  # largest difference of interpolation with four and with six nodes, in steps
+_NEWTON_STEPS = 12  # steps of Newton's method for the zero of an interpolation polynomial
+_MAX_DIFFERENCE = 0.1  # largest difference, in steps, of the zeros interpolated with four and with six nodes
 _ASPECT = 0.75  # height over width of the axes
 
 
@@ -96,8 +96,8 @@ def section_of(
         direction: "up" for crossings to positive values, "down" to negative ones, or "both".
         progress: called with the current step.
 
-    Crossings are interpolated by polynomials in the step through six consecutive points. Raises InputError for another
-    direction.
+    Crossings are interpolated through six consecutive points by polynomials in the step number. Raises InputError for
+    another direction.
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
@@ -115,7 +115,7 @@ def section_of(
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
-    """Return the interpolated zeros of an affine function along an orbit, and the number of omitted zeros.
+    """Return the interpolated points at which an affine function along an orbit is 0, and the number of omitted ones.
 
     Args:
         points: the points of the orbit (count, dim). values: the values of the function (count,).
@@ -139,7 +139,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     node_points, node_values = points[node_rows], values[node_rows]
 
     def interpolate_zero(nodes: slice) -> FloatArray:
-        """Return the crossings by interpolation at a subset of the six nodes."""
+        """Return the crossings, interpolated through the nodes in this slice of the six nodes."""
         node_steps = np.arange(1 - _NODE_COUNT // 2, _NODE_COUNT // 2 + 1, dtype=np.float64)[nodes]
         inverse = np.linalg.inv(np.vander(node_steps, increasing=True))  # maps values at the nodes to coefficients
         coefficients = node_values[:, nodes] @ inverse.T

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MAX_STEPS = 12  # of each map
-MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: a step then takes seconds
+MAX_STEPS = 12  # number of steps of each map
+MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: with so many bits a step takes seconds
 
 Point = tuple[fmpq, ...]
 Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None after an indeterminacy point or if numbers are too long
@@ -56,7 +56,7 @@ class MapPair:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Two lattices for a point x: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
+    """Lattices of a point x and maps F, G: `g_after_f[i][j]` is G^j(F^i x), and `f_after_g[i][j]` is F^i(G^j x).
 
     `stopped` is a sentence that says why points are missing, empty if none are missing.
     """
@@ -73,7 +73,7 @@ class Squares:
 
     @property
     def compared(self) -> list[tuple[Point, Point]]:
-        """The pairs of corresponding points of the two lattices, if both exist."""
+        """The pairs of points with equal indices [i][j] in the two lattices, if both points exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
         pairs = (pair for row, other_row in rows for pair in zip(row[1:], other_row[1:], strict=True))
         return [(p, q) for p, q in pairs if p is not None and q is not None]
@@ -146,8 +146,8 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
     """Return the pairs of maps to be plotted for a member: two associated systems, and a control.
 
     The first system is the member itself, the second is the associated system with the opposite sign at the last factor
-    of chi. The control is the pair J grad H_0, J grad H_1 or, if m = 1, the pair f, 2 f. Raises InputError if the
-    system is not a member of the family, declared or recognised, in its own coordinates.
+    of chi. The control is J grad H_0, J grad H_1 with grad H_1 = A grad H_0 or, if m = 1, f = J grad H_0 and 2 f.
+    Raises InputError if the system is not a member of the family, declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
@@ -224,7 +224,7 @@ def plot_squares(
 
 
 def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
-    """Return the two coordinates in which the narrowest of the squares and of their gaps is as wide as possible."""
+    """Return the two coordinates that maximize the smallest width of all squares and of all gaps between corners."""
     dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0
@@ -322,7 +322,7 @@ def _draw_lattices(axes: Axes, gf: Floats, fg: Floats) -> None:
 
 
 def _magnify(axes: Axes, gf: Floats, fg: Floats, all_points: Floats, window: Floats, style: Style) -> None:
-    """Draw the last two corners, magnified so that they are distinguishable, in the emptiest corner of the panel."""
+    """Draw both candidates for the last corner, magnified to be distinguishable, in the emptiest part of the panel."""
     lengths = np.diff(window, axis=1)[:, 0]
     relative_points = (all_points - window[:, 0]) / lengths
     if len(gf) == 2:  # the panel also contains the name of the last corner
@@ -380,7 +380,7 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
 
 
 def _to_table(lattice: Lattice) -> Floats:
-    """Return the points as floating-point numbers; nan for missing points and coordinates of 1e150 or more."""
+    """Return the points of a lattice in doubles; NaN for missing points and for coordinates of 1e150 or more."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _MAX_COORDINATE, table, np.nan)

@@ -25,8 +25,8 @@ from kahanmaps.reports.pictures import DEFAULT_EPS
 
 _MIN_SLIDER_END = 0.5  # the slider of eps ends there, or at twice the given eps if this is larger
 _DEFAULT_STEPS, _MAX_STEPS = 800, 5000
-_MAX_TERMS = 2000  # of all polynomials together that the browser evaluates at every step
-_MAX_VARIABLES = 12  # each has a slider
+_MAX_TERMS = 2000  # number of terms of all polynomials that the browser evaluates at every step
+_MAX_VARIABLES = 12  # maximal number of variables: each has a slider
 
 
 def explore_sections(analysis: Analysis) -> list[Section]:
@@ -65,7 +65,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
 
 
 def explore_data(analysis: Analysis) -> dict[str, Any]:
-    """Return the data for explore.js: the rows of (M | -r) as terms, functions to be plotted, the initial point."""
+    """Return the data for explore.js: rows of (M | -r) with M x~ = r as terms, plotted functions, initial point."""
     file = analysis.file
     map_, n = file.map, file.dim
     if n > _MAX_VARIABLES:

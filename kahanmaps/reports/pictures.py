@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 DEFAULT_EPS = fmpq(1, 20)  # eps of pictures on a page about every eps
 _STYLE = Style(width=14, font_size=11, dpi=150)  # letters are legible on a phone
 _MAX_ELEMENTS = 1_500  # maximal number of points drawn as SVG elements, which take a hundred bytes each
-_STEPS = 600  # of each orbit of a portrait
-_PORTRAIT_STARTS = 16  # random initial points
-_CURVE_COUNT = 3  # orbits on invariant curves
-_CURVE_STEPS = 300  # of each of these orbits
+_STEPS = 600  # number of steps of each orbit of a portrait
+_PORTRAIT_STARTS = 16  # number of random initial points
+_CURVE_COUNT = 3  # number of orbits on invariant curves
+_CURVE_STEPS = 300  # number of steps of each of these orbits
 
 
 class Pictures:

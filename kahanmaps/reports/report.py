@@ -69,8 +69,8 @@ def report_html(
         explore: for an Analysis, add sliders for eps and the initial point of an orbit instead of the results.
 
     Returns:
-        The page, the same text for the same input (and the same versions of the libraries). Formulas are exact;
-        those of more than about 6000 characters are truncated, with a note.
+        The page; its text depends only on the input and the versions of the libraries. Formulas are exact;
+        formulas of more than about 6000 characters are truncated, with a note.
 
     Raises:
         InputError: for other types, for no reports, and if the extra [report] is not installed.

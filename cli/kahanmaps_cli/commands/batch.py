@@ -31,7 +31,7 @@ from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_MAX_TASKS_SHOWN = 3  # of each experiment, by a dry run
+_MAX_TASKS_SHOWN = 3  # number of tasks of each experiment that a dry run prints
 _MAX_VALUE_WIDTH = 300  # maximal length of a value that `batch show` prints on a terminal
 _SYSTEMS_OF_TASKS = {
     None: "none",

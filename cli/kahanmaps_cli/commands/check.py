@@ -51,7 +51,7 @@ def command(name: str) -> click.Command:
                     eps_ratio = 1 if eps2 is None else eps2 / eps
                     g_map = lib.match_variables(f, g)[0]
                     commutator = lib.commutator(f.map, g_map, eps, initial_point, steps, eps_ratio)
-                    options |= {"start": None, "steps": None}  # `start` and `steps` concern only the float orbit
+                    options |= {"start": None, "steps": None}  # both options concern only the commutator
                 settings = opt.settings_from(options, progress, options["start"] and start)
                 report = check(file, second_file, settings, eps2)
             else:
@@ -118,7 +118,7 @@ class _PairCommand(click.Command):
 
 
 def _name_claims(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
-    """Return the claims as pairs of a name and a text, without the word "known".
+    """Return the claims given by --integral as pairs (name, text), all of them named, without the word "known".
 
     An integral of the file has its name in the file. Other claims without a name are called I1, I2, ..., skipping names
     in use.

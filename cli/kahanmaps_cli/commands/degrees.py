@@ -110,7 +110,7 @@ def command(system: str | None, **options: Any) -> int:
 def measure(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
-    """Return the degree growth that the options request."""
+    """Return the degree growth of the map of a file, computed as the options request."""
     arguments = opt.pick(options, "effort", "max_degree", "seed", max_terms="terms")
     return lib.degree_growth(file.map, eps, **arguments, steps=options.get("steps"), progress=progress)
 

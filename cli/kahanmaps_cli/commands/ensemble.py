@@ -18,9 +18,9 @@ from kahanmaps_cli.screen.render import json_number, print_json, record_of, shor
 from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 from kahanmaps_cli.signals import interruptible
 
-MAX_STEPS = 10**13  # more would take years
-FAILURES_SHOWN = 20  # orbits that ended early, in the output
-_MIN_COMPILED_WORK = 5_000_000  # for less work numpy is faster than loading and compiling code
+MAX_STEPS = 10**13  # maximal number of steps: more would take years
+FAILURES_SHOWN = 20  # number of orbits that ended early and are listed in the output
+_MIN_COMPILED_WORK = 5_000_000  # orbits times steps; for less, numpy is faster than loading and compiling code
 _MAX_SAMPLES = 100  # steps at which integrals are evaluated, unless --every is given
 _MAX_VALUES = 200_000  # maximal number of values of integrals
 

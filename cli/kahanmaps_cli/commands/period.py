@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
 
 _EXIT_STATUS = {"periodic": 0, "aperiodic": 0}
 _ORBIT_HINT = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
-_LONG_PRIME_BITS, _MAX_PRIME_BITS = 90, 192  # between these sizes of primes the computation takes seconds to minutes
+_LONG_PRIME_BITS, _MAX_PRIME_BITS = 90, 192  # for primes between these sizes the computation takes seconds to minutes
 
 
 @click.command("period")
@@ -166,6 +166,6 @@ def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) ->
         for square in plane["squares"]:
             remark = ", no real level" if square[0] == "-" else ""
             print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{remark}")
-        if plane["disc"] == "0":  # no psi_N has the root 1
+        if plane["disc"] == "0":  # then gamma = 1, which is a root of no psi_N
             print_stdout("level\tnone, except perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

@@ -146,7 +146,7 @@ def _write_certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:
-    """Return whether a system is named, and whether a random member is requested; refuse contradictory options."""
+    """Return two flags: a system is given; a random member is requested. Refuse contradictory options."""
     context = click.get_current_context()
     names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
     typed_options = [

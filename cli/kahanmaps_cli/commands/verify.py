@@ -157,7 +157,7 @@ def command(system: str | None, **options: Any) -> int:
 
 
 def markdown(report: lib.Report) -> str:
-    """Return the table in Markdown, as in docs/audit.md."""
+    """Return the table of claims and verdicts in Markdown, as in docs/audit.md."""
     lines = [markup.markdown(headline(report))]
     section = None
     for finding in report.findings:
@@ -216,7 +216,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
             print_stdout(_LEGEND[method])
-    # Further evidence, in addition to the evidence for the verdict.
+    # Both the evidence for the verdict and further evidence.
     all_evidence = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(e.data["error_bound"])[3:]) for e in all_evidence if "error_bound" in e.data]
     if bounds:

@@ -11,7 +11,7 @@ from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.runs.comparison import comparison_options, early_messages, requested_comparison
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_START_CHARACTERS = 160  # characters of a printed initial point
+_MAX_START_CHARACTERS = 160  # maximal number of characters of a printed initial point
 
 
 @picture(

@@ -17,7 +17,7 @@ from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_BYTES = 64_000_000  # of a file of --from
+_MAX_BYTES = 64_000_000  # maximal size of a file of --from
 # Statuses of OrbitEnd that count as early ends; a digit limit and a periodic orbit are normal ends.
 _EARLY_STATUSES = ("singular",)
 

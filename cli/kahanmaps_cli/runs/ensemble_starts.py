@@ -18,7 +18,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import ExpressionError, InputError, counted, quoted
 
-MAX_TEXT_BYTES = 100_000_000  # of a file of initial points
+MAX_TEXT_BYTES = 100_000_000  # maximal size of a text file of initial points
 MAX_NPY_BYTES = 2_000_000_000
 _MAGIC = b"\x93NUMPY"
 

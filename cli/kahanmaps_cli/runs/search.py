@@ -48,13 +48,13 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """Return the arguments of a search: symbols, eps, effort, seed, and the options called `names`."""
+    """Return the keyword arguments of a search: symbols, eps, effort, seed, and the options with these `names`."""
     symbols, eps = symbols_and_eps(options)
     return {"symbols": symbols, "eps": eps, **opt.pick(options, *names, "effort", "seed")}
 
 
 def scope(result: Any) -> str:
-    """Return the text after the name of the map: the eps and symbols for which the formulas hold."""
+    """Return the text after the name in a heading: the eps and symbols for which the formulas of a result hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
     eps_text = lib.eps_suffix(result.eps, result.file.map)
@@ -90,8 +90,8 @@ def print_search(
 ) -> None:
     """Print the result of a search as text, JSON, TOML or LaTeX, as requested.
 
-    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and an origin; `last_line` is
-    printed after them.
+    Each of `formulas` is a triple: a name, an object with `text`, `verdict` and `evidence`, and its origin as text.
+    `last_line` is printed after the formulas.
     """
     if options["as_json"]:
         print_json(record(name, result, search))
@@ -115,7 +115,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search, on standard error what is undecided in it; return the exit status."""
+    """Print the result of a search, and on standard error what it leaves undecided; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

@@ -23,7 +23,7 @@ class OrbitTable(Writer):
         self._width = columns()
         self._step_width = max(6, len(str(header["steps"])))
         self._cell_width = (self._width - self._step_width) // len(names) - 2
-        self._has_digits = False  # whether some numbers of digits are shown without the word "digits"
+        self._has_digits = False  # whether some counts of digits are shown without the word "digits"
         min_width = _MIN_BALL_WIDTH if header["arithmetic"].startswith("ball") else _MIN_WIDTH
         self._is_table = self._cell_width >= min_width
         if self._is_table:
@@ -50,7 +50,7 @@ class OrbitTable(Writer):
 
 
 def _decimal_forms(text: str) -> list[str]:
-    """Return decimal forms of a long exact number with the digit counts of numerator/denominator, longest first.
+    """Return decimal forms of a long rational number with digit counts of its two integers, the longest form first.
 
     >>> _decimal_forms("-133567234372186342562607635605/125821231910581795318152718151")
     ['-1.06156 (30/30 digits)', '-1.06156 (30/30)', '-1.06 (30/30)', '-1.06 (30)']

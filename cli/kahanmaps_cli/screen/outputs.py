@@ -109,7 +109,7 @@ def file_name(name: str) -> str:
 
 
 def deliver(path: str, content: bytes) -> bool:
-    """Write to a file atomically, or to standard output for `-`; return whether it was a file."""
+    """Write to a file atomically, or to standard output for the path `-`; return True if the target was a file."""
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()

@@ -120,7 +120,7 @@ class SearchProgress(Progress):
 
     def __init__(self, options: Mapping[str, Any], since: float | None = None) -> None:
         super().__init__(options["quiet"])
-        self.work: dict[str, Any] = {}  # effort and units of work, set at the end of the block
+        self.work: dict[str, Any] = {}  # the effort and the units of work, set at the end of the block
         self._was_over: bool | None = None  # set at the end of the block
         self._effort, self._seconds, self._since = options.get("effort"), options.get("seconds"), since
 
@@ -166,9 +166,9 @@ class SearchProgress(Progress):
 class TimeLeft:
     """Estimate the remaining time of steps that become more expensive.
 
-    The time of n steps is fitted by a power of n between n/2 and n steps (quadratic growth of heights gives a power
-    between 3 and 4), or by an exponential if each of the last three steps increased it by two fifths. The estimate is a
-    lower bound.
+    The time of the first n steps is fitted by a power of n, from its values at about n/2 and n (quadratic growth of
+    heights gives an exponent between 3 and 4), or by an exponential if it grew by two fifths or more from each of
+    the last four calls to the next. The estimate is meant as a lower bound.
 
     >>> clock = iter([0.0, 1.0, 8.0])
     >>> left = TimeLeft(64, lambda: next(clock))
@@ -194,7 +194,7 @@ class TimeLeft:
             self._reference, self._latest = self._latest, (step, elapsed)
         if step >= self._steps:
             return ""
-        # The growth is the logarithm of the time of all steps divided by the time of the steps up to this one.
+        # `growth` is log(time of all steps / time of the steps up to this one).
         (first, first_time), *later = self._recent_steps
         n, t = self._reference
         is_exponential = all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent_steps))

@@ -43,7 +43,7 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(
     report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
 ) -> int:
-    """Print a report and additional measured numbers; return the exit status of the verdict."""
+    """Print a report, and numbers `measured` in addition (if any); return the exit status for the verdict."""
     if as_json:
         name = click.get_current_context().info_name or ""
         entries = {} if measured is None else {"measured": measured.to_json()}

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # Maximal number of characters of a number on a terminal.
 NUMBER_WIDTH = 40
-_LABEL_WIDTH = 12  # of the first cell of a line
+_LABEL_WIDTH = 12  # width of the first cell of a line
 _COLOR_CHOICES = {"auto": None, "always": True, "never": False}
 
 
@@ -84,7 +84,7 @@ def abbreviated(text: str, width: int = 400) -> str:
 def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
     """Print lines of cells separated by tabs; on a terminal the first cell is a label before the other cells.
 
-    Verdicts are colored, and lines that start with # are headings. `hang` is the column after the label.
+    Verdicts are colored, and lines that start with # are headings. `hang` is the width of the label.
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")

@@ -18,14 +18,14 @@ from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import print_stdout
 
-_MAX_ROWS = 10_000  # combinations of values
+_MAX_ROWS = 10_000  # maximal number of combinations of values
 
 Row = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The result for one combination of values: a line, its JSON record, a full display, and why it is undecided."""
+    """The result for one combination of values: a line, a JSON record, a full display, a reason why it is undecided."""
 
     line: str
     record: Callable[[], dict[str, Any]]
@@ -81,7 +81,7 @@ def table(
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
-    """Return the parameters of each combination (the last range varies fastest); None if there is no range."""
+    """Return pairs (name, value) for each combination (the last range varies fastest); None if there is no range."""
     if not any(lib.is_range(value) for _, value in parameters):
         return None
     if system == "-":

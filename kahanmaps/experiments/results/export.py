@@ -44,8 +44,8 @@ RESERVED = frozenset((*_COLUMNS, "system", "options", "result", "stderr", "versi
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
 _MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
-_MAX_ROWS = 10_000  # in one row group of Parquet
-_MAX_CHARACTERS = 50_000_000  # in one row group: a fixed number of rows with long lists may take gigabytes
+_MAX_ROWS = 10_000  # number of rows in one row group of Parquet
+_MAX_CHARACTERS = 50_000_000  # number of characters in one row group: rows with long lists may take gigabytes
 
 
 # The path of a value in a row: "option", "system" or "result", followed by keys.
@@ -205,7 +205,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
 
 
 class _Layout:
-    """The `names` of the columns of a table; if `typed`, also their `types` and the text columns of exact `numbers`."""
+    """The `names` of the columns of a table; if `typed`, their `types`, and the columns `numbers` of exact numbers."""
 
     def __init__(self, rows: Iterable[Row], stable: bool, typed: bool = False) -> None:
         kinds: defaultdict[Entry, set[str]] = defaultdict(set)
@@ -250,7 +250,7 @@ class _Layout:
 
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
-# Types of Parquet, and the kinds of values (small: integers up to 2^53) that each represents; the first one that fits.
+# For each type of Parquet the kinds of values that it represents (small: integers up to 2^53); the first fit is used.
 _KINDS_OF_TYPE = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},

@@ -16,7 +16,7 @@ from hashlib import sha256
 from typing import Any, Protocol
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
-# Documents of systems: digest -> canonical text.
+# A function that returns the canonical text of the document of a system from its digest.
 Documents = Callable[[str], str]
 
 KEY_LENGTH = 32  # hexadecimal digits: 128 bits make collisions negligible

@@ -80,10 +80,10 @@ PRAGMA user_version = 1;
 """
 PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
 RESULT_CHUNK = 50  # rows read with their results, each of which may take megabytes
-MAX_FOUND_TASKS = 20  # of one prefix of a key
+MAX_FOUND_TASKS = 20  # number of tasks found for one prefix of a key
 MAX_CONFLICTS_SHOWN = 5  # keys of conflicting tasks in the result of a merge
 
-_BUSY_SECONDS = 30.0  # of waiting for a lock of another process
+_BUSY_SECONDS = 30.0  # seconds of waiting for a lock of another process
 _MIN_BYTES = 512  # the smallest page that SQLite has
 # KiB of cache for SQLite. Planning accesses the index of keys at random: unless the index of a million keys fits into
 # the cache, every key causes the write of a page.
@@ -107,7 +107,7 @@ class Unavailable(KahanmapsError, OSError):
 
 @dataclass(frozen=True)
 class StoredExperiment:
-    """A planned experiment: `total` rows with `tasks` different tasks.
+    """A planned experiment: `total` is the number of rows of its plan, `tasks` the number of different tasks.
 
     `id` is the number of the experiment in the database. `offset` is the number of rows in the plans of earlier
     experiments.
@@ -144,8 +144,8 @@ class ExperimentStatus:
 class Planned:
     """The result of planning. `total` counts rows of the plan, all other counts refer to different tasks.
 
-    `known` tasks were already in the store, `new_tasks` were not; `dropped` tasks were only in the plan that was
-    replaced. If `is_resumed`, the same definition had been planned before.
+    `known` counts tasks that were already in the store, `new_tasks` those that were not, `dropped` those that were only
+    in the plan that was replaced. `is_resumed` is true if the same definition had been planned before.
     """
 
     total: int
@@ -157,7 +157,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Merged:
-    """The result of a merge: numbers of new tasks, of new results, and of failures `replaced` by results.
+    """The result of a merge: the numbers of new tasks, of new results, and of failures that results `replaced`.
 
     `conflicts` counts tasks with different results in the two databases; `conflicting` lists the first few of their
     keys.
@@ -576,7 +576,7 @@ class Store(HtmlDisplay):
                 self._put_result(task, old_row if is_kept else row, (attempts or 0) + 1)
 
     def _find_result(self, key: str) -> Sequence[Any] | None:
-        """Return the id, the columns of the result (None if missing) and the attempts of a task; None if unknown."""
+        """Return the id of a task, the columns of its result (None without one), its attempts; None for no task."""
         sql = f"SELECT t.id, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
         row: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
         return row

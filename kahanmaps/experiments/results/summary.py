@@ -46,8 +46,8 @@ class SummaryTable(NamedTuple):
 class Group:
     """A group of tasks with the same `values`; `outcomes` and `verdicts` map each outcome and verdict to its count.
 
-    `numbers` maps each numeric entry to the count `n` of its values, to `same` (whether all values are one double), and
-    to their `QUANTILES`. `flags` maps each boolean entry to the counts of true and false.
+    `numbers` maps each numeric entry to a dict: the count `n` of its values, `same` (whether all values are the same
+    double), and their `QUANTILES`. `flags` maps each boolean entry to the counts of true and false.
     """
 
     values: tuple[Any, ...]

@@ -45,7 +45,7 @@ PASSED_VARIABLES = ("KAHANMAPS_TASKS", "PYTHONPATH")  # environment variables th
 GROUP_START = 60.0  # seconds allowed for a group beyond the time limits of its jobs, since a worker may be busy
 JOB_START = 5.0  # seconds allowed in addition for each job of a group
 MAX_GROUP_JOBS = 200
-MAX_SILENT_GROUPS = 3  # groups that ended by themselves without a record before any group has printed one
+MAX_SILENT_GROUPS = 3  # groups that may end by themselves before any group has printed a record
 FETCH_SECONDS = 30.0  # seconds to fetch the output of a group that has ended
 COUNT_INTERVAL = 2.0  # seconds between two counts of the workers
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
@@ -132,8 +132,8 @@ class ClusterWorkers(Executor):
     def wait(self, timeout: float) -> list[Record]:
         """Return the finished records as soon as there is one, or none after `timeout` seconds.
 
-        Raises ClusterLost if the scheduler does not answer. Raises WorkersUnfit if several groups, among them the
-        groups of all jobs in flight, have ended by themselves and none has printed a record.
+        Raises ClusterLost if the scheduler does not answer. Raises WorkersUnfit if no group has printed a record, and
+        several groups, among them those of all jobs in flight, have ended by themselves.
         """
         deadline = time.monotonic() + timeout
         while True:

@@ -76,7 +76,7 @@ class _Attempt:
     job: Job
     documents: dict[str, str]
     tries: int = 0  # number of attempts in which the worker was killed from outside
-    had_fault: bool = False  # an earlier attempt failed for a reason that may lie in its worker
+    had_fault: bool = False  # whether an earlier attempt failed for a reason that may lie in its worker
     begun: float = 0.0  # time of the start of this attempt
 
 
@@ -156,7 +156,7 @@ class LocalWorkers:
         self._running[future] = worker, attempt
 
     def _record(self, worker: _Worker, attempt: _Attempt, future: Future[str]) -> Record | None:
-        """Return the record of a job, or None if it must be run again in a fresh worker."""
+        """Return the record of a job that has ended, or None if the job must be run again in a fresh worker."""
         from pebble import ProcessExpired
 
         was_fresh, worker.is_fresh = worker.is_fresh, False
@@ -227,7 +227,7 @@ class _Worker:
         from pebble import ProcessPool  # not needed for `kahanmaps --help`
 
         self.seconds = 0.0
-        self.is_fresh = True  # it has not run any task
+        self.is_fresh = True  # True until it runs its first task
         self._documents: set[str] = set()
         with TemporaryFile() as file:
             # The output file of the worker, as a connection: multiprocessing cannot pass an unnamed file otherwise.

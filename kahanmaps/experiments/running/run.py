@@ -19,12 +19,12 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _WAIT_SECONDS = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time that writing the last list took
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time in which the last list was written
 GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
-    """An iterable of lists of records as they arrive: at least ten lists a second, some of them empty.
+    """An iterable that yields records in lists as they arrive: at least ten lists a second, some of them empty.
 
     Since writing waits for the disk, records of short tasks are collected in one list, for four times as long as it
     took to write the last list. A caller that stores each list at once loses at most one list and the tasks in flight.

@@ -39,18 +39,18 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
 
 DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
-BINS = 200  # of steps, in each of which the largest error is kept
+BINS = 200  # number of bins of steps; the largest error in each bin is kept
 MAX_STEPS = 10**9
-MAX_FUNCTIONS = 12  # whose drift is measured
+MAX_FUNCTIONS = 12  # number of functions whose drift is measured
 MAX_STARTS = 100_000  # initial points
 _CANDIDATE_STARTS = 40  # initial points that are tried if none is given
 _STARTS_PER_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
 _PROBE_STEPS = 1000  # steps of RK4 that the orbit of a candidate must complete
 _REFERENCE_STARTS = 4  # maximal number of initial points for which errors are measured
-_MAX_HALVINGS = 6  # number of times tried for the reference solution, each half of the previous time
+_MAX_HALVINGS = 6  # number of times t at which the reference solution is tried; each t is half of the previous one
 _MIN_LOG_STEPS, _MAX_LOG_STEPS = 1, 14  # base-2 logarithms of the smallest and largest number of steps
 _MIN_SIZES = 5  # step sizes needed before the order counts as converged
-_MAX_SLOPE_CHANGE = 0.004  # change of the slope between step sizes below which the order counts as converged
+_MAX_SLOPE_CHANGE = 0.004  # the order counts as converged if the slope between step sizes changes by less
 _ROUNDING_ERROR = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
 _MIN_COMPILED_STEPS = 20_000  # of all orbits together: for fewer steps numpy is faster than loading compiled code
 _MAX_NUMBER_CHARACTERS = 60  # maximal length of a printed number; JSON output has all characters
@@ -98,9 +98,9 @@ class MethodRun:
 
     `ends` says how the orbit of each initial point ended. The counts over all orbits are `evaluations` of f, solved
     linear `systems`, `repeated` steps (in which an implicit method needed more iterations), and `failures` (orbits that
-    ended since Newton's method found no solution). `errors` are measured at the reference time, by decreasing step
-    size; `order` is the slope between the last two errors above rounding (None: there are none). `seconds` is None
-    without a clock.
+    ended since Newton's method found no solution). `errors` are measured at the time of the reference solution, by
+    decreasing step size; `order` is log2 of the quotient of the errors for a step size and half of it, the smallest
+    ones above the rounding error (None: there are none). `seconds` is None without a clock.
     """
 
     method: str
@@ -123,10 +123,10 @@ class MethodRun:
 class Comparison(ResultPart):
     """The result of `compare`.
 
-    `relative` is true for functions I whose errors are divided by |I(x_0)| for all initial points; the errors of other
-    functions are absolute. `labels` are the names of functions in plots. `origins` are the origins of functions:
-    declared, theorem, found, flow or requested. `time` is the time at which errors are measured, None without a
-    reference; `skipped` maps methods that the system does not admit to the reason. `eps` is half the time step
+    `relative` maps the name of a function I to True if its errors are divided by |I(x_0)|, to False if its errors are
+    absolute. `labels` are the names of functions in plots. `origins` are the origins of functions: declared, theorem,
+    found, flow or requested. `time` is the time at which errors are measured, None without a reference solution.
+    `skipped` maps each requested method that the system does not admit to the reason. `eps` is half the time step
     (exact).
     """
 
@@ -277,15 +277,15 @@ def compare(
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
         integrals: functions, texts or pairs (name, text); by default known integrals, or the results of a quick search.
         linear_bins: whether the bins of the drift have equal lengths; by default they grow with the step.
-        orders: whether to measure errors and orders, for which the solution is computed as reference.
+        orders: whether to measure errors and orders, for which a reference solution is computed.
         seed: the random seed of the initial point.
         kernel: "numpy" or "numba" (default: numba if installed); the numbers are the same.
         clock: a function such as `time.perf_counter` that measures the seconds of each method; by default none.
         progress: called with a sentence at each stage.
 
     Returns:
-        A `Comparison`: errors |I(x_n) - I(x_0)|/|I(x_0)| of functions, of which the maximum over each of about 200 bins
-        of steps and over all initial points is kept, and errors against a Taylor solution in balls. All are measured.
+        A `Comparison`: errors |I(x_n) - I(x_0)|/|I(x_0)| of each function I (their maximum over all initial points, for
+        each of about 200 bins of steps), and errors against a Taylor solution in balls. All errors are measured.
 
     Raises:
         InputError: for invalid values, and if a function is undefined at an initial point.
@@ -411,7 +411,7 @@ def _exact_starts(system: QuadraticSystem, points: Any, eps: fmpq, seed: int) ->
 def _choose_methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
-    """Return the admitted methods, the reasons for omitted methods, and a function that returns orbits of a method."""
+    """Return the admitted methods, a dict (omitted method -> reason), and a function that makes orbits of a method."""
     if isinstance(requested, str) or not hasattr(requested or (), "__iter__"):
         raise InputError(f"found methods = {requested!r}, expected a list such as ['kahan', 'rk4']")
     names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))
@@ -445,7 +445,7 @@ def _choose_methods(
 def _initial_values(
     functions: Sequence[WatchedFunction], starts: Sequence[Sequence[fmpq]]
 ) -> tuple[list[tuple[FloatArray, FloatArray]], dict[str, bool]]:
-    """Return the initial values of each function and the divisors of its errors, and whether errors are relative."""
+    """Return pairs (initial values, divisors of errors) of functions, and a dict: name -> are errors relative?"""
     points = np.array([to_floats(start) for start in starts])
     initial, relative = [], {}
     for function in functions:
@@ -464,7 +464,7 @@ def _references(
 ) -> tuple[fmpq | None, FloatArray | None]:
     """Return a time in which the solutions change by about their own norm, and the solutions at this time.
 
-    The time is the time step times a power of 2, with the sign of eps. If there is no reference, both values are None.
+    The time is the time step times a power of 2, with the sign of eps. If no solution is found, both are None.
     """
     speeds = [max(abs(entry) for entry in system.over(QQ).value(start)) for start in starts]
     times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]
@@ -489,7 +489,7 @@ def _measure_errors(
     references: FloatArray,
     progress: Callable[[str], None],
 ) -> tuple[tuple[StepError, ...], float | None]:
-    """Return the errors at `time` for decreasing step sizes, and the slope of the last two errors above rounding."""
+    """Return the errors at `time` by decreasing step size, and the measured order; None if it cannot be measured."""
     errors: dict[int, StepError] = {}
     reference_size = float(np.abs(references).max())
 

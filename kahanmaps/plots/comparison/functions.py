@@ -30,7 +30,7 @@ _EFFORT = -2  # effort of the search for integrals, which then takes at most a f
 
 
 class TwoPointFunction:
-    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
+    """An integral that depends on x and its Kahan image x~: the modified H, or x^T M x~/eps with a matrix M."""
 
     of_arrays = True  # ensembles evaluate it at arrays of points
 
@@ -50,7 +50,7 @@ class TwoPointFunction:
             self._values = lambda x, image: ((x @ matrix) * image).sum(axis=1) / to_float(eps)
 
     def at(self, start: Sequence[fmpq]) -> fmpq | None:
-        """Return the exact value; None at an indeterminacy point of the Kahan map."""
+        """Return the exact value at the point x = `start`; None at an indeterminacy point of the Kahan map."""
         try:
             value: fmpq | None = self._function.value(QQ, self._eps, start)
         except SingularStep:
@@ -71,9 +71,9 @@ WatchedFunction = PointFunction | TwoPointFunction
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
-    They come in this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian; the integrals
-    from the commutant of a member of the family; and H itself, which the Kahan map does not conserve. `eps` is half the
-    time step.
+    They come in this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian H; for a member
+    (A, H) of the family the integrals from powers of A; and H itself, which the Kahan map does not conserve. `eps` is
+    half the time step (exact).
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
@@ -140,8 +140,8 @@ def watched_functions(
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
     """Return H and the integrals claimed in the file; if no integral is claimed, those that follow from theorems.
 
-    Claimed integrals are normalized by `measured_integrals`: an integral with a constant limit for eps -> 0 has a small
-    drift along orbits of every method. Raises InputError if no integral is known.
+    Claimed integrals are normalized by `measured_integrals`, since an integral whose limit for eps -> 0 is constant has
+    a small drift along orbits of every method. Raises InputError if no integral is known.
     """
     functions = functions_of(file, eps)
     functions |= {
@@ -162,9 +162,9 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
 
 
 def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
-    """Return the functions requested by pairs (name, text): "known", a name in `functions_of`, or an expression.
+    """Return the functions for pairs (name, text): each text is "known", a name in `functions_of`, or a formula.
 
-    Expressions may contain eps. Raises InputError for invalid text, for a repeated name, and if no integral is known.
+    A formula may contain eps. Raises InputError for invalid text, for a repeated name, and if no integral is known.
     """
     available = functions_of(file, eps)
     functions: list[WatchedFunction] = []
@@ -184,13 +184,13 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """Return a function of `functions_of` by its name, or an expression, without eps unless `eps` is given."""
+    """Return the function with this name in `functions_of`, or an expression, free of eps if `eps` is None."""
     function = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if function is None else function
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return the same as `requested_function`. Raises InputError for integrals that depend on the image x~ of x."""
+    """Return a function of x alone, by name or as an expression. Raises InputError if it depends on the image x~."""
     available = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     rational_functions = {
         name: function.function for name, function in available.items() if isinstance(function, PointFunction)

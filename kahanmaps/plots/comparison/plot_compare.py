@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
 _MIN_PANEL_WIDTH = 5.5  # minimal width in centimetres of panels side by side
-_MIN_CLIPPED_ERROR = 1e3  # no smaller error is shown as an arrow
-_MAX_PANELS = 6  # of one picture, each of one function
+_MIN_CLIPPED_ERROR = 1e3  # smaller errors are never replaced by an arrow
+_MAX_PANELS = 6  # number of panels of one picture; each panel shows one function
 _DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the error axis if all errors are 0
 
 
@@ -41,8 +41,8 @@ def plot_comparison(
 ) -> Figure:
     """Plot the "drift", "error" or "work" of a comparison. Raises InputError if this was not measured.
 
-    `plot_drift` plots the drift. "error" plots errors against the time step, with dotted lines whose slopes are the
-    orders. "work" plots errors against the number of evaluations of f.
+    "drift" is the picture of `plot_drift`. "error" plots errors of the solution at a fixed time against the time step;
+    the slope of each dotted line is an order. "work" plots these errors against the number of evaluations of f.
     """
     style = style or Style()
     if show == "drift":

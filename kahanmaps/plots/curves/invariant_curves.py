@@ -29,7 +29,7 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transform_cubic
 
-MAX_POINTS = 1_000_000  # of all orbits together
+MAX_POINTS = 1_000_000  # number of points of all orbits together
 MAX_STARTS = 7  # the number of colors
 BITS = 256  # of the floating-point numbers
 _POLE_BITS = 96  # a point within 2^-96 of infinity counts as a pole
@@ -41,9 +41,9 @@ Numbers = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class PlaneOrbit:
-    """An orbit in one plane: its curve, and `u` and `v` at the steps 0, 1, ..., complex in a complex plane.
+    """An orbit in one plane: its curve `cubic`, and its coordinates `u` and `v` at the steps from 0 on.
 
-    `cubic` is None in a complex plane.
+    In a complex plane u and v are complex, and `cubic` is None.
     """
 
     u: Numbers
@@ -53,11 +53,11 @@ class PlaneOrbit:
 
 @dataclass(frozen=True, eq=False)
 class InvariantPlane:
-    """One plane of the normal form: the root of chi as a number and as text, and one orbit for each initial point.
+    """One plane of the normal form: its root of chi as a number and as text, and one orbit for each initial point.
 
-    `h` are the coefficients of the cubic in the coordinates (u, v), complex if the root is complex; `shape` is the form
-    of h, one of the constants of `plane_cubics`. `index` is the index of the plane in its splitting, `block` the planar
-    Kahan map in the coordinates (u, v), and `matrix` transforms coordinates of the splitting to (u, v).
+    `h` are the coefficients of the cubic Hamiltonian h(u, v), complex if the root is complex; `shape` is the form of h
+    as text, a constant of `plane_cubics`. `index` is the index of the plane in its splitting, `block` the planar
+    Kahan map in the coordinates (u, v), and `matrix` the 2 x 2 matrix from coordinates of the splitting to (u, v).
     """
 
     index: int
@@ -198,7 +198,7 @@ def _planes_without_orbits(splitting: Splitting) -> list[InvariantPlane]:
 def _compute_orbit(
     block: PlanarBlock, initial_triple: Triple, eps: fmpq, length: int, label: str, progress: Callable[[str], None]
 ) -> tuple[Numbers, Numbers]:
-    """Return u and v of `length` points of an orbit, fewer if it reaches a pole."""
+    """Return arrays of u and v at `length` points of an orbit, fewer points if the orbit reaches a pole."""
     P = initial_triple
     us, vs = [], []
     time_step = 2 * arb(eps)

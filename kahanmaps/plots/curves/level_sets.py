@@ -16,9 +16,9 @@ from kahanmaps.plots.figures import require_matplotlib
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window
 
-MAX_LEVELS = 200  # of one function in one picture
+MAX_LEVELS = 200  # number of levels of one function in one picture
 GRID = 301  # grid lines in each direction
-_NEWTON_STEPS = 8  # for each vertex
+_NEWTON_STEPS = 8  # steps of Newton's method for each vertex
 
 
 Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices
@@ -82,8 +82,8 @@ def zero_curves(
 ) -> tuple[FloatArray, ...]:
     """Compute the zero set of a function of points (..., 2) in a window as curves: arrays (n, 2) of vertices.
 
-    The curves are computed on a grid, and each vertex is moved onto the zero set. `on_grid` are known values on the
-    grid.
+    The curves are computed on a grid, and each vertex is moved onto the zero set. `on_grid` are the
+    values of the function on the grid, if they are known.
 
     >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
     >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))

@@ -27,9 +27,9 @@ Floats = NDArray[np.float64]
 class PlaneCubic:
     """The curve denominator * h = numerator * (1 + eps^2 D) in the plane.
 
-    `h` are the coefficients of the cubic, `eps` is half the time step. If `numerator` = 0, the curve is h = 0, lines
-    through the origin. If `denominator` = 0, it is the conic 1 + eps^2 D = 0, which the map sends to infinity. Both are
-    0 for a base point, which lies on all curves.
+    `h` are the coefficients of u^3, u^2 v, u v^2, v^3 in the form h, D is its Hessian determinant, `eps` is half the
+    time step. If `numerator` = 0, the curve is h = 0, lines through the origin. If `denominator` = 0, it is the conic
+    1 + eps^2 D = 0, which the map sends to infinity. Both are 0 for a base point, which lies on all curves.
 
     >>> circle = PlaneCubic((1.0, 0.0, -3.0, 0.0), 0.5, 1.0, 0.0)
     >>> round(circle.length, 12), bool(abs(circle.value(np.array([0, circle.length]))) < 1e-12)
@@ -48,11 +48,11 @@ class PlaneCubic:
         return 4 * p, 4 * q, 4 * r
 
     def h_at(self, u: Any, v: Any) -> Any:
-        """Return the value of h."""
+        """Return h(u, v)."""
         return PlanarBlock(*self.h).h(u, v)
 
     def D_at(self, u: Any, v: Any) -> Any:
-        """Return the value of D."""
+        """Return D(u, v)."""
         p, q, r = self.D
         return p * u * u + q * u * v + r * v * v
 
@@ -71,9 +71,9 @@ class PlaneCubic:
     def value_on_sphere(self, angles: Floats, length: float) -> Floats:
         """Return the polynomial of `value`, made homogeneous, on a half sphere that represents the projective plane.
 
-        `angles` (..., 2) are the direction of a point in the plane, and an angle from the axis, pi/2 at infinity:
-        (u, v) = length tan(second) (cos(first), sin(first)). If the curve consists of lines through the origin, or is a
-        conic, the factors that vanish at the origin and at infinity are omitted.
+        Each pair (s, t) in `angles` (..., 2) stands for the point (u, v) = length tan(t) (cos(s), sin(s)), at infinity
+        if t = pi/2. If the curve consists of lines through the origin, the factor that vanishes at the origin is
+        omitted. If it is a conic, the factor that vanishes at infinity is omitted.
         """
         first, second = np.moveaxis(angles, -1, 0)
         x, y, w, r = np.cos(first), np.sin(first), np.cos(second), np.sin(second)
@@ -85,7 +85,7 @@ class PlaneCubic:
         return np.asarray(self.denominator * (length * r) ** 3 * self.h_at(x, y) - self.numerator * w * conic)
 
     def flow_through(self, u: float, v: float) -> PlaneCubic:
-        """Return the level curve of h through a point, which is an orbit of the differential equation."""
+        """Return the level curve of h through a point: it contains the orbit of the differential equation."""
         return PlaneCubic(self.h, 0.0, self.h_at(u, v), 1.0)
 
     def gradient(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -97,17 +97,17 @@ class PlaneCubic:
         return along_u, along_v
 
 
-Matrix = arb_mat | acb_mat  # of complex balls in a complex plane
+Matrix = arb_mat | acb_mat  # its entries are complex balls in a complex plane, else real balls
 
 COMPLEX = "complex"
 THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3 u v^2)", "a repeated factor", "0"
 
 
 def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
-    """Return the shape of the cubic and the matrix of determinant 1 from (u, v) to the symmetric coordinates.
+    """Return the shape of the cubic as text, and the matrix of determinant 1 that brings it to this shape.
 
-    The coefficients of the block are real balls. If the ball of the discriminant contains 0, the discriminant counts as
-    0, and the matrix is I.
+    The coefficients of the block are real balls. If the ball of the discriminant of h contains 0, the discriminant
+    counts as 0, and the matrix is I.
 
     >>> block = PlanarBlock(arb(0), arb(1), arb(1), arb(0))
     >>> shape, matrix = symmetric_coordinates(block)

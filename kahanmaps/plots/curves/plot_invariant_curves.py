@@ -226,7 +226,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Disc:
-    """The projective plane as a half sphere seen from above; its rim is at infinity. `length` appears at 45 degrees."""
+    """The projective plane as a half sphere seen from above: 90 degrees is infinity, 45 degrees distance `length`."""
 
     length: float
     stretch: float = 1.0

@@ -29,8 +29,8 @@ _MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the
 _ZERO_TOLERANCE = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
 _ARROWS_PER_SIDE = 21  # number of arrows along each side of the window
 _STEPS_PER_WINDOW = 400  # number of steps of a curve that crosses the window
-_MAX_STEPS = 6000  # length of a curve: fifteen times the window
-_MIN_SPEED_RATIO = 1e-4  # fraction of the largest speed in the window: curves stop near an equilibrium
+_MAX_STEPS = 6000  # maximal number of steps of a curve; it is then fifteen times as long as the window
+_MIN_SPEED_RATIO = 1e-4  # a curve stops (near an equilibrium) below this fraction of the largest speed in the window
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """The kind given by the eigenvalues; a center of the linear part need not be a center of the vector field."""
+        """The kind of the linear part, from its eigenvalues: "center" need not mean a center of the vector field."""
         values, real = self.values, self.values.real
         threshold = _ZERO_TOLERANCE * max(float(np.abs(values).max()), _ZERO_TOLERANCE)
         if (np.abs(values) <= threshold).any():
@@ -94,8 +94,8 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 class Flow:
     """The parts of the phase portrait of x' = f(x) that are drawn under the orbits of the map.
 
-    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f at these points in units of
-    the window. `equilibria` are points (2,) with their kinds; `separatrices` and `solutions` are curves (n, 2 or 3).
+    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f there, in units of the
+    window. `equilibria` are pairs of a kind and a point (2,); `separatrices`, `solutions` are curves (n, 2 or 3).
     """
 
     places: FloatArray
@@ -149,9 +149,9 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
 def projected_solutions(
     system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
-    """Return the solutions through the initial points of orbits, for the same time and near the orbits, along `axes`.
+    """Return the solutions through the initial points of orbits as curves in the coordinates `axes`.
 
-    Raises InputError if an axis is the step.
+    A solution ends at the time of the orbits, or far away from them. Raises InputError if an axis is the step.
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
@@ -211,7 +211,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 START_COUNT = 16  # number of automatic initial points
 _MAX_CENTERS = 4  # maximal number of equilibria tried as centers of initial points
 _MAX_SIZES = 24  # maximal number of distances from a center that are tried
-_SIZE_RATIO = 0.8  # of two successive distances
+_SIZE_RATIO = 0.8  # quotient of two successive distances
 _TRIAL_STEPS = 300  # steps for which the orbits must stay near the center
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 _MAX_GROWTH = 4.0  # orbits stay near a center if no distance exceeds this multiple of the largest initial distance

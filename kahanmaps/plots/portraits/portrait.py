@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.comparison.functions import WatchedFunction
 
-_MAX_NEIGHBOURS = 2000  # points, all pairs of which are compared; a curve with more points looks smooth without lines
-_MIN_NEIGHBOURS = 8  # points of an orbit, without which no curve is recognized
+_MAX_NEIGHBOURS = 2000  # all pairs of so many points are compared; a curve with more points looks smooth anyway
+_MIN_NEIGHBOURS = 8  # minimal number of points of an orbit in which a curve is recognized
 _MIN_CURVE_SHARE = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
 # A line longer than both multiples, of the median line and of the diameter of the orbit, is a gap in an orbit that does
 # not fill its curve. If the rotation number is nearly rational, bunches of points are joined by long but shorter lines.
@@ -134,9 +134,9 @@ def _step_numbers(trajectories: Trajectories) -> FloatArray:
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     """Return pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None if there is no curve.
 
-    Every point is joined to its nearest neighbour, and to the nearest point on the opposite side. For points that lie
-    densely enough on a smooth curve, in any dimension and with any number of components, this reconstructs the curve
-    (Dey and Kumar's NN-crust). NaN and points after the first 2000 are ignored.
+    Every point p is joined to its nearest neighbour q, and to the nearest point r on the opposite side, that is with
+    (q - p).(r - p) < 0. This reconstructs a smooth curve, in any dimension and with any number of components, if the
+    points are dense enough (Dey and Kumar's NN-crust). NaN and points after the first 2000 are ignored.
 
     >>> turn = 2.4 * np.arange(12)
     >>> pairs = neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))
@@ -198,7 +198,7 @@ _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, both axes have one unit.
+    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, the axes have equal units.
 
     `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
     """
@@ -262,7 +262,7 @@ def plot_portrait(
         if portrait.values is None and points.shape[1] <= len(COLORS):
             _draw_few_orbits(axes, points, lines, portrait)
         elif portrait.values is None:
-            # In the colors of the color map; the widest orbit is drawn first, so that the orbits inside stay visible.
+            # Orbits are colored by the color map; the widest is drawn first, so that the orbits inside stay visible.
             with np.errstate(all="ignore"):
                 extent = np.nanmax(points, axis=0, initial=-np.inf) - np.nanmin(points, axis=0, initial=np.inf)
                 extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)

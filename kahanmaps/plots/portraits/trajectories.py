@@ -21,15 +21,15 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-MAX_POINTS = 4_000_000  # of all orbits together: more points would not be visible in a picture
-_MAX_COORDINATES = 40_000_000  # of all points together
+MAX_POINTS = 4_000_000  # number of points of all orbits together: more would not be visible in a picture
+_MAX_COORDINATES = 40_000_000  # number of coordinates of all points together
 # Up to this work and this number of steps, numpy is faster than loading compiled code.
 _MAX_NUMPY_WORK, _MAX_NUMPY_STEPS = 10_000_000, 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,).
+    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,) of the rows.
 
     `ended` maps the reason why orbits ended early, as a phrase after "an orbit", to the number of these orbits.
     """

@@ -14,12 +14,12 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
 _OUTER_PERCENT = 10.0  # percent of the points at either end that are ignored if they are far away
-_FAR_RATIO = 3.0  # "far away" is farther than this multiple of the range of all other points
-_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # in units of the largest initial coordinate
+_FAR_RATIO = 3.0  # a point is far away if its distance exceeds this multiple of the range of all other points
+_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # a window above 1e12 times the initial coordinates is cut to 10 times these
 _MARGIN_RATIO = 0.04  # margin at either end, relative to the range
 _MAX_NUMBER = 1e307  # largest number that matplotlib can subtract
 _MAX_POINTS = 4000  # maximal number of points used in the choice of axes
-_MAX_VARIABLES = 16  # of which two or three are chosen as axes
+_MAX_VARIABLES = 16  # maximal number of variables from which two or three are chosen as axes
 _CELLS_PER_AXIS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
 
 
@@ -53,7 +53,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """Return the range of values that `window_of` determines, without a margin; `required` are initial values.
+    """Return the interval that `window_of` finds for these values, without a margin; `required` are initial values.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
@@ -79,7 +79,7 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
-    """Return low, high, low, high, ... as a window. Raises InputError unless each axis has two numbers, low < high."""
+    """Return a list low, high, low, high, ... as a window. Raises InputError unless each axis has two, low < high."""
     if len(numbers) != 2 * axes:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
@@ -91,7 +91,7 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
 
 
 def is_inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
-    """Return which points (..., d) lie in the window; NaN counts as outside."""
+    """Return an array (...): True for points (..., d) in the window, False for others and for NaN."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
