@@ -28,7 +28,7 @@ def has_llvm() -> bool:
 
 
 def choose_kernel(requested: str | None, is_long: bool) -> str:
-    """Return the requested kernel; by default numba if installed and the computation `is_long`. May raise InputError.
+    """Return `requested`, or if None: "numba" if `is_long` is True and numba installed, else "numpy"; or InputError.
 
     >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')
