@@ -471,7 +471,7 @@ class ImplicitMap(MapFamily):
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
     inverse map, if known. Otherwise the inverse is computed: by exchanging the points if M and r have degree 1 in the
     variables, else by elimination. `title` is the kind of map in one or two words. `time_steps` is 1 if a step
-    approximates a flow for the time 2 eps (that of `of_field`, if given, in the first variables); otherwise 0.
+    approximates a flow for the time 2 eps, otherwise 0. `of_field` is its vector field in the first variables, or None.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
