@@ -238,7 +238,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
 
 def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
-    """Return the polynomial of degree < m equal to s_i modulo (factor i)^multiplicity, s = `signs`; Chinese remainders.
+    """Return the polynomial of degree < m that is the i-th sign modulo the i-th factor to its multiplicity.
 
     Its square is 1 modulo chi, and chi(A) = 0. So B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
     even if chi has repeated roots.

@@ -23,7 +23,7 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 class CubicSpace:
     """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    Each H in `basis` has coprime integer coefficients. The system has `unknowns` and `rank`; `expected` is 4m.
+    `basis`: primitive integer cubics; `unknowns`: number of monomials; `rank`: of the linear system; `expected`: 4m.
     """
 
     basis: tuple[fmpq_mpoly, ...]

@@ -352,7 +352,7 @@ def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
 
 
 def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
-    """Yield X and Y = (X - a E)/b, each with its irreducible polynomial; the integers a, b keep it integral for Y."""
+    """Yield X and Y = (X - a E)/b, each with its irreducible polynomial; integers a, b keep that of Y integral."""
     yield X, polynomial
     d = polynomial.degree()
     if d == 1:
@@ -382,7 +382,7 @@ def _reduced_basis(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
         )
         if d == 0:
             return []
-        # For B = `lattice`, let G be the Hermite form of its columns: c B is integral iff c G is, so G^-1 B is a basis.
+        # Let G be the Hermite form of the columns of B = `lattice`: for a row c, c B is integral if and only if c G is.
         G = fmpz_mat(lattice.transpose().hnf().tolist()[:d]).transpose()
         lattice = (fmpq_mat(G).inv() * fmpq_mat(lattice)).numer_denom()[0]
     shape = matrices[0].nrows(), matrices[0].ncols()

@@ -63,7 +63,7 @@ def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
 def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[RationalFunction, ...]:
     """Return the m components over Q, for t^0, ..., t^(m-1), of a rational function of the variables and eps over K.
 
-    If the Kahan map over K conserves the function, the Kahan map over Q conserves each component. BudgetExceeded.
+    If the Kahan map over K conserves the function, that over Q conserves each component. Raises BudgetExceeded.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> for integral in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
@@ -187,7 +187,7 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
-    """Return whether Q^n is a free Q[C]-module: tested by the dimension of the kernel of p(C), p | chi irreducible."""
+    """Return whether Q^n is a free Q[C]-module: tested by dim ker p(C) for each irreducible factor p of chi."""
     rank, remainder = divmod(C.nrows(), int(chi.degree()))
     return remainder == 0 and all(
         C.nrows() - evaluate_at_matrix(p, C).rank() == rank * p.degree() for p, _ in chi.factor()[1]

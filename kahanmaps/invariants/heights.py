@@ -116,7 +116,7 @@ class HeightGrowth(ResultPart):
         fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent fluctuations
         of standard deviation s; for linear growth, 3 s/n and 3.5 s/n^1.5. The second difference of the heights at n/3,
         2n/3 and n would have the errors 18 s/n^2 and 11 s/n^2. At n = 120, for six members with known c, its error was
-        2 to 18 parts in 10^5, and that of the polynomial below 3. To omit the first tenth or third gains nothing.
+        2 to 18 parts in 10^5, and that of the polynomial below 3. Omitting the first heights gains nothing.
         """
         match self.kind:
             case Growth.QUADRATIC:

@@ -220,7 +220,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # The image x^ is that under this map: maps of associated systems, which map x to other points, conserve H~ too.
+        # x^ is the image of x under the Kahan map of this system; maps of associated systems conserve H~ as well.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -242,7 +242,7 @@ class PaperIntegral(ImageFunction):
 
 
 class CommutantIntegral(ImageFunction):
-    """eps^{-1} x^T J C x~, defined over Q for any chi; C = (A^T)^k commutes with f'(x), and k is the `power`.
+    """eps^{-1} x^T J C x~, defined over Q for any chi; C = (A^T)^k commutes with f'(x), for k = `power`.
 
     For C = I it is H~. Over the splitting field of chi, the functions for k < m span the same space as the functions
     K~_s of all associated systems; the proof is in docs/mathematics.md.
@@ -391,7 +391,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
 def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
     """Return numerator and denominator of det dPhi(x); for a Kahan map det(I + eps f'(x~)) and det(I - eps f'(x)).
 
-    For a map with several factors, each is the product of those of the factors.
+    For a map with several factors, each is the product of the corresponding determinants of the factors.
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerators = [

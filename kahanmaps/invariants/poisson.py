@@ -291,5 +291,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    """Whether the matrix is 0; False over a BoundField, where bounds of both sides of the law also hold for P = 0."""
+    """Whether the matrix is 0. False over a BoundField: bounds for both sides of the law hold whether P is 0 or not."""
     return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

@@ -182,7 +182,7 @@ def composed_map(
 
     Args:
         maps: the maps in the order in which they are applied, or pairs (map, power) with any integer as power.
-        variables: the names of the coordinates, by default those of the first map; only their order matters otherwise.
+        variables: names for the coordinates, by default those of the first map; other maps correspond by position.
         symbols: the symbols of the composition, by default those of all maps; equal names mean the same symbol.
         values: for each map the values of its symbols, rational functions of `symbols`; by default each symbol itself.
 

@@ -89,7 +89,7 @@ class Equation:
 
     @cached_property
     def explicit(self) -> Equation | None:
-        """The numerators and the common denominator of an explicit map (rows Q_i x~_i = P_i), as row of an equation.
+        """The numerators and the common denominator of an explicit map (rows Q_i x~_i = P_i), as a single row.
 
         These forms have no common factor. The value is None if the map is not explicit, if the forms are long, and over
         fields other than QQ and GF(p).

@@ -28,7 +28,7 @@ def has_llvm() -> bool:
 
 
 def choose_kernel(requested: str | None, is_long: bool) -> str:
-    """Return `requested`, or if None: "numba" if `is_long` is True and numba installed, else "numpy"; or InputError.
+    """Return `requested`; by default "numba" if installed and `is_long` is True, else "numpy". May raise InputError.
 
     >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')

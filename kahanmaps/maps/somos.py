@@ -19,9 +19,9 @@ _MAX_DIRECT_INDEX = 8  # up to this n, quotients of s(n) are computed from s(n);
 
 
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
-    """Return [W(1), ..., W(4)] for the divisibility sequence W and [U(1), ..., U(4)] for a sequence U at Q + n T.
+    """Return the lists of W(1) to W(4) and U(1) to U(4), with W(1) = U(1) = U(2) = 1, W(2) = H and W(3) = H^3.
 
-    W(1) = 1, W(2) = H, W(3) = H^3, U(1) = U(2) = 1; y, z are H U(n)^2/(U(n + 1) U(n - 1)), n = 2, 3. ZeroDivisionError.
+    U is a sequence at Q + n T: H U(n)^2/(U(n + 1) U(n - 1)) is y for n = 2, z for n = 3. Raises ZeroDivisionError.
     """
     one = H / H
     a = H / y
@@ -33,9 +33,9 @@ def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
 
 
 def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
-    """Return a dict of W(n), -bound <= n <= bound; or, if `multiples` contains W(1), ..., W(4), a dict of U(n).
+    """Return {n: W(n)} for -bound <= n <= bound, or {n: U(n)} if `multiples` is the list of W(1) to W(4).
 
-    `first` contains the terms with n = 1, ..., 4. Raises ZeroDivisionError if the recurrence divides by a term 0.
+    `first` contains the terms with n = 1 to 4. Raises ZeroDivisionError if the recurrence divides by a term that is 0.
     """
     terms = list(first)
     while len(terms) < bound:
@@ -62,7 +62,7 @@ class Integers:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return (integer, scale), product `value`. ArithmeticError if its denominator has a prime not in `power`."""
+        """Return (integer, scale) for `value`, not 0. ArithmeticError if its denominator has a prime not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)
@@ -73,7 +73,7 @@ class Integers:
         return value
 
     def difference(self, s: fmpq, first: fmpz, t: fmpq, second: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
-        """Return (integer, scale) for (s first - t second)/divisor, integral except for denominators in `power`."""
+        """Return (integer, scale) for (s first - t second)/divisor, which is integral except at primes of `power`."""
         denominator = s.q.lcm(t.q)
         numerator = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
         if divisor is not None:
