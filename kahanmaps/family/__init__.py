@@ -30,10 +30,10 @@ def new(
     """Return a random member of the family.
 
     Args:
-        m: half the dimension; the eigenvalues are then random integers or, with `generic`, chi is a random polynomial.
+        m: half the dimension; A then has random integer eigenvalues, or a random chi if `generic` is True.
         eigenvalues: the eigenvalues of A, m exact numbers.
         chi: the polynomial with det(t - A) = chi(t)^2, as text such as "(t - 1)*(t^2 - 2)".
-        size: a bound for the random integer coefficients.
+        size: a bound for the random integer coefficients of the cubic in the normal form.
         seed: the random seed.
 
     Raises:
@@ -70,7 +70,7 @@ def show(system: Any) -> FamilyStructure | None:
 
 
 def space(A: Any) -> CubicSpace:
-    """Return the space of cubics H with A Hess(H) = Hess(H) A^T, for a matrix or a member of the family."""
+    """Return the space of cubics H with A Hess(H) = Hess(H) A^T, for a matrix A, or the A of a member of the family."""
     from flint import fmpq_mat
 
     from kahanmaps.algebra.fields import rational

@@ -28,7 +28,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 @dataclass(frozen=True, eq=False)
 class AssociatedSystem(HtmlDisplay, ResultPart):
-    """An associated system f_s = B^T f_0: its signs, B, the coefficients of B as a polynomial in A, and the cubic K."""
+    """An associated system f_s = B^T f_0 = J grad K: the signs, B, its coefficients as polynomial in A, the cubic K."""
 
     signs: tuple[int, ...]
     coefficients: tuple[fmpq, ...]
@@ -60,7 +60,7 @@ class AssociatedSystem(HtmlDisplay, ResultPart):
 class ConjugateAssociate:
     """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at the `root` of g.
 
-    `coefficients` are the coefficients in Q[t]/g of B as a polynomial in A; with the `chain` of H they give K.
+    For the `coefficients` c_i in Q[t]/g, B is the sum of c_i A^i, and K is the sum of c_i H_i over the `chain` of H.
     """
 
     root: Root
@@ -96,8 +96,8 @@ class ConjugateAssociate:
 class FamilyMember(HtmlDisplay, ResultPart):
     """A member of the family: a skew-Hamiltonian A, a cubic H with A Hess(H) = Hess(H) A^T, and signs.
 
-    The signs determine one associated system, `chosen`; if all signs are positive, it is f_0. Raises HypothesisError
-    if A is not skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
+    The signs determine one associated system, `chosen`; if all signs are positive, it is f_0 = J grad H. Raises
+    HypothesisError if A is not skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
@@ -188,8 +188,8 @@ class FamilyMember(HtmlDisplay, ResultPart):
         """Yield the associated systems with the opposite sign at one root t of a factor g of degree 2 or more.
 
         There is one over Q[t]/g for every such g with multiplicity 1 and every choice of the signs at the remaining
-        factors, up to an overall sign. The conjugates of its B belong to the conjugate roots, and a product of two
-        conjugates has the opposite sign at both roots. With the rational B_s these generate all B_s if no root repeats.
+        factors, up to an overall sign. Its matrix B has one conjugate for each root of g; the product of two conjugates
+        has opposite signs at both roots. If chi has no repeated root, these B and the rational B_s generate all B_s.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
@@ -198,7 +198,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():
-            quotient = [root.number_field.one]  # chi/(x - t), leading coefficient first
+            quotient = [root.number_field.one]  # the coefficients of chi(x)/(x - t), leading one first
             for c in chi(self.A).coeffs()[-2:0:-1]:
                 quotient.append(quotient[-1] * root.number_field.generator + c)
             value_at_root = sum(
@@ -238,7 +238,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
 
 def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
-    """Return the polynomial of degree < m that equals s_i modulo the power of the i-th factor (Chinese remainders).
+    """Return the polynomial of degree < m that is the i-th sign modulo the i-th factor to its multiplicity.
 
     Its square is 1 modulo chi, and chi(A) = 0. So B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
     even if chi has repeated roots.

@@ -23,7 +23,7 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 class CubicSpace:
     """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    `basis` has coprime integer coefficients, `unknowns` counts monomials, `rank` is that of the system, `expected` 4m.
+    `basis`: primitive integer cubics; `unknowns`: number of monomials; `rank`: of the linear system; `expected`: 4m.
     """
 
     basis: tuple[fmpq_mpoly, ...]
@@ -86,7 +86,7 @@ def belongs(A: fmpq_mat, H: fmpq_mpoly) -> bool:
 
 
 def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
-    """Raise HypothesisError unless A (Hess H) = (Hess H) A^T for a homogeneous cubic H; the message gives an entry."""
+    """Raise HypothesisError, naming a wrong entry, unless H is a homogeneous cubic with A (Hess H) = (Hess H) A^T."""
     if len(names_of(H)) != A.nrows():
         raise HypothesisError(
             f"A is {A.nrows()} x {A.ncols()} and H has {len(names_of(H))} variables, expected as many as A has rows"
@@ -118,9 +118,9 @@ def chain(A: fmpq_mat, H: fmpq_mpoly, length: int | None = None) -> tuple[fmpq_m
 
 
 def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
-    """Return the homogeneous cubic H with this gradient, by Euler's formula 3 H = x . grad H.
+    """Return the homogeneous cubic H with grad H = `field`, by Euler's formula 3 H = x . grad H.
 
-    Raises HypothesisError if the quadratic forms are not a gradient.
+    Raises HypothesisError if the quadratic forms in `field` are not a gradient.
     """
     context = field[0].context()
     total = context.constant(0)
@@ -133,7 +133,7 @@ def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
 
 
 def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq, fmpq]]:
-    """Yield entries (i, j, variable l) in which A T_l and T_l A^T differ, where T_l is d(Hess H)/dx_l."""
+    """Yield (i, j, l, a, b) if A T_l has the entry a and T_l A^T another entry b at (i, j); T_l = d(Hess H)/dx_l."""
     n = A.nrows()
     for l, T in enumerate(third_derivatives(H)):
         left = A * T

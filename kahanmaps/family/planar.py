@@ -46,7 +46,7 @@ Quadruple = tuple[fmpq_poly, fmpq_poly, fmpq_poly, fmpq_poly]
 class PlanarPart:
     """The planar system at a rational root of chi: u' = dh/dv, v' = -dh/du, with u = X(root) and v = Y(root).
 
-    `h` is h(root; u, v) in the variables u, v, without a factor; its term in H is h times the weight 1/chi'(root).
+    `h` is the value of the cubic h over K at t = root, in the variables u, v; its `weight` in H is 1/chi'(root).
     """
 
     root: fmpq
@@ -214,8 +214,8 @@ class NormalForm(HtmlDisplay, ResultPart):
     def verify(self) -> None:
         """Verify the normal form exactly. Raises AssertionError if it is wrong, which means an error in kahanmaps.
 
-        The conditions are: A^T S = S diag(C, C) for the companion matrix C of chi; S^T J S is the Gram matrix of l(W),
-        which is invertible; and H(S z) = l(h) as symmetric trilinear forms.
+        The conditions are: A^T S = S diag(C, C) for the companion matrix C of chi; S^T J S is the matrix of l(W) in the
+        coordinates z, an invertible matrix; and H(S z) = l(h) as symmetric trilinear forms.
         """
         n, m = self.dim, self.m
         if (self.S.nrows(), self.S.ncols(), len(names_of(self.H))) != (n, n, n):
@@ -246,7 +246,7 @@ class NormalForm(HtmlDisplay, ResultPart):
                 raise AssertionError("normal form: H(S z) is not l(h)")
 
     def _functional_of_powers(self, element: fmpq_poly, count: int) -> list[fmpq]:
-        """Return l(element t^k) for 0 <= k < count."""
+        """Return l(a t^k) for a = `element` and 0 <= k < count; l is the coefficient of t^(m-1)."""
         t, values = fmpq_poly([0, 1]), []
         for _ in range(count):
             values.append(element[self.m - 1])
@@ -263,8 +263,8 @@ class NormalForm(HtmlDisplay, ResultPart):
 def normal_form(member: FamilyMember) -> NormalForm:
     """Return the normal form of the associated system given by the signs of the member.
 
-    If a sign is negative, `H` of the result is K. The vector e1 is a unit vector or a small combination of unit
-    vectors, and e2 a short vector with W(e1, e2) = 1 found by LLL. At most 2m vectors e1 are tried; the result with the
+    The result's `H` is the cubic of this system. The vector e1 is a unit vector or a small combination of unit vectors,
+    and e2 is a short vector with W(e1, e2) = 1, found by LLL. At most 2m vectors e1 are tried; the normal form with the
     shortest numbers is returned. Exact. Raises HypothesisError if chi has repeated roots.
     """
     if not isinstance(member, FamilyMember):
@@ -301,10 +301,10 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """Yield for each unit vector its sum with few small multiples of the others that generates a free K-module.
+    """For each unit vector, add small multiples of few others until it generates a free K-module; yield the sum.
 
-    For all but at most m values of c, adding c times a unit vector gives the largest module that both vectors allow: on
-    the part that belongs to an irreducible factor of chi, K is a field, and at most one c fails.
+    For all but at most m numbers c, v + c w generates the largest module that two vectors v and w allow: on the part
+    that belongs to an irreducible factor of chi, K acts as a field, and at most one c fails.
     """
     n = t.nrows()
     m = n // 2
@@ -325,9 +325,9 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
 def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
-    The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1; those with s = 0, one of rank m.
-    With weights above the bounds of LLL for short vectors of both lattices, the first m vectors of a reduced basis have
-    s = 0, and the next vector has the least s > 0, up to sign; then e2 = y/s.
+    The integer vectors (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank
+    m. The weights exceed the bounds of LLL for short vectors of both lattices. So the first m vectors of a reduced
+    basis have s = 0, and the next vector has the least s > 0, up to sign; then e2 = y/s.
     """
     n = t.nrows()
     m = n // 2

@@ -134,7 +134,7 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
 
 
 def _in_original_coordinates(A_z: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
-    """Return A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
+    """Return A_x in the coordinates x = S z: since Hess_x = S^{-T} Hess_z S^{-1}, it is S^{-T} A_z S^T."""
     return symplectic_inverse(S).transpose() * A_z * S.transpose()
 
 

@@ -33,7 +33,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns in dimension n
-_DRAWS = 24  # small combinations that are tried besides the basis vectors
+_DRAWS = 24  # number of random combinations of a basis that are tried besides the basis itself
 _TRIAL_DIVISION = 1000  # limit of the trial divisions of a gcd
 _T = fmpq_poly([0, 1])
 
@@ -156,8 +156,8 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
     Returns None if H is not a homogeneous cubic, J is not invertible, or only multiples of I satisfy A Hess(H) =
     Hess(H) A^T. (In dimension 2 the result is A = I for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
-    r. The member is verified exactly. If H depends on all variables, no A has more distinct roots (proved); otherwise
-    A is the best of many combinations, with small coefficients, of the solutions.
+    r. The member is verified exactly. If H depends on all variables, no A has more distinct roots (proved). Otherwise
+    this is not proved, since only some combinations of solutions A are tried.
 
     Raises InputError above dimension 32.
 
@@ -188,8 +188,8 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     # A gets as many distinct eigenvalues as possible, and small entries.
     blocks = list(_split_idempotent(space, QQ.identity(hamiltonian.dim)))
     A = fmpq_mat(hamiltonian.dim, hamiltonian.dim)
-    # All idempotents E_k add up to I. If all factors are linear, then E_1 + 2 E_2 + 3 E_3 + ... = I + E_2 + 2 E_3 + ...
-    # does not contain E_1: so the idempotent with the longest entries gets the eigenvalue 1.
+    # The idempotent E_1 with the longest entries gets the eigenvalue 1: if the r idempotents of linear blocks add up to
+    # I, then E_1 + 2 E_2 + ... + r E_r = I + E_2 + ... + (r - 1) E_r does not contain E_1, so its entries are shorter.
     linear_blocks = sorted(
         (block for block in blocks if block.factor.degree() == 1), key=lambda block: -_total_bits(block.E)
     )
@@ -286,7 +286,7 @@ class _Block:
 
 
 def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block]:
-    """Split the idempotent E of the space by elements E X E as far as possible; yield each part with its best X."""
+    """Split the idempotent E as far as possible by elements E X E, X in `space`; yield each part as a block."""
     if trace(E) == 2:  # a self-adjoint matrix in a symplectic plane is scalar
         yield _Block(E, E * 0, _T)
         return
@@ -299,7 +299,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
     if len(block_basis) == 1:
         yield _Block(E, E * 0, _T)
         return
-    # In a commutative algebra the trace form has the rank of the semisimple part, i.e. the number of roots to be found.
+    # In a commutative algebra, the rank of the form tr(X Y) is the number of distinct roots of a generic element.
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(block_basis, 2))
     rows, rows_of_transposes = (
         fmpq_mat([M.entries() for M in matrices]) for matrices in (block_basis, [X.transpose() for X in block_basis])
@@ -307,7 +307,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
     target_degree = rank(QQ, rows * rows_of_transposes.transpose()) if is_commutative else 0
     candidates: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     rng = random.Random(len(block_basis))
-    # First the basis, then combinations with coefficients that grow slowly.
+    # First the basis is tried, then random combinations of it, with coefficients that grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
     combinations = (combination_of([rng.randint(-bound, bound) for _ in block_basis], block_basis) for bound in bounds)
     for index, X in enumerate(itertools.chain(block_basis, combinations)):
@@ -317,7 +317,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
             return
         polynomial = _factors_on_image(X, E)[0].polynomial
         value, power, length = evaluate_at_matrix(polynomial, X) * E, E, 0
-        while power != 0 * power:  # length = the degree times the least k with polynomial(X)^k E = 0
+        while power != 0 * power:  # length = degree of `polynomial` times the least k with polynomial(X)^k E = 0
             power, length = power * value, length + polynomial.degree()
         for Y, minimal_polynomial in _equivalent_generators(X, E, polynomial):
             height = sum(map(bits_of, minimal_polynomial.coeffs()))
@@ -342,7 +342,7 @@ def _split_by_factors(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
 
 
 def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
-    """Return the factors of chi of X = E X E, restricted to the image of E."""
+    """Return the irreducible factors of chi of the restriction of X = E X E to the image of E."""
     dim, factors = int(trace(E).p), []
     for factor in factors_of_chi(X):
         multiplicity = factor.multiplicity - (X.nrows() - dim) // 2 * (factor.root == 0)
@@ -352,7 +352,7 @@ def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
 
 
 def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
-    """Yield X with its irreducible polynomial, and (X - a E)/b for integers a, b that keep the polynomial integral."""
+    """Yield X and Y = (X - a E)/b, each with its irreducible polynomial; integers a, b keep that of Y integral."""
     yield X, polynomial
     d = polynomial.degree()
     if d == 1:
@@ -373,7 +373,7 @@ def _reduced_basis(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
     rows = lattice.tolist()
     is_alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
-    # If each row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
+    # If each row has an entry 1 or -1 that is alone in its column, the rows generate all integer points of their span.
     if not all(any(alone and abs(entry) == 1 for entry, alone in zip(row, is_alone, strict=True)) for row in rows):
         reduced_rows = lattice.lll()
         d = lattice.rank()
@@ -382,7 +382,7 @@ def _reduced_basis(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
         )
         if d == 0:
             return []
-        # c B is integral if and only if c G is, where G is the d x d Hermite form of the columns: G^-1 B is a basis.
+        # Let G be the Hermite form of the columns of B = `lattice`: for a row c, c B is integral if and only if c G is.
         G = fmpz_mat(lattice.transpose().hnf().tolist()[:d]).transpose()
         lattice = (fmpq_mat(G).inv() * fmpq_mat(lattice)).numer_denom()[0]
     shape = matrices[0].nrows(), matrices[0].ncols()

@@ -163,7 +163,7 @@ def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
 
 
 def companion_matrix(chi: fmpq_poly) -> fmpq_mat:
-    """Return the matrix of multiplication by t on Q[t]/chi in the basis 1, t, ..., t^(m-1).
+    """Return the matrix of multiplication by t on Q[t]/chi in the basis 1, t, ..., t^(m-1), for chi of degree m.
 
     >>> companion_matrix(fmpq_poly([-2, 0, 1]))
     [0, 2]

@@ -25,7 +25,7 @@ _MAX_DIMENSION = 32  # largest dimension in which a normal form is searched for
 
 @dataclass(frozen=True, eq=False)
 class SystemNormalForm(ResultPart):
-    """A normal form with x = T S z; `T` is None if the form is in the system's own coordinates.
+    """The normal form `form` of a system, with x = T S z for a point x and its matrix S; `T` is None if T = I.
 
     `declared` says whether the system was given as a member of the family; `text` describes its membership.
     """
@@ -43,7 +43,7 @@ class SystemNormalForm(ResultPart):
 
 @dataclass(frozen=True)
 class NoNormalForm(ResultPart):
-    """The reason why there is no normal form; `text` and `T` are set for a member whose chi has a repeated root."""
+    """The `reason` why there is no normal form; `text` and `T` are set for a member whose chi has a repeated root."""
 
     reason: str
     text: str = field(default="", compare=False)

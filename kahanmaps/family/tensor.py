@@ -61,9 +61,9 @@ def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
 
 
 def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[RationalFunction, ...]:
-    """Return the m components over Q of a rational function of the variables and eps over K, that of t^0 first.
+    """Return the m components over Q, for t^0, ..., t^(m-1), of a rational function of the variables and eps over K.
 
-    If the Kahan map over K conserves the function, the map over Q conserves its components. Raises BudgetExceeded.
+    If the Kahan map over K conserves the function, that over Q conserves each component. Raises BudgetExceeded.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> for integral in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
@@ -77,7 +77,7 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
 
 
 def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFunction:
-    """Return the norm N(phi) from K to Q: if dx/phi is invariant over K, dx/N(phi) is invariant over Q.
+    """Return the norm N(phi) from K to Q of phi = `function`: if phi is a density over K, N(phi) is one over Q.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> print(inherited_density(RationalFunction(x, x**0), fmpq_poly([-2, 0, 1])).numerator)
@@ -91,8 +91,8 @@ def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFun
 class TensorStructure(ResultPart):
     """A system over Q as a system in `rank` variables over K = Q[t]/(chi), where t acts as the matrix `C`.
 
-    The constructor verifies that C f'(x) = f'(x) C for all x, chi is the minimal polynomial of C, and the module is
-    free. It raises InputError otherwise.
+    The constructor verifies that C f'(x) = f'(x) C for all x, that chi is the minimal polynomial of C, and that the
+    Q[C]-module of all points is free. It raises InputError otherwise.
     """
 
     system: QuadraticSystem
@@ -187,7 +187,7 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
-    """Return whether Q^n is free over Q[C]: tested by the dimension of the kernel of p(C) for each factor p of chi."""
+    """Return whether Q^n is a free Q[C]-module: tested by dim ker p(C) for each irreducible factor p of chi."""
     rank, remainder = divmod(C.nrows(), int(chi.degree()))
     return remainder == 0 and all(
         C.nrows() - evaluate_at_matrix(p, C).rank() == rank * p.degree() for p, _ in chi.factor()[1]
@@ -199,8 +199,8 @@ def components(
 ) -> list[fmpq_mpoly]:
     """Return the coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ....
 
-    The first variables of the polynomial are split into `variables`; t and the variables in `names` do not change.
-    Without `names` the result is in the ring of `variables`.
+    Each of the first variables x is split into m of `variables`; t and the other variables do not change. The results
+    are in the ring of `names`, by default that of `variables`.
     """
     names = names or variables
     m = int(chi.degree())
@@ -221,7 +221,7 @@ def components(
 
 
 def _as_matrices(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:
-    """Return numerator and denominator as matrices (multiplication on K) over functions of the split variables, eps."""
+    """Return (F, P, Q): P and Q are multiplication on K by numerator and denominator, matrices over the field F."""
     m = int(chi.degree())
     variables = split_names(function.names[:-1], m)
     names = (*variables, "eps")
@@ -239,6 +239,6 @@ def _as_matrices(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionFi
 
 
 def _in_lowest_terms(element: Function) -> RationalFunction:
-    """Return a quotient in lowest terms."""
+    """Return the element of the function field as a quotient in lowest terms."""
     common_factor = element.numerator.gcd(element.denominator)
     return RationalFunction(element.numerator / common_factor, element.denominator / common_factor)

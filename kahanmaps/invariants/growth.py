@@ -16,8 +16,8 @@ class Growth(StrEnum):
     QUADRATIC = "quadratic"
     POLYNOMIAL = "polynomial"
     EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"  # for degrees that satisfy no recurrence found
-    UNDECIDED = "undecided"  # for heights that match no rule
+    UNKNOWN = "unknown"  # degrees for which no recurrence was found
+    UNDECIDED = "undecided"  # heights that match no rule of HeightGrowth
 
 
 GROWTHS_OF_DEGREES = tuple(

@@ -57,7 +57,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
-MIN_HEIGHTS = 9  # needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
+MIN_HEIGHTS = 9  # number needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
 _MIN_EXPONENTIAL_HEIGHTS = 6  # number of heights needed for exponential growth
 _MIN_LOGARITHMIC_HEIGHTS = 32  # number of heights needed for logarithmic growth
 _MAX_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
@@ -77,7 +77,7 @@ class HeightGrowth(ResultPart):
       and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 = e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is
       less than 0.9 e_2^2.)
     * quadratic: all e_j > 0, no e_j exceeds 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (For c n^2 + b n all e_j are
-      equal, wherever its minimum is; for n^3 they are 1 : 2 : 3, or at least 1 : 1.8 if the intervals omit steps.)
+      equal. For n^3, e_1 : e_2 : e_3 is 1 : 2 : 3 if the intervals begin at n = 0; otherwise e_3/e_1 >= 1.8.)
     * logarithmic: at least 32 heights; the largest height in the last interval exceeds that in the first; and from the
       second interval on, the mean change per height is less than 1/8 bit. (Linear growth is faster: a Moebius map of
       infinite order with two fixed points increases heights by at least 1/2 bit in each step, since its multiplier has
@@ -114,9 +114,9 @@ class HeightGrowth(ResultPart):
 
         It is the leading coefficient of the least-squares polynomial through all heights. If h_n is c n^2 + b n up to
         fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent fluctuations
-        of standard deviation s; for linear growth, 3 s/n and 3.5 s/n^1.5. For the second difference of the heights at
-        n/3, 2n/3 and n the errors are 18 s/n^2 and 11 s/n^2: for six members with known c its error at n = 120 was 2 to
-        18 parts in 10^5, less than 3 for the polynomial. Omitting the first tenth or third of the heights is no gain.
+        of standard deviation s; for linear growth, 3 s/n and 3.5 s/n^1.5. The second difference of the heights at n/3,
+        2n/3 and n would have the errors 18 s/n^2 and 11 s/n^2. At n = 120, for six members with known c, its error was
+        2 to 18 parts in 10^5, and that of the polynomial below 3. Omitting the first heights gains nothing.
         """
         match self.kind:
             case Growth.QUADRATIC:
@@ -175,15 +175,15 @@ class HeightGrowth(ResultPart):
 
 
 def height(point: Sequence[Any]) -> int:
-    """Return the height in bits of a point with exact coordinates (over Q[t]/g, that of the point of coefficients).
+    """Return the height in bits of a point with exact coordinates; over Q[t]/g, that of the point of coefficients.
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
     if isinstance(point, str) or not hasattr(point, "__len__"):
         raise wrong_kind(point, "the coordinates of a point", 'write a list, e.g. [3, "1/2"]')
-    # These integers have no common factor: if a prime p divides the least common denominator exactly k times, p divides
-    # the denominator of some fraction k times, and not the numerator of this fraction.
+    # Over the least common denominator q, the numerators and q have no common factor: if a prime p divides q exactly k
+    # times, then p divides the denominator of some fraction k times, and not the numerator of this fraction.
     numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]
     return IntegerPoint.from_rationals([number for row in numbers for number in row]).bits
 
@@ -257,7 +257,7 @@ def height_growth(
             elif return_step is None and point.value == start_value:
                 return_step = point.step
             heights.append(bits)
-        if not heights:  # the initial point exceeds the budget; step by step, its height would still be listed
+        if not heights:  # the initial point exceeds the budget; a stepwise orbit would still list its height
             heights.append(height(iterates.start))
         assert iterates.end is not None
         end = iterates.end
@@ -293,7 +293,7 @@ def _points_with_heights(orbit: Orbit, every: int, budget: Budget | None) -> Ite
             previous_bits, bits = bits, height_of(point)
             increase = max(0, bits - previous_bits)
             yield point, bits
-        # If steps multiply the heights, their gcds are of longer numbers than those of steps with slow growth.
+        # A step that multiplies the height takes gcds of longer numbers than a step with slow growth.
         count_work(20 + len(orbit.start) ** 2 * (bits / 100 + increase / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()

@@ -72,7 +72,7 @@ class PhaseFunction(ABC):
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    If there is a `root`, the variable before eps represents it. The map is needed if the function contains x~.
+    `root`, if given, is the value of the variable before eps. `map_` is needed if the function contains x~.
     """
 
     def __init__(
@@ -135,9 +135,9 @@ def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[
 def at_eps(
     function: RationalFunction, eps: fmpq | None, root: Root | None = None, k: int = 0
 ) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Return numerator and denominator, at eps if it is given; the denominator may become 0.
+    """Return the numerator and the denominator of `function`, at eps if it is given; the denominator may become 0.
 
-    If there is a `root`, represented by the k-th variable, they are reduced modulo its minimal polynomial.
+    If `root` is given, both are reduced modulo its minimal polynomial, written in the k-th variable.
     """
     numerator, denominator = function.numerator, function.denominator
     if eps is not None:
@@ -187,7 +187,7 @@ class ImageFunction(PhaseFunction):
 
 
 def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Sequence[Any]) -> Any:
-    """Evaluate H + grad H . (x~ - x)/3 at a point, for any map."""
+    """Return H + grad H . (x~ - x)/3 at a point x with the image x~ under any map phi."""
     field, image = phi.field, phi.step(point)
     with field.working():
         total = field.zero
@@ -220,7 +220,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^, as in the paper: H~ is also conserved by the maps of associated systems, which are not the map x -> x^.
+        # x^ is the image of x under the Kahan map of this system; maps of associated systems conserve H~ as well.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -242,7 +242,7 @@ class PaperIntegral(ImageFunction):
 
 
 class CommutantIntegral(ImageFunction):
-    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x); it is rational for arbitrary roots of chi.
+    """eps^{-1} x^T J C x~, defined over Q for any chi; C = (A^T)^k commutes with f'(x), for k = `power`.
 
     For C = I it is H~. Over the splitting field of chi, the functions for k < m span the same space as the functions
     K~_s of all associated systems; the proof is in docs/mathematics.md.
@@ -312,7 +312,7 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
 def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
     """Whether the quotient of two polynomials is independent of the first `dim` variables; `denominator` is not 0."""
     monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
-    # The coefficients of this monomial in numerator and denominator, polynomials in the remaining variables.
+    # The coefficients of `monomial` in numerator and denominator, polynomials in the remaining variables.
     for polynomial in (numerator, denominator):
         terms = {(*(0,) * dim, *m[dim:]): value for m, value in polynomial.terms() if m[:dim] == monomial}
         coefficients.append(polynomial.context().from_dict(terms))
@@ -391,7 +391,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
 def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
     """Return numerator and denominator of det dPhi(x); for a Kahan map det(I + eps f'(x~)) and det(I - eps f'(x)).
 
-    For a map with several factors, both are products over the factors.
+    For a map with several factors, each is the product of the corresponding determinants of the factors.
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerators = [
@@ -417,7 +417,7 @@ class Normalized:
 
     @property
     def is_shifted(self) -> bool:
-        """Whether a constant was subtracted, because I tends to a constant."""
+        """Whether a constant was subtracted from I, because I tends to this constant as eps -> 0."""
         return not self.coefficients[1].is_zero()
 
     def combination(self, name: str) -> str:
@@ -506,7 +506,7 @@ def _content(polynomial: fmpq_mpoly, dim: int) -> fmpq_mpoly:
 
 
 def _lowest_order_terms(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-    """Return the terms of lowest order in eps, divided by the power of eps that they contain."""
+    """Return the terms of lowest order in eps (the last variable), divided by the power of eps that they contain."""
     order = min(int(monomial[-1]) for monomial in polynomial.monoms())
     terms: dict[tuple[int, ...], fmpq] = {}
     for monomial, value in polynomial.terms():

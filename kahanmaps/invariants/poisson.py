@@ -251,10 +251,10 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
 def transformation_sides(
     map_: Map, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
-    """Return both sides of the transformation law stated in the module docstring, at x = `point` and x~ = `image`.
+    """Return the two sides N P(x) N^T and M P(x~) M^T of the transformation law, for x = `point` and x~ = `image`.
 
     `values` are the values of the symbols. Returns None at a pole of the tensor, and if P is 0 at both points, where
-    the law is trivial. For a composition, the law is that of the last factor, and the other factors transform P(x).
+    the law is trivial. For a composition, N and M belong to the last factor; the other factors first transform P(x).
     """
     field, eps = map_.field, map_.eps
     P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))
@@ -291,5 +291,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    """Whether the matrix is 0. Over bounds the answer is False: the bounds of both sides of the law cover this case."""
+    """Whether the matrix is 0. False over a BoundField: bounds for both sides of the law hold whether P is 0 or not."""
     return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

@@ -12,9 +12,9 @@ from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):
-    """The map `given`, with the value `root` for its only symbol, if any; over Q it is a map over the field Q[t]/g.
+    """The map `given`, with `root` as value of its only symbol (if any); g is the minimal polynomial of `root`.
 
-    `at_number` returns the map with a rational value of the symbol, for float computations with a rounded root.
+    By default, `at` returns the map over Q[t]/g. `at_number` is a function that returns the map for a rational value of
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
@@ -49,7 +49,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with a rational number near the root. Raises InputError if the root is not real."""
+        """The map with a rational number near the root for its symbol. Raises InputError if the root is not real."""
         return self._at_number(self.root.real_approximation())
 
     @property
@@ -65,7 +65,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def _root_name(self) -> str:
-        """The name of the root: the symbol of the map; t if the map does not contain the root."""
+        """The name under which the root is printed: the symbol of the map, or t if the map has no symbol."""
         return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class AlgebraicMap(MapFamily):
 
 
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:
-    """Return the map on points over Q[t]/g. Raises InputError if the coefficients contain another root than `root`."""
+    """Return the map over Q[t]/g, where `root` is a root of g. Raises InputError if the map contains another root."""
     if map_.root is None:
         return AlgebraicMap(map_, root, lambda _: map_)
     if map_.root != root:

@@ -23,13 +23,13 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
-_BUDGET = 20_000_000  # products of terms in an expansion
+_BUDGET = 20_000_000  # maximal number of products of terms in one expansion
 _TRIES = 20  # random points at which `is_involution` tests a map
 
 
 @dataclass(frozen=True, eq=False)
 class MapFactor:
-    """A factor of a composition: a map or its inverse; `values` are the values of its symbols."""
+    """A factor of a composition: a map or its inverse; `values` are the values of the symbols of the map."""
 
     map: MapFamily
     is_inverse: bool
@@ -80,13 +80,13 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum of those of the factors, if these are powers of one map; otherwise 0: they have no common flow."""
+        """The sum of the factors' `time_steps` if they are powers of one map; otherwise 0: they have no common flow."""
         factors = self._elementary_factors
         return sum(steps for _, steps in factors) if all(factor == factors[0][0] for factor, _ in factors) else 0
 
     @property
     def _elementary_factors(self) -> list[tuple[Any, int]]:
-        """The elementary factors, with compositions expanded, each with its signed number of time steps."""
+        """The pairs (data of an elementary factor, its `time_steps`, negative for an inverse), nested ones included."""
         elementary_factors: list[tuple[Any, int]] = []
         for map_factor in self.parts:
             factors = [(map_factor.map_and_values, map_factor.map.time_steps)]
@@ -100,7 +100,7 @@ class ComposedMap(MapFamily):
         return sum(part.map.digits for part in self.parts)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if a factor has no reduction."""
+        """Return the map at eps over a field. InputError for eps = 0, BadPrime without reduction modulo the prime."""
         eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._cache is None or values or self._cache[0] is not over or self._cache[1] is not eps_element:
             parts = [part.at(eps_element, over, values) for part in self.parts]
@@ -182,7 +182,7 @@ def composed_map(
 
     Args:
         maps: the maps in the order in which they are applied, or pairs (map, power) with any integer as power.
-        variables: names for the coordinates, by default those of the first map; maps are matched by position.
+        variables: names for the coordinates, by default those of the first map; other maps correspond by position.
         symbols: the symbols of the composition, by default those of all maps; equal names mean the same symbol.
         values: for each map the values of its symbols, rational functions of `symbols`; by default each symbol itself.
 
@@ -242,7 +242,7 @@ def composed_map(
             orders_text = f"{', '.join(first_map.variables)} and {', '.join(factor.map.variables)}"
             raise InputError(f"the maps must have their variables in the same order: got {orders_text}")
         if factor.is_inverse:
-            _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # raises InputError if there is none
+            _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # raises InputError if it is unknown
     variables = first_map.variables if variables is None else tuple(variables)
     if len(variables) != first_map.dim:
         raise InputError(f"found {len(variables)} variables for maps of dimension {first_map.dim}, expected as many")
@@ -255,7 +255,7 @@ def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 
 def is_involution(map_: MapFamily) -> bool:
-    """Return whether Phi(Phi(x)) = x at random points modulo primes; the probability of an error is below 2^-40."""
+    """Return whether Phi(Phi(x)) = x at 3 random points modulo primes; True is wrong with probability below 2^-40."""
     rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
@@ -273,9 +273,9 @@ def is_involution(map_: MapFamily) -> bool:
 
 
 def _expand_image(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
-    """Return the image of the variables as functions of `names` (variables, symbols, eps), in lowest terms.
+    """Return the coordinates of the image of x as functions of `names` (variables, symbols, eps), in lowest terms.
 
-    Returns None if the expansion takes too many products of terms.
+    Returns None if the expansion takes more than `_BUDGET` products of terms.
     """
     field = FunctionField(names, _BUDGET, reduces=True)
     n = parts[0].map.dim

@@ -22,7 +22,7 @@ NO_EPS = "the map does not depend on eps"
 
 
 def either(hint: str = "", **arguments: Any) -> Any:
-    """Return the argument that is given under one of several names, or None. Raises InputError if two are given."""
+    """Return the one argument that is not None; None if all are None. Raises InputError if several are not None."""
     given_values = {name: value for name, value in arguments.items() if value is not None}
     if len(given_values) > 1:
         raise InputError(f"found {' and '.join(given_values)}, expected one of them{hint}")
@@ -32,7 +32,7 @@ def either(hint: str = "", **arguments: Any) -> Any:
 def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:
     """Return eps, given as `eps`, or by the time step 2 eps as `time_step` or `h`; None if none of these is given.
 
-    With `floats`, for floating-point orbits, a float means the decimal number that Python prints: 0.1 means 1/10.
+    If `floats` is True (floating-point orbits), a float stands for the decimal number that Python prints: 0.1 is 1/10.
     """
     number = either(": the time step is h = 2 eps", eps=eps, time_step=time_step, h=h)
     if floats and isinstance(number, float):
@@ -41,7 +41,7 @@ def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False
 
 
 def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:
-    """Return the distinct nonzero values of `time_steps` of the maps."""
+    """Return the distinct nonzero numbers `time_steps` of the maps that depend on eps; [1] if no maps are given."""
     return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
 
 
@@ -71,7 +71,7 @@ def describe_eps(map_: MapFamily) -> str:
 def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
     """Return the entries of a record about eps (None: every eps): the value of eps, the time step and the convention.
 
-    The value is None if the maps do not depend on eps.
+    The value of eps is None if the maps do not depend on eps.
     """
     convention_text, step = convention(*maps), time_step(1 if eps is None else eps, *maps)
     return {
@@ -82,7 +82,7 @@ def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
 
 
 def eps_record_suffix(context: Mapping[str, Any]) -> str:
-    """Return the text about eps and the time step in a record, to be appended to the name of the map."""
+    """Return the text about eps and the time step for the record `context`, to be appended to the name of its map."""
     convention_text = context.get("convention", CONVENTION)
     if convention_text == NO_EPS:
         return ""

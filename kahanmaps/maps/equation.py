@@ -48,7 +48,7 @@ class Equation:
         return int(sum(self.exponents[0]))
 
     def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
-        """Return the values of the monomials at (X_1, ..., X_n, Z), elements of any ring multiplied by `times`."""
+        """Return the values of the monomials at X = (X_1, ..., X_n, Z) over any ring; `times` is its product."""
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
@@ -64,7 +64,7 @@ class Equation:
         return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
-        """Return L at the point at which the monomials have these values."""
+        """Return the values of the entries of L, given those of the monomials; an entry without terms is `zero`."""
         return [
             [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
              for entry in row]
@@ -72,9 +72,9 @@ class Equation:
         ]  # fmt: skip
 
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
-        """Return the image of (X_1 : ... : X_n : Z) over any ring, perhaps with a common factor: the kernel of L.
+        """Return the image of (X_1 : ... : X_n : Z) over any ring, a vector in the kernel of L.
 
-        Short explicit forms are evaluated if there are such forms, otherwise the minors of L.
+        Its entries, which may have a common factor, are the values of the forms of `explicit`, or else the minors of L.
         """
         if self.explicit is None:
             minors = kernel_minors(self.rows(self.monomials(X, times), None), times)
@@ -89,10 +89,10 @@ class Equation:
 
     @cached_property
     def explicit(self) -> Equation | None:
-        """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the only row of an equation.
+        """The numerators and the common denominator of an explicit map (rows Q_i x~_i = P_i), as a single row.
 
-        They have no common factor. None if the map is not explicit or these forms are long, and over fields other than
-        QQ and GF(p).
+        These forms have no common factor. The value is None if the map is not explicit, if the forms are long, and over
+        fields other than QQ and GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None
@@ -148,9 +148,9 @@ class Equation:
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """Return the equation with the `rows` of (M | -r) over a field, at the values `point` of the symbols and eps.
+    """Return the equation with the `rows` of (M | -r) over a field; `point` contains the values of symbols and eps.
 
-    Raises BadPrime if a coefficient has no reduction.
+    Raises BadPrime if a coefficient has no reduction modulo the prime.
     """
     rows = list(rows)
     n = len(rows)
@@ -171,7 +171,7 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     else:
         monomials = dict.fromkeys(m for row in rows_by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in monomials]
-    is_exact = over is QQ or over.characteristic > 0  # a ball that contains 0 need not be 0
+    is_exact = over is QQ or over.characteristic > 0  # the number in a ball that contains 0 need not be 0
     index = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
         tuple(tuple((index[m], c) for m, c in entry.items() if not is_exact or c != 0) for entry in row)

@@ -25,10 +25,10 @@ def explicit_map(
     image: Sequence[Any] | None = None,
     inverse: Sequence[Any] | Mapping[Any, Any] | None = None,
 ) -> ImplicitMap:
-    """Return the map x -> (P_1/Q_1, ..., P_n/Q_n) with these rational functions as coordinates of the image.
+    """Return the map x -> (P_1/Q_1, ..., P_n/Q_n) for n rational functions P_i/Q_i.
 
     Args:
-        variables: the names of the n coordinates; or a dict {variable: function}, then without `image`.
+        variables: the names of the n coordinates; or a dict {variable: function}, which replaces `image`.
         image: n rational functions of the variables, then symbols (if any), then eps; or texts, or SymPy expressions.
         inverse: the functions of the inverse map, if known; they are not verified here.
 

@@ -87,7 +87,7 @@ class Map(LatexDisplay):
         return f"Map({', '.join(self.variables)}; {eps_text}{time_step_text}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
-        """Return the map as plain data; eps is None for factors with different eps, time_step if there is no flow."""
+        """Return the map as plain data: "eps" is None if the factors differ in eps, "time_step" if there is no flow."""
         eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
         return {"map": repr(self), "eps": eps, "time_step": step}
 
@@ -102,7 +102,7 @@ class Map(LatexDisplay):
         return all(equation.degree == 1 for equation in self.equations)
 
     def denominator_name(self, backward: bool) -> str:
-        """Return the name of the matrix M(x) of the map, or of its inverse if `backward`."""
+        """Return the name of the matrix M(x) of the map or, if `backward` is True, of the inverse map."""
         return "M'(x)" if backward else "M(x)"
 
     def point(self, values: Any) -> tuple[Any, ...]:
@@ -188,7 +188,7 @@ class Map(LatexDisplay):
     def integer_step(self, point: IntegerPoint, max_bits: int | None = None) -> IntegerPoint | None:
         """Return the image of an integer point, for maps over QQ; None if the map is not defined at the point.
 
-        If an intermediate point of a composition has more than `max_bits` bits, it is returned instead of the image.
+        If an intermediate point of a composition has more than `max_bits` bits, this point is returned instead.
         """
         for factor in self.factors:
             image = factor.integer_steps.step(point)
@@ -213,20 +213,20 @@ class Map(LatexDisplay):
         return self.inverse.step(point)
 
     def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
-        """Yield each factor with the point to which it is applied. Raises SingularStep."""
+        """Yield the pairs (factor, point to which this factor is applied). Raises SingularStep."""
         x = self.point(point)
         for k, factor in enumerate(self.factors):
             x = self.factors[k - 1].step(x) if k else x
             yield factor, x
 
     def determinant(self, point: Sequence[Any]) -> Any:
-        """Return det M(x), the denominator of the map; for several factors, the product at the intermediate points."""
+        """Return det M(x); for several factors, the product of their det M, each at the point that the factor maps."""
         first_determinant, *other_determinants = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
             return reduce(mul, other_determinants, first_determinant)
 
     def jacobian(self, point: Sequence[Any]) -> Any:
-        """Return the Jacobi matrix dPhi(x); it is M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
+        """Return the Jacobi matrix dPhi(x), the product of the Jacobi matrices of the factors. Raises SingularStep."""
         jacobians = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
             return reduce(lambda product, jacobian: jacobian * product, jacobians)
@@ -247,8 +247,8 @@ class Map(LatexDisplay):
 class ElementaryMap(Map):
     """The map of one equation M(x) x~ = r(x) over a field.
 
-    `backward` returns the equation of the inverse. If it is None, the inverse exchanges the two points, which needs an
-    equation of degree 1. Subclasses that compute the matrices faster (KahanMap) override these methods.
+    `backward` is a function that returns the equation of the inverse. If it is None, the equation must have degree 1;
+    x and x~ are then exchanged. KahanMap overrides the methods for M, r and N(x, x~) by faster ones.
     """
 
     def __init__(
@@ -286,7 +286,7 @@ class ElementaryMap(Map):
         return inverse
 
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Return M(x), and r(x) as a column."""
+        """Return the pair of the matrix M(x) and the column r(x)."""
         n = self.dim
         with self.field.working():
             rows = self._equation.rows(self._equation.monomials([*x, self.field.one]), self.field.zero)
@@ -371,7 +371,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the generators of the ring of its formulas: the variables, then the symbols, then eps."""
+        """The names in the polynomial ring of the map's formulas: the variables, then the symbols, then eps."""
         return (*self.variables, *self.symbols, "eps")
 
     @property
@@ -391,7 +391,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with rational approximations of its coefficients. Raises InputError if one is not real."""
+        """The map with rational approximations of its coefficients. Raises InputError if a coefficient is not real."""
         return self
 
     @property
@@ -418,7 +418,7 @@ class MapFamily(LatexDisplay, ABC):
     @property
     @abstractmethod
     def digits(self) -> int:
-        """Approximate number of decimal digits of the longest coefficient, over a common denominator."""
+        """Approximate number of decimal digits of the longest coefficient, all written over a common denominator."""
 
     @abstractmethod
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
@@ -471,7 +471,7 @@ class ImplicitMap(MapFamily):
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
     inverse map, if known. Otherwise the inverse is computed: by exchanging the points if M and r have degree 1 in the
     variables, else by elimination. `title` is the kind of map in one or two words. `time_steps` is 1 if a step
-    approximates a flow for the time 2 eps (that of `of_field`, if given, in the first variables); otherwise 0.
+    approximates a flow for the time 2 eps, otherwise 0. `of_field` is its vector field in the first variables, or None.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -514,7 +514,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """The polynomials M x~ - r in x, in the coordinates of x~ (named x_new, ...), in the symbols and eps.
+        """The entries of M x~ - r, polynomials in x, in x~ (with names such as x_new), in the symbols and eps.
 
         >>> x, eps = ring(["x", "eps"]).gens()
         >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
@@ -552,7 +552,7 @@ class ImplicitMap(MapFamily):
         return digits_of(entry for row in self.rows for entry in row)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
-        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction."""
+        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime without reduction modulo p."""
         eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for cached_field, cached_eps, map_at_eps in self._cached_maps:
             if cached_field is over and cached_eps is eps_element:
@@ -586,9 +586,9 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
 
-    The map must be defined and dominant, and a given inverse map must be its inverse. A wrong map passes each of the
-    three points with probability below 2^-40. If `root` is given, it is the value of the only symbol, and only primes
-    modulo which it exists are used.
+    The map must be defined and dominant, and a given inverse map must be its inverse. A wrong map passes the test at
+    each of the three points with probability below 2^-40. `root`, if given, is the value of the only symbol; the primes
+    are then those modulo which the root exists.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     passed_count = 0

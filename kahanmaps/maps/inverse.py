@@ -25,12 +25,12 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix
 
 Rows = tuple[tuple[fmpq_mpoly, ...], ...]
-Quotient = tuple[Any, Any]  # two polynomials
-Solution = dict[int, Quotient]  # for each unknown, given by its index among the variables, its value
+Quotient = tuple[Any, Any]  # numerator and denominator, polynomials
+Solution = dict[int, Quotient]  # from the index of an unknown among the variables to the value of the unknown
 
-_MAX_TERMS = 3000  # terms of a polynomial
-_PRIME_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, which must be C integers
-_MAX_RESULTANT = 60_000  # product of the numbers of terms of two polynomials, times the sum of their degrees
+_MAX_TERMS = 3000  # largest number of terms of a polynomial
+_PRIME_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, read as C integers
+_MAX_RESULTANT = 60_000  # of two polynomials: the largest product of their numbers of terms and the sum of degrees
 
 
 class NotBirational(InputError):
@@ -84,7 +84,7 @@ def inverse_rows(rows: Rows) -> Rows:
 
 
 def why_not_birational(rows: Rows) -> str:
-    """Return why a map is not birational, tested modulo primes at random eps and symbols; empty if it seems to be."""
+    """Return why a map is not birational; empty if tests modulo primes at random eps and symbols show nothing."""
     n, names = len(rows), names_of(rows[0][-1])
     reasons = []
     for seed in range(2):
@@ -115,7 +115,7 @@ def why_not_birational(rows: Rows) -> str:
 
 
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
-    """Return a random point (x, x~) of the graph modulo a random prime, followed by the values of symbols and eps."""
+    """Return a random prime field and over it, in one list, a random point (x, x~) of the graph, symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
     while True:  # this ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
@@ -141,7 +141,7 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
 
 
 def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], is_on_graph: Callable[[Any], bool]) -> Solution:
-    """Solve for the unknowns as functions of the other variables, from polynomials that vanish on the graph."""
+    """Solve equations for the unknowns as functions of the other variables; `polynomials` vanish on the graph."""
     if not unknowns:
         return {}
     relations: list[Any] = []
@@ -190,7 +190,7 @@ def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], is_on_graph: Cal
 
 
 def _coefficients_in(polynomial: Any, u: int) -> list[Any]:
-    """Return the coefficients of the powers of a variable, starting with the constant term."""
+    """Return the coefficients of the powers of the variable with index u, starting with the constant term."""
     context = polynomial.context()
     terms_by_power: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
     for monomial, coefficient in polynomial.terms():
@@ -199,7 +199,7 @@ def _coefficients_in(polynomial: Any, u: int) -> list[Any]:
 
 
 def _substitute_quotient(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
-    """Substitute numerator/denominator for a variable, and clear the denominator."""
+    """Substitute numerator/denominator for the variable with index u; multiply by denominator^(degree in it)."""
     *coefficients, total = _coefficients_in(polynomial, u)
     power = denominator**0
     for coefficient in reversed(coefficients):
@@ -209,7 +209,7 @@ def _substitute_quotient(polynomial: Any, u: int, numerator: Any, denominator: A
 
 
 def _substitute_solution(polynomial: Any, solution: Solution) -> Quotient:
-    """Substitute the values in `solution` for the unknowns."""
+    """Substitute the values in `solution` for the unknowns; return the result in lowest terms."""
     denominator = polynomial.context().constant(1)
     for u, (numerator, denominator_of_unknown) in solution.items():
         denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])

@@ -53,11 +53,11 @@ class KahanMap(ElementaryMap):
     """The Kahan map Phi(., eps) of a quadratic system over a field (by default the rationals).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    It is also substituted for eps in the coefficients of the system; the other symbols take the `values`, elements of
+    It is also substituted for eps in the coefficients of the system. `values` are the values of the other symbols in
     the field. Results are exact over QQ and GF(p), and enclosures over RR(bits). If the system is already over a field
     (`SystemOver`), eps may be any element of it.
 
-    M and r are computed from the tensor f'', which over most fields is faster than evaluating the equation.
+    M and r are computed from the tensor f''; over most fields this is faster than an evaluation of the equation.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
     >>> phi = KahanMap(system, "1/2")
@@ -78,7 +78,7 @@ class KahanMap(ElementaryMap):
         time_step: Any = None,
         h: Any = None,
     ) -> None:
-        """If this is an inverse map, its step is -eps, and `inside` is the eps in the coefficients."""
+        """`inside` is the eps in the coefficients, if not `eps`: an inverse map has -eps and the same coefficients."""
         if eps is None:
             eps = resolve_eps(eps, time_step, h)
         if not isinstance(system, QuadraticSystem | SystemOver):

@@ -28,7 +28,7 @@ def has_llvm() -> bool:
 
 
 def choose_kernel(requested: str | None, is_long: bool) -> str:
-    """Return the requested kernel; by default numba if installed and the computation `is_long`. May raise InputError.
+    """Return `requested`; by default "numba" if installed and `is_long` is True, else "numpy". May raise InputError.
 
     >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')

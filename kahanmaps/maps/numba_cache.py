@@ -13,7 +13,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function by numba with these options; use the disk cache if its folder is writable."""
     try:
         compiled_function = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # "no locator available": there is no writable folder
+    except RuntimeError:  # numba's error "no locator available" means that no cache folder is writable
         return numba.njit(**options)(function)
     save = compiled_function._cache.save_overload
 

@@ -34,8 +34,8 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
         degree: d, from 2 to 6; it may exceed the degree of f.
 
     Returns:
-        The map, exact; its inverse is known. Its variables are those of f at the points x_k, ..., x_{k+d-2}: x, x_1,
-        ...
+        The map, exact; its inverse is known. Its variables are the coordinates of x_k, ..., x_{k+d-2}, with names such
+        as x, x_1, ... for a variable x of f.
 
     Raises:
         InputError: if the degree of f exceeds d, or d is out of range.
@@ -60,7 +60,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     one, zero = context.constant(1), context.constant(0)
 
     def unit_row(column: int, value: Any) -> tuple[fmpq_mpoly, ...]:
-        """Return the row of the equation that sets a coordinate of the image equal to `value`."""
+        """Return the row of the equation "coordinate number `column` of the image = value"."""
         return (*(context.constant(int(j == column)) for j in range(copy_count * n)), -value)
 
     # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}); the inverse gives (x_{k-1}, ..., x_{k+d-3}), with -h for h.
@@ -68,14 +68,14 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     forward = [unit_row(k * n + i, points[k + 1][i]) for k in range(copy_count - 1) for i in range(n)]
     backward = [unit_row((k + 1) * n + i, points[k][i]) for k in range(copy_count - 1) for i in range(n)]
     for i, f in enumerate(rhs):
-        # `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term.
+        # (d - 1) h F(x_k, ..., x_{k+d-2}, y) is linear in y: the coefficients of y, and the constant term.
         linear_coefficients, constant = [zero] * n, zero
         for monomial, coefficient in f.terms():
             indices: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
             indices += [None] * (degree - len(indices))
             exponents = (*[0] * (n * copy_count), *monomial[n:])
             term = step * context.from_dict({exponents: coefficient / factorial(degree)})
-            # The mean over all arrangements of the points is the symmetric form; equal ones are counted repeatedly.
+            # F is the mean over all arrangements of the variables of a monomial; equal arrangements count repeatedly.
             for arrangement in permutations(indices):
                 product = term
                 for point, j in zip(points, arrangement[:copy_count], strict=True):

@@ -19,23 +19,23 @@ _MAX_DIRECT_INDEX = 8  # up to this n, quotients of s(n) are computed from s(n);
 
 
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
-    """Return W(1) to W(4) and U(1) to U(4) over any field, scaled such that W(2) = H, W(3) = H^3 and U(1) = U(2) = 1.
+    """Return the lists of W(1) to W(4) and U(1) to U(4), with W(1) = U(1) = U(2) = 1, W(2) = H and W(3) = H^3.
 
-    y and z are H U(n)^2/(U(n + 1) U(n - 1)) for n = 2 and 3. Raises ZeroDivisionError.
+    U is a sequence at Q + n T: H U(n)^2/(U(n + 1) U(n - 1)) is y for n = 2, z for n = 3. Raises ZeroDivisionError.
     """
     one = H / H
     a = H / y
     U = [one, one, a, a * a * H / z]
     while len(U) < 6:
         U.append(_next_term(U[-4:], H))
-    # U(n + 3) U(n - 2) W(2) W(1) = W(3) W(2) U(n + 2) U(n - 1) - W(4) W(1) U(n + 1) U(n), for n = 3
+    # W(4) from U(n + 3) U(n - 2) W(2) W(1) = W(3) W(2) U(n + 2) U(n - 1) - W(4) W(1) U(n + 1) U(n), for n = 3
     return [one, H, H**3, H * (H**3 * U[4] * U[1] - U[5] * U[0]) / (U[3] * U[2])], U[:4]
 
 
 def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
-    """Return the terms from -bound to bound of W, or of U if the first terms of W are given as `multiples`.
+    """Return {n: W(n)} for -bound <= n <= bound, or {n: U(n)} if `multiples` is the list of W(1) to W(4).
 
-    Raises ZeroDivisionError if a term by which the recurrence divides is 0.
+    `first` contains the terms with n = 1 to 4. Raises ZeroDivisionError if the recurrence divides by a term that is 0.
     """
     terms = list(first)
     while len(terms) < bound:
@@ -56,13 +56,13 @@ def _next_term(terms: Sequence[Any], H: Any) -> Any:
 
 
 class Integers:
-    """Rational terms, each written as an integer coprime to `power` times a rational scale."""
+    """Arithmetic of rational terms written as integer times rational scale, the integers coprime to `power`."""
 
     def __init__(self, power: fmpz) -> None:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return integer and scale of a nonzero value. ArithmeticError if its denominator has primes not in `power`."""
+        """Return (integer, scale) for `value`, not 0. ArithmeticError if its denominator has a prime not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)
@@ -73,7 +73,7 @@ class Integers:
         return value
 
     def difference(self, s: fmpq, first: fmpz, t: fmpq, second: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
-        """Return integer and scale of (s first - t second)/divisor, which is integral up to the primes of `power`."""
+        """Return (integer, scale) for (s first - t second)/divisor, which is integral except at primes of `power`."""
         denominator = s.q.lcm(t.q)
         numerator = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
         if divisor is not None:
@@ -100,12 +100,12 @@ class Terms:
     """
 
     def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
-        """Start from t(1), ..., t(4). `multiples` is W, None for W itself; W(1) = 1, primes of W(2) are in the set."""
+        """`first` is t(1), ..., t(4). `multiples` is W, or None if t = W. W(1) = 1; primes of W(2) are in the set."""
         self._W = self if multiples is None else multiples
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}
-        self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
-        self._short_scales: dict[int, Any] = {}  # s(n), while it is short
+        self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n = i + j above 4, with i - j = 1 or 2
+        self._short_scales: dict[int, Any] = {}  # s(n) for n up to _MAX_DIRECT_INDEX + 1
         self._pairs: dict[int, tuple[Any, Any]] = {}
         self._computation_order = deque[int]()  # the order in which the terms after the first ones were computed
         self._own_quotients: dict[int, Any] = {}
@@ -114,7 +114,7 @@ class Terms:
             if term == 0:
                 raise ArithmeticError("one of the first terms is 0")
             self._terms[n], self._short_scales[n] = numbers.split(term)
-        # The division by t(i - j): by 1 or W(2) in the scale for W, otherwise by w, which divides exactly.
+        # Division by t(i - j): for W, and if t(1) = t(2) = 1, only the scale is divided; else w(i - j) divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
         self._divisor_and_scale = {
             small_index: (None, first[small_index - 1])
@@ -188,7 +188,7 @@ class Terms:
     def forget(self, n: int) -> None:
         """Discard the terms with index below n that terms near 2 n + 8 and later do not need, except the first ones.
 
-        Products that are needed again are recomputed, which takes a fifth of the time of the first computation.
+        To recompute the discarded products that are needed again takes a fifth of the time of the first computation.
         """
         while self._computation_order and self._computation_order[0] < n:
             self._terms.pop(self._computation_order.popleft(), None)

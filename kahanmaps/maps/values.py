@@ -12,7 +12,7 @@ from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InexactNumber, InputError, counted
 
-_MATRIX_TYPES = (fmpq_mat, fmpz_mat)  # a matrix with one column or row contains coordinates
+_MATRIX_TYPES = (fmpq_mat, fmpz_mat)  # a matrix with one column or one row is read as a point
 
 
 def is_float_value(value: Any) -> bool:
@@ -129,7 +129,7 @@ def function_value(function: RationalFunction, arguments: Sequence[Any], named: 
         values = [function_value(function, (row, *arguments[1:]), named) for row in arguments[0]]
         return np.array(values, dtype=np.float64 if any(map(is_float_value, values)) else object)
     names, values_by_name, values = function.names, dict(named), list[Any]()
-    for name in {"h", "time_step"} & {*named} - {*names}:  # 2 eps
+    for name in {"h", "time_step"} & {*named} - {*names}:  # both names mean 2 eps
         h = values_by_name.pop(name)
         values_by_name["eps"] = h / 2 if is_float_value(h) else QQ.convert(h) / 2
     for entry in arguments:
@@ -140,7 +140,7 @@ def function_value(function: RationalFunction, arguments: Sequence[Any], named: 
     free_names = [name for name in names if name not in values_by_name]
     unused_names = {*function.numerator.unused_gens()}.intersection(function.denominator.unused_gens())
     if len(values) == len(free_names) - 1 and free_names[-1] == "eps" and "eps" in unused_names:
-        values.append(0)  # any value, since the function does not contain this name
+        values.append(0)  # a value for eps, which does not occur in the function
     if len(values) != len(free_names) or not {*values_by_name} <= {*names}:
         hint = (
             ', for example I(x, eps="1/10")' if len(values) == len(free_names) - 1 and free_names[-1] == "eps" else ""

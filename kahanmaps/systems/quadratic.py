@@ -93,7 +93,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @cached_property
     def Q(self) -> tuple[fmpq_mat, ...]:
-        """The symmetric matrices of the quadratic forms; only for systems without symbols."""
+        """The symmetric matrices Q_i of the quadratic terms x^T Q_i x of f_i(x); only for systems without symbols."""
         n, entries = self.dim, (self._over_rationals.tensor / 2).entries()
         return tuple(fmpq_mat(n, n, entries[i * n * n : (i + 1) * n * n]) for i in range(n))
 
@@ -159,7 +159,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return values.values_at(self.rhs, self.variables, values.point_of(point, named))
 
     def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
-        """Return f'(x) as polynomials in `names`, which contain the variables and the symbols."""
+        """Return the entries of f'(x), polynomials in `names`; these include the variables and the symbols."""
         context = ring(names)
         images = [context.gen(list(names).index(name)) for name in names_of(self.rhs[0])]
         return [[p.derivative(k).compose(*images, ctx=context) for k in range(self.dim)] for p in self.rhs]
@@ -180,7 +180,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @cached_property
     def digits(self) -> int:
-        """Approximate number of decimal digits of the longest coefficient, over a common denominator."""
+        """Approximate number of decimal digits of the longest coefficient, all written over a common denominator."""
         return digits_of(self.rhs)
 
     def __repr__(self) -> str:
@@ -229,7 +229,7 @@ class SystemOver:
                 for monomial, coefficient in polynomial.terms():
                     # The indices of the variables in the monomial, each as often as it occurs.
                     indices = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
-                    # Twice x_j^2/2 is integral: f'' is defined modulo 2, though Q is not.
+                    # The second derivative of c x_j^2 is 2 c. So f'' is defined modulo 2, though Q = f''/2 is not.
                     is_square = len(indices) == 2 and indices[0] == indices[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
                     for exponent, symbol_value in zip(monomial[n:], values, strict=True):
@@ -269,7 +269,7 @@ class SystemOver:
 
     @cached_property
     def _derivatives(self) -> list[Any]:
-        """The partial derivatives of f'. Their linear combination f''(v) takes a third of a product with the tensor."""
+        """The matrices df'/dx_k. Their combination f''(v) takes a third of the time of a product with `tensor`."""
         n, entries = self.dim, self.tensor.entries()
         with self.field.working():
             return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]
@@ -286,7 +286,7 @@ class SystemOver:
         return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
-        """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's equation; not modulo 2."""
+        """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's equation; not defined modulo 2."""
         one_half = self.field.convert(fmpq(1, 2))
         column_x, column_y = self.field.column(x), self.field.column(y)
         with self.field.working():
@@ -295,7 +295,7 @@ class SystemOver:
 
 
 def as_system(value: Any) -> QuadraticSystem:
-    """Convert a value to a quadratic system: whatever `maps.kahan.as_map` accepts, but no maps except Kahan maps."""
+    """Convert a value that `maps.kahan.as_map` accepts to a quadratic system; of maps, only Kahan maps are accepted."""
     if isinstance(value, QuadraticSystem):
         return value
     system: QuadraticSystem = (

@@ -57,7 +57,7 @@ def _integrate(system: QuadraticSystem, x: list[arb], time: fmpq, bits: int) -> 
             terms.append((arb(coefficient), [k for k, power in enumerate(monomial) for _ in range(int(power))]))
         equations.append(terms)
     index_pairs = sorted({tuple(indices) for terms in equations for _, indices in terms if len(indices) == 2})
-    degree = bits // 2 + 1  # sufficient for r <= 1/4
+    degree = bits // 2 + 1  # sufficient since r (module docstring) is at most 1/4
     for step_count in range(_MAX_STEPS):
         size = max(abs(entry).upper() for entry in x)
         scales = [size, 4 * size, arb(1)] if size > 0 else [arb(1)]
