@@ -20,9 +20,9 @@ _MAX_FACTORED_BITS = 140  # a cofactor with at most this number of bits is facto
 
 @dataclass(frozen=True)
 class BadPrimes:
-    """The primes of bad reduction of an elliptic curve over Q; for a number field, the primes of Q below the bad ones.
+    """The primes of bad reduction of an elliptic curve over Q, or the primes of Q below those of a number field.
 
-    At the primes `bad` the reduction is bad (proved), at `undecided` it is not known. `bad_cofactors` are unfactored
+    At the primes `bad` the reduction is bad (proved); at `undecided` this is not known. `bad_cofactors` are unfactored
     composite integers all of whose prime factors are bad; of `undecided_cofactors` some prime factors may be bad. At
     all other primes the reduction is good (proved). `minimal_discriminant` is for a curve over Q, None if not known.
     """
@@ -54,7 +54,7 @@ class BadPrimes:
 
 
 def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
-    """Return the prime factors found for a nonzero integer, and the composite cofactors that remain.
+    """Return the prime factors found of a nonzero integer, and its remaining composite factors.
 
     >>> factor_within_bound(fmpz(-12))
     ({2, 3}, set())
@@ -121,7 +121,7 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
     K, denominator = gamma.field, leading_coefficient(gamma)
-    # Primes in the denominator of j are bad. For a number field these are the primes that divide this integer.
+    # Primes in the denominator of j are bad. The primes of Q below them are those that divide this integer.
     pole_norm = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()

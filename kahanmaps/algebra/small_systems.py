@@ -72,7 +72,7 @@ class SolutionComponent:
 
 @dataclass
 class Solutions:
-    """The result of `solve_system`: linear families and points, unsolved parts, and parts without rational points.
+    """The result of `solve_system`: `components` are linear families and points, `unsolved` the parts not solved.
 
     `conjugate` lists the parts without a rational point; `irrational` describes them, in the same order.
     """
@@ -86,7 +86,7 @@ class Solutions:
 
     @property
     def complete(self) -> bool:
-        """Whether every rational solution is in one of the components."""
+        """Whether every rational solution is in one of `components`."""
         return not self.unsolved
 
 
@@ -201,7 +201,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
             power = power * ratio
         blocks.append(nullspace(QQ, annihilator))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
-    # Return None unless the forms decouple: new coordinates would only make the coefficients longer.
+    # Return None unless the forms decouple: other coordinates would only make their coefficients longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
     T_hessian = T.transpose() * hessian() * T
     is_decoupled = all(T_hessian[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
@@ -209,7 +209,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
 
 
 class _Solver:
-    """The recursion of `solve_system`; `stop_reason` is not empty once a limit has ended it."""
+    """The recursion of `solve_system`; `stop_reason` is empty until a limit ends the recursion."""
 
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
@@ -246,7 +246,7 @@ class _Solver:
                 new_equations = [q.compose(*gens, ctx=context) for q in original_equations]
                 self.solve(new_equations, tuple(q.compose(*gens, ctx=context) for q in values))
                 return
-        # The reduced basis may hide factors of the original equations, as for x f, y g, z h: factor both.
+        # Equations that factor, as x f, y g, z h, may have a basis whose elements do not factor: factor both.
         factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original_equations)
         if factors is not None:
             for factor in sorted(factors, key=lambda q: (degree(q), str(q))):
@@ -315,8 +315,8 @@ class _Solver:
 
 
 def _factors_to_branch_on(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """Return the factors of the equation that is best to branch on; None if no equation factors."""
-    # Factors of high degree lead to long branches, so the equation whose largest factor has the least degree is taken.
+    """Return the factors of the equation whose largest factor has the least degree; None if no equation factors."""
+    # Factors of high degree lead to long branches.
     products = []
     for p in equations:
         variable_count = sum(e > 0 for e in p.degrees())
@@ -409,7 +409,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
 
 
 def quotient_monomials(basis: Sequence[fmpq_mpoly], free_variables: Sequence[int]) -> list[tuple[int, ...]] | None:
-    """Return the monomials that no leading monomial of the basis divides; None if there are infinitely many."""
+    """Return the monomials in the free variables that no leading monomial of the basis divides; None if infinite."""
     leads = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     for i in free_variables:
         if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leads):
