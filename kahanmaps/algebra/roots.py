@@ -54,7 +54,7 @@ class Root:
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
             with suppress(InputError):  # the error is raised later, when the real number is needed
-                # Replace `near`, so that equal roots have equal text: the root to 4, 8, ... digits, whichever suffice.
+                # Replace `near` by the root to 4, 8, ... digits, the first that suffice: equal roots get equal text.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -94,7 +94,7 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Return the remainder modulo g in the k-th variable: 0 if and only if the polynomial vanishes at the root."""
+        """Return the remainder modulo `self.polynomial` in variable k: 0 if `polynomial` is 0 with the root for it."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
@@ -132,7 +132,7 @@ class Root:
                 raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
             center = arb(0 if near is None else near)
             closest, *others = sorted(real_roots, key=lambda root: float(abs(root - center)))
-            if others and (near is None or not abs(closest - center) < abs(others[0] - center)):  # the two may overlap
+            if others and (near is None or not abs(closest - center) < abs(others[0] - center)):  # balls may overlap
                 texts = ", ".join(root.str(6, radius=False) for root in real_roots)
                 example = real_roots[-1].str(4, radius=False)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {example}")
