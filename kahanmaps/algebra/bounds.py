@@ -56,7 +56,7 @@ ONE = CoefficientSize(0, 0.0)
 
 
 def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[CoefficientSize, int]:
-    """Bound the polynomials that are 0 if and only if each pair of elements (or matrices) over `field` is equal.
+    """Bound the polynomials that are all 0 if and only if the two elements (or matrices) of each pair are equal.
 
     Returns:
         (bound, degree): `bound` holds for each of these polynomials; `degree` bounds the degree of the product of the
@@ -257,7 +257,7 @@ class BoundMatrix:
         return Bound(self.field, self._minor_bound(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
-        """Bound the solution by Cramer's rule: if this matrix is N/d, N over Z[x], it is d adj(N) right / det N."""
+        """Bound the solution by Cramer's rule: for self = N/d with N over Z[x] it is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         index = self.field.denominator(self, self._minor_bound(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))

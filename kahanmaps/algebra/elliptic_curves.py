@@ -157,7 +157,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
             gcds.append(gcd)
         return gcds
 
-    # The common factors are usually much smaller than R, and as large as the first ones, which need no modulus.
+    # The gcds are usually much smaller than R, and as large as the first ones, which are computed without a modulus.
     typical_factor = reduce(fmpz.lcm, common_factors(_EXACT_TERMS, None))
     gcds = common_factors(_HEIGHT_TERMS, resultant * typical_factor**_HEIGHT_TERMS)
     if len(gcds) < _HEIGHT_TERMS:
@@ -221,7 +221,7 @@ def _depressed_cubic(curve: EllipticCurve) -> tuple[Any, Any, Any]:
 
 
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
-    """Return (r, k): r in (0, 1/2] is, up to sign, the rotation number of the translation by k P on the real curve.
+    """Return (r, k): r in [0, 1/2] is, up to sign, the rotation number of the translation by k P on the real curve.
 
     k is 2 if the translation by P exchanges the two real components of the curve, and 1 otherwise.
 

@@ -102,7 +102,7 @@ def _numpy_kind(value: Any) -> str:
 
 
 class Field(ABC):
-    """A field of numbers; `exact` tells whether equality of two elements is decidable."""
+    """A field of numbers; `exact` is True if equality of two elements is decidable."""
 
     name: str
     characteristic: int

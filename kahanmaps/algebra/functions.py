@@ -317,7 +317,7 @@ class FunctionMatrix(EntryMatrix):
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
     def _diagonal_blocks(self) -> list[list[int]]:
-        """Return the finest partition of the indices for which the matrix is block diagonal."""
+        """Return lists of indices, as short as possible, such that entries between two of the lists are 0."""
         indices = set(range(self._rows))
         blocks = []
         while indices:
@@ -337,7 +337,7 @@ class FunctionMatrix(EntryMatrix):
         for i in range(self._rows):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
-            for entry in row:  # a common denominator as in a sum
+            for entry in row:  # the sum of all 1/denominator has a common denominator
                 if entry.numerator.is_zero():
                     continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.denominator)

@@ -70,7 +70,7 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
-    """Whether `power` has each prime of `gcd` = gcd(n, `power`) more often than `gcd`; then `gcd` has it as n does."""
+    """Whether `power` has each prime of `gcd` = gcd(n, `power`) more often than `gcd`: then n has it as `gcd` does."""
     cofactor = power // gcd
     while gcd != 1:
         common_factor = gcd.gcd(cofactor)

@@ -155,7 +155,7 @@ class Quotient:
 
     @classmethod
     def of(cls, shape: Shape, numerator: Sequence[int], denominator: Sequence[int], prime: int) -> Quotient | None:
-        """Return the fraction with leading coefficient 1 below and no zero terms; None if its denominator is 0."""
+        """Return the fraction without zero terms, its denominator normalized; None if the denominator is 0."""
         numerator_terms = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
         denominator_terms = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
         if not denominator_terms:

@@ -277,7 +277,7 @@ def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RationalFunction(LatexDisplay):
-    """A quotient of two polynomials over Q; the denominator has coprime integer coefficients and a positive first one.
+    """A quotient of polynomials over Q; the denominator has coprime integer coefficients, the first of them positive.
 
     Common factors are not canceled, since a gcd of large polynomials is expensive. Two rational functions are equal if
     their cross products are equal.

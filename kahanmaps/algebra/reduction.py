@@ -35,7 +35,7 @@ class BadPrimes:
 
     @property
     def text(self) -> str:
-        """The primes in one line."""
+        """The bad primes, cofactors and undecided primes as text in one line."""
         texts = [", ".join(map(str, self.bad)) or "none"]
         if self.bad_cofactors:
             texts.append(f"and all primes of {', '.join(map(str, self.bad_cofactors))} (composite, not factored)")

@@ -70,7 +70,7 @@ class Root:
 
     @cached_property
     def number_field(self) -> EtaleAlgebra:
-        """Q[t]/g for the polynomial g; the class of t is the root."""
+        """Q[t]/g for g = `polynomial`; the class of t is the root."""
         return EtaleAlgebra(self.polynomial)
 
     def over(self, field: Field) -> Any:
@@ -94,7 +94,7 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Return the remainder modulo `self.polynomial` in variable k: 0 if `polynomial` is 0 with the root for it."""
+        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; 0 if it vanishes at the root."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 

@@ -167,7 +167,7 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
 
 
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
-    """Find coordinates in which cubic forms in `count` variables may decouple: a matrix with the new basis, or None.
+    """Return T for which the cubic forms at T y, y of `count` variables, may decouple; None if none was found.
 
     If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all its
     elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic

@@ -67,7 +67,7 @@ class Monomial:
 
 @dataclass(frozen=True)
 class DarbouxFactor:
-    """A factor P with D^k P(N/D) = C P, where P and C are polynomials over Z, and the exponent of P in a product.
+    """A Darboux polynomial P over Z, D^k P(N/D) = C P with `cofactor` C over Z, and its exponent in a product.
 
     k is `degree`: the degree of P in the variables, or a larger number if P has a factor of D.
     """
@@ -97,7 +97,7 @@ class DarbouxProduct:
 
     @property
     def degree(self) -> int:
-        """The sum of k times the exponent over the factors, k as in `DarbouxFactor`."""
+        """The sum of degree times exponent over the factors."""
         return sum(factor.degree * factor.exponent for factor in self.factors)
 
     def cofactor(self, degree: int, count: int) -> Monomial:

@@ -36,7 +36,7 @@ class PositiveEntropy(Claim):
     """The proof that the dynamical degree is above `lower`; `forms` are F_1, ..., F_n, `inverse` is F_1 of the inverse.
 
     They are forms in the variables and a last, homogenizing variable. c_1 F_1 is (N : D), c_(k+1) F_(k+1) is F_1(F_k),
-    where `factors` are the c_k. `degree` is deg F_n, `line_degree` is the degree of the 2n-th image of a line.
+    where `factors` are the c_k. `degree` is deg F_n, `line_degree` is that of the 2n-th image of `LINE`.
     """
 
     inverse: tuple[fmpq_mpoly, ...]
@@ -114,7 +114,7 @@ def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpol
 
 
 def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
-    """Return the degree of the image of the line after `steps` steps modulo a prime; None if a step is undefined."""
+    """Return the degree of the image of `LINE` after `steps` steps modulo a prime; None if a step is undefined."""
     line = [nmod_poly(list(point), prime) for point in LINE]
     try:
         for _ in range(steps):
@@ -125,7 +125,7 @@ def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | N
 
 
 def _curve_image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
-    """Return the image of a curve modulo the prime, without common factors. Raises InputError if the image is 0."""
+    """Return the image of a curve under the map with these forms, without common factors. InputError if it is 0."""
     powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], prime)} for _ in curve]
 
     def power(k: int, exponent: int) -> nmod_poly:

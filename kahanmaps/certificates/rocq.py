@@ -68,7 +68,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """Return the text of det(M) x~: if `at_n` the names of N, else products that Cramer's rule rewrites to N."""
+        """Return texts of det(M) x~_i: if `at_n` the names n1, ..., else products that Cramer's rule makes n1, ..."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
@@ -279,7 +279,7 @@ class _Script:
         ]
 
     def expand_tactic(self, *names: str) -> str:
-        """Return the tactic that unfolds all definitions and proves a polynomial identity."""
+        """Return the tactic that unfolds the definitions of the map and `names`, and proves a polynomial identity."""
         n = self.data.dim
         definitions = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         definitions += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]

@@ -32,7 +32,7 @@ _IN_K = (
 
 
 def cache_by_id(method: Method) -> Method:
-    """Cache the values of a method by the `id` of its arguments; references keep the arguments alive."""
+    """Cache the values of a method by the `id` of its arguments; the cache keeps the arguments alive."""
     name = method.__name__
 
     @wraps(method)
@@ -63,7 +63,7 @@ class PaperObjects:
     step_eps: Any = None
     method: str = "kahan"
     error_of_second: Any = None
-    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if these are
+    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if roots were used
     _cache: dict[Any, Any] = field(default_factory=dict)
     A: Any
     d3H: Any
@@ -713,7 +713,7 @@ class PaperObjects:
 
 
 def _times_linear(K: Field, polynomial: Sequence[Any], root: Any) -> list[Any]:
-    """Return (t - root) times a polynomial in t, given by its coefficients, constant term first."""
+    """Return (t - root) times a polynomial in t; both are lists of coefficients, constant term first."""
     product = [K.zero, *polynomial]
     for k, coefficient in enumerate(polynomial):
         product[k] = product[k] - root * coefficient
