@@ -77,7 +77,7 @@ def rational(value: Any) -> fmpq:
 
 
 def integer(value: Any, name: str) -> int:
-    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError; `name` is its name for the value.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int. InputError: its text calls the value `name`.
 
     >>> integer(7, "m")
     7

@@ -370,7 +370,7 @@ def _interpolate_on_line(
 
 
 def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
-    """Return (N, D), N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic, or None."""
+    """Return (N, D), N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic; or None."""
     p = interpolant.modulus()
     previous, current = (node_polynomial, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:

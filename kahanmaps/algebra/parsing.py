@@ -319,7 +319,7 @@ _OPERAND = "expected a number, a name or '('"
 
 
 class _Polynomial(NamedTuple):
-    """`element` is a polynomial or a number (fmpq_mpoly or fmpq); the other fields are its size.
+    """A polynomial or number `element` (fmpq_mpoly or fmpq), with its size.
 
     `common_denominator` times `element` has integer coefficients of absolute value at most 2**`bits`.
 

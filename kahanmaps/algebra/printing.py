@@ -212,9 +212,9 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
 
 @dataclass(frozen=True)
 class Notation:
-    """How a language writes formulas: `name`, `number` (a positive number) and `power` return the text of their value.
+    """How a language writes formulas: `name`, `number` and `power` write a name, a positive number and a power.
 
-    `signs`: the minus of the first term, the plus and the minus of other terms. `gap` is between terms, `times` between
+    `signs` are the minus of the first term, the plus and the minus of others. `gap` is between terms, `times` between
     factors. `enclosed` puts brackets around a sum, `fraction` joins numerator and denominator, `row` groups a sum or a
     product. Terms are in the order of the ring. If `eps_first` is True, eps is the first factor of each term.
     """

@@ -85,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # The root is b/q for an algebraic integer b; Cauchy's bound for g bounds all conjugates of the root.
+            # The root is b/q for an algebraic integer b; Cauchy's bound holds for all conjugates of b.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})

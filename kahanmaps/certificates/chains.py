@@ -135,7 +135,7 @@ def apply(data: MapData, point: RationalPoint) -> RationalPoint:
 
 
 def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tuple[fmpq_mpoly, list[int]]:
-    """Return (P d, exponents): the value P of the polynomial times d, a product of powers of the point's denominators.
+    """Return (v d, e): v is the value at the point, d the product of the point's denominators to the powers e.
 
     Raises InputError if the result has too many terms.
     """

@@ -150,7 +150,7 @@ def affine_symmetry(
     target: MapData | None = None,
     about: str = "",
 ) -> AffineSymmetry:
-    """Return the identity that T(x) = S x + shift takes the map to `target` (None: the map), if `reversing` inverted.
+    """Return the identity: T(x) = S x + shift takes the map to `target` (None: itself), or its inverse if `reversing`.
 
     Raises:
         FalseClaim: if the identity does not hold, or T is not invertible.

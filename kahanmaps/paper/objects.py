@@ -299,7 +299,7 @@ class PaperObjects:
         return self.A_to(i) * gradient
 
     def H(self, x: Any, i: int = 0) -> Any:
-        """Return H_i(x) by Euler's formula for each degree; this H_i has the gradient A^i nabla H_0 if one has."""
+        """Return H_i(x) by Euler's formula for each degree; nabla H_i = A^i nabla H_0 if this is a gradient."""
         return self.potential(self.A_to(i), x)
 
     def gradient_of_chain(self, i: int, x: Any) -> Any:

@@ -255,7 +255,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # chi splits at 1/m! or more of all primes, so no prime is found with probability at most e^-40.
+                        # chi splits at 1/m! or more of all primes, so the search fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None

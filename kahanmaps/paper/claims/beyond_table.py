@@ -108,7 +108,7 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 
 
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_objects: Any) -> PaperObjects:
-    """Return objects in normal form: A = diag(roots, roots), H and x the sums of `ones`.
+    """Return objects in normal form: A = diag(roots, roots), H and x sums of monomials and unit vectors `ones`.
 
     If `ones` contains index pairs (i, j) of J, J has the entry 1 there, -1 at (j, i), and 0 elsewhere.
     """
@@ -121,7 +121,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_obj
         elif kind == "J":
             J[indices[0] * n + indices[1]], J[indices[1] * n + indices[0]] = 1, -1
         else:
-            # Add 1 to this third (second, first) derivative, with the coordinates in each order.
+            # Add 1 to the third (second, first) derivative along the coordinates of the monomial, in each order.
             coordinates = [i for i, e in enumerate(indices) for _ in range(e)]
             entries = {3: cubic, 2: hessian, 1: linear}[len(coordinates)]
             for permutation in itertools.permutations(coordinates):
