@@ -23,9 +23,9 @@ from kahanmaps.errors import InputError
 
 @dataclass(frozen=True)
 class CoefficientSize:
-    """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute values of its coefficients.
+    """Bounds on a polynomial over Z: its total degree, and log2 of the sum of the absolute values of its coefficients.
 
-    This sum is subadditive and submultiplicative, so that bounds can be computed operation by operation.
+    The sum is subadditive and submultiplicative in the polynomial, so bounds can be computed operation by operation.
 
     >>> CoefficientSize(2, 1.0) * CoefficientSize(3, 0.5)
     CoefficientSize(degree=5, bits=1.5)
@@ -48,7 +48,7 @@ class CoefficientSize:
         return CoefficientSize(self.degree * exponent, self.bits * exponent)
 
     def __or__(self, other: CoefficientSize) -> CoefficientSize:
-        """Return a bound that holds for both polynomials."""
+        """Return a bound of all polynomials that satisfy `self` or `other`."""
         return CoefficientSize(max(self.degree, other.degree), max(self.bits, other.bits))
 
 
@@ -56,11 +56,11 @@ ONE = CoefficientSize(0, 0.0)
 
 
 def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[CoefficientSize, int]:
-    """Bound the polynomial equations equivalent to equality of pairs of elements, or matrices, over `field`.
+    """Bound the polynomials that are all 0 if and only if the two elements (or matrices) of each pair are equal.
 
     Returns:
-        A bound for all polynomials that vanish if and only if the pairs are equal, and the degree of the product of
-        all polynomials that must not be zero: the divisors, and the elements compared with zero.
+        (bound, degree): `bound` holds for each of these polynomials; `degree` bounds the degree of the product of the
+        polynomials that must not be zero: all divisors, and all elements compared with zero.
     """
     bound = ONE
     for pair in pairs:
@@ -97,13 +97,13 @@ class BoundField(Field):
 
     @property
     def pole_degree(self) -> int:
-        """The degree of the product of all polynomials that must not be zero."""
+        """The degree of the product of all divisors and all elements compared with zero, which must not be zero."""
         return sum(size.degree for size in self._denominators)
 
     def denominator(self, owner: Any, size: CoefficientSize) -> int:
         """Return the index of the denominator of the object `owner`; the same object always has the same index.
 
-        A common bound of the entries of a matrix gets a new index in each call, since it represents different entries.
+        If `owner` is the common bound of the entries of a matrix, each call returns a new index: the entries differ.
         """
         if isinstance(owner, Bound) and owner.is_common:
             self._denominators.append(size)
@@ -161,7 +161,7 @@ class BoundField(Field):
 
 
 class Bound(Element):
-    """The bound of one rational function, or (`is_common`) of each entry of a matrix."""
+    """The bound of one rational function, or, if `is_common` is True, of each entry of a matrix."""
 
     __slots__ = ("denominator", "is_common", "numerator", "scale")
 
@@ -177,13 +177,13 @@ class Bound(Element):
         self.is_common = False
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of the numerator if the fraction is expanded to this multiple of its denominator."""
+        """Return the size of the numerator if the fraction is written over `scale` times the product `denominator`."""
         missing_exponents = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
         return self.numerator * self.field.product(missing_exponents) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
     def pole_degree(self) -> int:
-        """The degree of the denominator."""
+        """The degree of the denominator of the bounded function."""
         return int(self.field.product(self.denominator).degree)
 
     def _add(self, other: Bound) -> Bound:
@@ -257,7 +257,7 @@ class BoundMatrix:
         return Bound(self.field, self._minor_bound(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
-        """Bound the solution by Cramer's rule: for a matrix N/d the solution is d adj(N) right / det N."""
+        """Bound the solution by Cramer's rule: for self = N/d with N over Z[x] it is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         index = self.field.denominator(self, self._minor_bound(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))

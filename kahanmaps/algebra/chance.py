@@ -48,7 +48,7 @@ def derive_seed(seed: int, *data: Any) -> int:
 
 
 def _encode(value: Any) -> str:
-    """Return text that differs for different values; the length of each entry precedes it: entries cannot merge."""
+    """Return text that differs for different values: each entry of a list is preceded by the length of its text."""
     if isinstance(value, int):
         value = fmpz(value)  # str() of a Python int is limited to 4300 digits
     if value is None or isinstance(value, str | fmpz | fmpq):

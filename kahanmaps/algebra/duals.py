@@ -17,9 +17,9 @@ from kahanmaps.errors import InputError, PrecisionLost, SingularMatrix
 
 
 class DualField(Field):
-    """The dual numbers over `base`. Elements are `Dual`, matrices `DualMatrix`.
+    """The dual numbers value + d slope over the field `base`, d^2 = 0: elements are `Dual`, matrices `DualMatrix`.
 
-    It implements the protocol of a field, but is not a field: value + d slope is invertible only if its value is, and
+    It has all methods of `Field`, but is not a field: value + d slope is invertible only if its value is, and
     an element with value 0 need not be zero. `convert` accepts what `base` accepts, and returns constants (slope 0).
 
     >>> from kahanmaps.algebra.fields import QQ
@@ -174,7 +174,7 @@ class DualMatrix:
         return self.__mul__(other)
 
     def det(self) -> Dual:
-        """Compute det M0 (1 + d tr(M0^{-1} M1)); if M0 has no inverse, compute the slope column by column."""
+        """Compute det M0 (1 + d tr(M0^{-1} M1)) for self = M0 + d M1; for a singular M0 the slope column by column."""
         value = self.value.det()
         if isinstance(self.value, EntryMatrix):  # solving is slower than computing more determinants here
             return Dual(self.field, value, self._slope_of_det())
@@ -185,7 +185,7 @@ class DualMatrix:
         return Dual(self.field, value, value * trace(quotient))
 
     def _slope_of_det(self) -> Any:
-        """Return the sum over all j of det M0 with column j replaced by column j of M1; valid for every M0."""
+        """Return the slope of det(M0 + d M1), the sum over j of det M0 with column j replaced by that of M1."""
         n, total = self.nrows(), self.field.base.zero
         value, slope = self.value.entries(), self.slope.entries()
         for k in range(n):
@@ -194,7 +194,7 @@ class DualMatrix:
         return total
 
     def solve(self, right: DualMatrix) -> DualMatrix:
-        """Solve self X = right. Raises SingularMatrix (a ZeroDivisionError) if M0 has no inverse."""
+        """Solve self X = right. Raises SingularMatrix (a ZeroDivisionError) if `self.value` has no inverse."""
         self._require_same_field(right)
         value = solve(self.value, right.value)
         return DualMatrix(self.field, value, solve(self.value, right.slope - self.slope * value))

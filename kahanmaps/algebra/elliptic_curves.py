@@ -60,7 +60,7 @@ class EllipticCurve:
 
     @property
     def discriminant(self) -> Any:
-        """The discriminant of the cubic polynomial in x; the curve is singular where it is 0."""
+        """The discriminant of x^3 + a2 x^2 + a4 x + a6; the curve is singular if and only if it is 0."""
         a, b, c = self.a2, self.a4, self.a6
         return (a * a - 4 * b) * b * b + (18 * a * b - 4 * a * a * a - 27 * c) * c
 
@@ -98,7 +98,7 @@ class EllipticCurve:
 
 
 def _candidate_factors(number: fmpz) -> list[fmpz]:
-    """Return the small prime factors of a number, its cofactor, and the roots of the cofactor, each greater than 1."""
+    """Return the primes of at most 20 bits in a number, the remaining cofactor, and all their integer roots above 1."""
     if number == 0:
         return []
     factors = [abs(factor) for factor, _ in number.factor_smooth(_MAX_PRIME_BITS)]
@@ -145,7 +145,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
         )
 
     def common_factors(terms: int, modulus: fmpz | None) -> list[fmpz]:
-        """Return the gcds canceled in the first doublings; fewer than `terms` if the modulus determines only some."""
+        """Return the gcds canceled in the first `terms` doublings of P, or fewer if the modulus determines fewer."""
         X, Z, gcds = x.p, x.q, list[fmpz]()
         while len(gcds) < terms and (modulus is None or modulus % resultant == 0):
             X, Z = double(X, Z)
@@ -157,7 +157,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
             gcds.append(gcd)
         return gcds
 
-    # The common factors are usually much smaller than R, and as large as the first ones, which need no modulus.
+    # The gcds are usually much smaller than R, and as large as the first ones, which are computed without a modulus.
     typical_factor = reduce(fmpz.lcm, common_factors(_EXACT_TERMS, None))
     gcds = common_factors(_HEIGHT_TERMS, resultant * typical_factor**_HEIGHT_TERMS)
     if len(gcds) < _HEIGHT_TERMS:
@@ -187,9 +187,9 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
 
 
 def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
-    """Return the roots of the cubic polynomial with arb coefficients; the first is the largest real root.
+    """Return the roots of x^3 + a2 x^2 + a4 x + a6 with arb coefficients; the first is the largest real root.
 
-    With `has_oval` (positive discriminant) all are real and in decreasing order; otherwise two are complex conjugate.
+    `has_oval`: the discriminant is positive, so all roots are real, in decreasing order; else two are conjugate.
     """
     shift, A, B = _depressed_cubic(curve)
     s = B * B / 4 + A * A * A / 27
@@ -205,7 +205,7 @@ def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
 
 
 def complex_roots(curve: EllipticCurve) -> list[acb]:
-    """Return the roots of the cubic polynomial with acb coefficients, by Cardano's formula."""
+    """Return the roots of x^3 + a2 x^2 + a4 x + a6 with acb coefficients, by Cardano's formula."""
     shift, A, B = _depressed_cubic(curve)
     sqrt = (B * B / 4 + A * A * A / 27).sqrt()
     u_cubed = max((-B / 2 + sqrt, -B / 2 - sqrt), key=lambda z: abs(z).mid())
@@ -221,13 +221,13 @@ def _depressed_cubic(curve: EllipticCurve) -> tuple[Any, Any, Any]:
 
 
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
-    """Return the rotation number in (0, 1/2] (up to sign) of the translation by P on the real curve, and 1 or 2.
+    """Return (r, k): r in [0, 1/2] is, up to sign, the rotation number of the translation by k P on the real curve.
 
-    If the translation exchanges two real components, the number is that of the squared translation, and 2 is returned.
+    k is 2 if the translation by P exchanges the two real components of the curve, and 1 otherwise.
 
     Args:
         curve, P: the curve and the point, with coefficients and coordinates in arb.
-        has_oval: whether the cubic polynomial has three real roots, i.e. a positive discriminant.
+        has_oval: whether x^3 + a2 x^2 + a4 x + a6 has three real roots, i.e. a positive discriminant.
     """
     a, b, c = (-root for root in real_roots(curve, has_oval))
     steps, x = 1, P[0]

@@ -27,7 +27,7 @@ _MAX_KARATSUBA_TERMS = 6
 class EtaleAlgebra(Field):
     """Q[t]/chi for a monic squarefree `chi`. Elements are `EtaleElement`, matrices `EtaleMatrix`.
 
-    It implements the protocol of a field, but is a field only for irreducible chi.
+    It has all methods of `Field`, but is a field only for irreducible chi.
 
     >>> K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
     >>> t = K.generator
@@ -134,7 +134,7 @@ class EtaleElement(Element):
 
     def _multiply(self, other: EtaleElement) -> EtaleElement:
         f, g = self.polynomial, other.polynomial
-        # Only one coefficient is measured: if the others have another length, the product is merely slower.
+        # Only the length of the constant coefficients is tested: if others are shorter, the product is merely slower.
         is_long = f[0].p.bit_length() > _MIN_KARATSUBA_BITS and g[0].p.bit_length() > _MIN_KARATSUBA_BITS
         product = _karatsuba_product(f, g) if is_long and self.field.degree <= _MAX_KARATSUBA_TERMS else f * g
         return EtaleElement(self.field, product % self.field.chi)
@@ -158,7 +158,7 @@ class EtaleElement(Element):
 
 
 def _karatsuba_product(f: fmpq_poly, g: fmpq_poly) -> fmpq_poly:
-    """Multiply polynomials with few long coefficients.
+    """Multiply f = sum of a_i t^i and g = sum of b_i t^i, polynomials with few long coefficients.
 
     FLINT multiplies all pairs of coefficients, which takes two products for each pair i < j. By
 

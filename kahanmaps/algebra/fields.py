@@ -35,7 +35,7 @@ def rational(value: Any) -> fmpq:
     """Convert a value to an exact rational number.
 
     Accepts int, Fraction, Decimal, text (`"1/3"`, `"0.1"`), fmpz, fmpq, and every `numbers.Rational`, such as rational
-    numbers of SymPy and integers of numpy. Raises `InexactNumber` for floats: their value differs from the decimal.
+    numbers of SymPy and integers of numpy. Raises `InexactNumber` for floats: the float 0.1 is not 1/10.
 
     >>> rational("0.1")
     1/10
@@ -77,7 +77,7 @@ def rational(value: Any) -> fmpq:
 
 
 def integer(value: Any, name: str) -> int:
-    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError, which calls the value `name`.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int. InputError: its text calls the value `name`.
 
     >>> integer(7, "m")
     7
@@ -102,7 +102,7 @@ def _numpy_kind(value: Any) -> str:
 
 
 class Field(ABC):
-    """A field of numbers; `exact` tells whether equality of two elements is decidable."""
+    """A field of numbers; `exact` is True if equality of two elements is decidable."""
 
     name: str
     characteristic: int
@@ -131,7 +131,7 @@ class Field(ABC):
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     def value(self, polynomial: Any, point: Sequence[Any]) -> Any:
-        """Evaluate a polynomial if the field has a method of its own, else return None (see `polynomials.evaluate`)."""
+        """Return the value of a polynomial; None if the field leaves this to `polynomials.evaluate`."""
         return None
 
     @abstractmethod
@@ -182,7 +182,7 @@ def operand(field: Field, value: Any) -> Any:
 
 
 class Element(ABC):
-    """An element of a field that FLINT lacks. It derives all operators from the sum, the product and the quotient.
+    """An element of a field that FLINT lacks. Subclasses define sum, product, quotient and equality of two elements.
 
     The second operand may be any number or element that `field.convert` accepts, but not text.
     """
@@ -211,7 +211,7 @@ class Element(ABC):
     def __neg__(self) -> Self: ...
 
     def _common_operands(self, other: Any) -> tuple[Self, Self] | None:
-        """Convert both operands to one of their two fields; return None if that is impossible."""
+        """Return (self, other), both converted to one of their two fields; None if that is impossible."""
         if isinstance(other, type(self)) and other.field is self.field:
             return self, other
         right = operand(self.field, other)

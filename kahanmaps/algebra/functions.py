@@ -42,7 +42,7 @@ class FunctionField(Field):
     """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the total number of term products.
 
     `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients of an irreducible
-    polynomial that has the last variable as a root: multiples of this polynomial are then 0.
+    polynomial in the last variable: its multiples are 0 in the field. None: there is no such polynomial.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -93,7 +93,7 @@ class FunctionField(Field):
         return self.vanishes(element.numerator)
 
     def vanishes(self, polynomial: fmpq_mpoly) -> bool:
-        """Whether a polynomial represents zero in this field, also as a multiple of the modulus."""
+        """Whether a polynomial represents zero in this field: it is 0, or a multiple of the modulus."""
         return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
@@ -136,7 +136,7 @@ class FunctionField(Field):
             return None
         exponent_columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         entries_with_exponents = [(point[k], powers) for k, powers in exponent_columns if any(powers)]
-        denominators: list[fmpq_mpoly] = []  # no element divides another one
+        denominators: list[fmpq_mpoly] = []  # none divides another one
         for entry, _ in sorted(entries_with_exponents, key=lambda pair: -int(pair[0].denominator.total_degree())):
             if (
                 all(self.quotient(D, entry.denominator) is None for D in denominators)
@@ -174,7 +174,7 @@ class FunctionField(Field):
         return product
 
     def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """Return the sum of coefficients times powers of `factors`; `terms` maps exponents to coefficients."""
+        """Return the sum over `terms` (exponents: coefficient) of the coefficient times these powers of `factors`."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
         terms_by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
@@ -203,7 +203,7 @@ class FunctionField(Field):
 class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced.
 
-    The value of a polynomial also stores its denominator as a product of `powers`, which cancel in quotients of values.
+    If it is the value of a polynomial, `powers` are the factors of its denominator: they cancel in quotients of values.
     """
 
     __slots__ = ("denominator", "numerator", "powers")
@@ -280,7 +280,7 @@ class FunctionMatrix(EntryMatrix):
         return total
 
     def det(self) -> Function:
-        """Compute the determinant block by block, after clearing the denominators of each row."""
+        """Compute the determinant block by block, after multiplying each row by a common denominator of its entries."""
         total: Function = self.field.one
         for block in self._diagonal_blocks():
             n = len(block)
@@ -304,7 +304,7 @@ class FunctionMatrix(EntryMatrix):
             augmented = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
             entries = [entry for row in augmented for entry in row]
             rows, _ = FunctionMatrix(self.field, n, n + columns, entries)._polynomial_rows()
-            sign = -1 if n % 2 else 1  # so that the denominator is the determinant
+            sign = -1 if n % 2 else 1  # the last minor is (-1)^n det
             for j in range(n, n + columns):
                 *numerators, denominator = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(denominator):
@@ -317,7 +317,7 @@ class FunctionMatrix(EntryMatrix):
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
     def _diagonal_blocks(self) -> list[list[int]]:
-        """Return the finest partition of the indices for which the matrix is block diagonal."""
+        """Return lists of indices, as short as possible, such that entries between two of the lists are 0."""
         indices = set(range(self._rows))
         blocks = []
         while indices:
@@ -337,7 +337,7 @@ class FunctionMatrix(EntryMatrix):
         for i in range(self._rows):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
-            for entry in row:  # a common denominator as in a sum
+            for entry in row:  # the sum of all 1/denominator has a common denominator
                 if entry.numerator.is_zero():
                     continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.denominator)

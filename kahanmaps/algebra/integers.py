@@ -38,12 +38,12 @@ def content(integers: Iterable[fmpz]) -> fmpz:
 
 
 def coprime_part(number: fmpz, power: fmpz) -> fmpz:
-    """Return the part of a nonzero integer that is coprime to `power`."""
+    """Return the largest divisor of a nonzero integer `number` that is coprime to `power`, with its sign."""
     return split_by_primes(number, power)[0]
 
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
-    """Split an integer into its part coprime to `power` and its positive part from primes of `power`; 0 into (0, 1)."""
+    """Return (a, b), `number` = a b, a coprime to `power`, b > 0 a product of primes dividing `power`; (0, 1) for 0."""
     prime_part = fmpz(1)
     if number == 0:
         return number, prime_part
@@ -70,7 +70,7 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
-    """Whether gcd(n, `power`) contains its primes as often as n: `power` contains each more often than the gcd."""
+    """Whether `power` has each prime of `gcd` = gcd(n, `power`) more often than `gcd`: then n has it as `gcd` does."""
     cofactor = power // gcd
     while gcd != 1:
         common_factor = gcd.gcd(cofactor)
@@ -93,7 +93,7 @@ def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
 
 
 def radical(*numbers: fmpz) -> fmpz:
-    """Return an integer with the prime factors of these nonzero numbers: small ones once, others to low powers."""
+    """Return an integer with the same prime factors as the product of `numbers`: small primes occur in it once."""
     product = fmpz(1)
     for number in numbers:
         if number == 0:

@@ -59,7 +59,7 @@ class Unlucky(Exception):
 
 @dataclass
 class Samples:
-    """The limits of the calls of the black box, the number of `calls` so far, and the length of each vector."""
+    """The limits on calls of the black box, the number of `calls` so far, and the `length` of the lists it returns."""
 
     max_samples: int
     budget: Budget | None
@@ -67,7 +67,7 @@ class Samples:
     length: int | None = None
 
     def check(self, needed: int = 0) -> None:
-        """Raise Stop if `needed` values, added to those so far, exceed the limit, or if the budget is spent."""
+        """Raise Stop if `calls` + `needed` exceeds the limit, or if the budget is spent."""
         if self.calls + needed > self.max_samples:
             raise Stop(f"{self.calls} values requested and {needed} more needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
@@ -75,7 +75,7 @@ class Samples:
 
 
 class SampledValues:
-    """The values of the black box modulo one prime so far, and cached values of monomials at their points."""
+    """The points so far modulo one prime, the values of the black box there, and cached values of monomials there."""
 
     def __init__(self, black_box: BlackBox, prime: int, samples: Samples) -> None:
         self.prime = prime
@@ -86,7 +86,7 @@ class SampledValues:
         self._monomial_values: list[dict[Exponents, int]] = []
 
     def take(self, draw: Callable[[], Point]) -> None:
-        """Compute one more value, at the first point drawn for which the black box has one."""
+        """Draw points until the black box has values at one of them; store this point and the values."""
         for _ in range(_MAX_BAD_POINTS):
             self.samples.check(1)
             point = draw()
@@ -114,7 +114,7 @@ class SampledValues:
         return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(nvars))
 
     def monomials(self, k: int, exponents: Sequence[Exponents]) -> list[int]:
-        """Return the values of the monomials at point k."""
+        """Return the values of the monomials with these exponents at `points[k]`."""
         known_values, point, p = self._monomial_values[k], self.points[k], self.prime
         values = []
         for monomial in exponents:
@@ -147,7 +147,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Quotient:
-    """A fraction of two polynomials modulo a prime, given by its coefficients in the order of the shape's monomials."""
+    """A fraction modulo a prime: the coefficients of its two polynomials, in the order of the monomials of `shape`."""
 
     shape: Shape
     numerator: tuple[int, ...]
@@ -155,7 +155,7 @@ class Quotient:
 
     @classmethod
     def of(cls, shape: Shape, numerator: Sequence[int], denominator: Sequence[int], prime: int) -> Quotient | None:
-        """Normalize a fraction and drop its zero terms; return None if the denominator is 0."""
+        """Return the fraction without zero terms, its denominator normalized; None if the denominator is 0."""
         numerator_terms = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
         denominator_terms = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
         if not denominator_terms:
@@ -199,7 +199,7 @@ def reconstruct(
             with one integer for each name; None if there is no value, for example at a pole.
         names: the symbols. Without symbols, the numbers themselves are reconstructed from their residues.
         seed: the random seed of primes (of 61 bits) and points.
-        max_degree: the sum of the degrees of numerator and denominator on any line is at most twice this number.
+        max_degree: on a line, the degrees of numerator and denominator may add up to twice this number.
         max_samples: the maximal number of calls of the black box.
         budget: the work limit, checked between calls; None means no limit.
         draw: a function that draws a random prime, for black boxes that accept only some primes.
@@ -255,7 +255,7 @@ def reconstruct(
 
 
 def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int, rng: random.Random) -> list[Quotient]:
-    """Interpolate the functions modulo one prime."""
+    """Return the functions in `nvars` symbols modulo the prime of `values`, one quotient for each entry."""
     p = values.prime
     values.take(values.random_points(nvars, rng))
     anchor = values.points[0]
@@ -266,7 +266,7 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
     for j in range(nvars):
         direction = tuple(int(i == j) for i in range(nvars))
         axes.append(_interpolate_on_line(values, anchor, direction, max_degree, rng))
-    # Symbols of large degree come first: each new symbol multiplies the number of monomials known before.
+    # Symbols of large degree come first: each new symbol multiplies the number of monomials in those before it.
     symbol_order = sorted(range(nvars), key=lambda j: -max((_deg(N) + _deg(D) for N, D in axes[j]), default=0))
     denominator_texts: list[list[str]] = [[] for _ in entries]
     for stage, j in enumerate(symbol_order):
@@ -291,7 +291,7 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
         if not dependents:
             continue
         shapes = {}
-        for i in dependents:  # after symbol j is added, the possible monomials have its exponents on axis j
+        for i in dependents:  # a monomial in the earlier symbols, times a power of symbol j that occurs on axis j
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -330,7 +330,7 @@ def _interpolate_on_line(
 ) -> list[tuple[nmod_poly, nmod_poly]]:
     """Interpolate all entries on the line anchor + t direction as fractions (N, D) of polynomials in t, D monic.
 
-    On an axis, the line is parametrized by its symbol, so that exponents of t are exponents of the symbol.
+    If the line is parallel to the axis of a symbol, t is the symbol itself, so both have the same exponents.
     """
     p = values.prime
     symbols = [i for i, d in enumerate(direction) if d]
@@ -370,7 +370,7 @@ def _interpolate_on_line(
 
 
 def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
-    """Find N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic, by Euclid's algorithm."""
+    """Return (N, D), N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic; or None."""
     p = interpolant.modulus()
     previous, current = (node_polynomial, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:
@@ -393,9 +393,9 @@ def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) 
 
 
 def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
-    """Split entries with one denominator into those that suffice to determine it and the remaining entries.
+    """Split a group of entries with the same denominator into some that determine it, and the remaining entries.
 
-    Entries with proportional numerators would give the same equations, so only one of these is used.
+    Entries with proportional numerators give the same equations, so the first part has only one of these.
     """
     if len(shapes[group[0]].denominator) == 1:
         return group[:1], group[1:]
@@ -412,9 +412,9 @@ def fit(
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
-    """Fit fractions of these shapes to all values but the last, which must agree; compute missing values first.
+    """Return, for each entry, the fraction of its shape that agrees with all values; compute missing values first.
 
-    With `fixed` coordinates only points with these coordinates are used.
+    The values at the last point are only a check. Only points with the coordinates `fixed` (index: value) are used.
     """
     quotients: dict[int, Quotient] = {}
     draw = values.random_points(nvars, rng, fixed)
@@ -445,9 +445,9 @@ def _solve(
     known_denominator: Quotient | None,
     quotients: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of entries that share one denominator, and store them in `quotients`.
+    """Compute the fractions of entries that have the same denominator, and store them in `quotients`.
 
-    Returns the number of missing values, 0 on success. Raises Unlucky if there is no solution.
+    Returns how many values are missing, 0 on success. Raises Unlucky if no fractions have these values.
     """
     p = values.prime
     values.samples.check()
@@ -515,7 +515,7 @@ def _lift(
     primes: list[int],
     rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
-    """Lift the functions to Q. Raises Unlucky if values modulo the next primes disagree with them."""
+    """Lift `quotients` from residues to functions over Q. Raises Unlucky if values modulo new primes disagree."""
     modulus, context = primes[-1], ring(names)
     shapes = {i: quotient.shape for i, quotient in enumerate(quotients)}
     residues = [[*quotient.numerator, *quotient.denominator] for quotient in quotients]

@@ -126,7 +126,7 @@ class EntryMatrix(ABC):
 
     @abstractmethod
     def solve(self, right: Self) -> Self:
-        """Solve self X = right; `right` may have several columns. Raises ZeroDivisionError if self is singular."""
+        """Return X with self X = right, for any number of columns. Raises ZeroDivisionError if self is singular."""
 
     def nrows(self) -> int:
         return self._rows
@@ -203,7 +203,7 @@ def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
 
 
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
-    """Gauss-Jordan elimination for matrices without an echelon form in FLINT: balls, and `EntryMatrix`."""
+    """Return the rows of the reduced echelon form, and its pivot columns, of a matrix of balls or an `EntryMatrix`."""
     with field.working():
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []

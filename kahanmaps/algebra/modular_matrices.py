@@ -56,7 +56,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
 
 
 def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
-    """Return the pivot columns of a reduced echelon form, and its remaining columns.
+    """Return the pivot columns of a reduced echelon form of this rank, and its other columns.
 
     >>> split_columns(*nmod_mat([[0, 2, 4, 0], [0, 1, 2, 3]], 7).rref())
     ([1, 3], [0, 2])

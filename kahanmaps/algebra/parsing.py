@@ -27,9 +27,9 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 
 @dataclass(frozen=True)
 class ExpressionLimits:
-    """Bounds on the size of a text and of its value, large enough for ordinary use.
+    """Limits on the length of the text of an expression, and on the size of its value.
 
-    The limits apply to results and to all intermediate values. The number of digits is bounded before each computation.
+    They apply to all intermediate values as well. The number of digits is bounded before each operation.
     """
 
     number_digits: int = 1_000_000  # digits of one number read by parse_number or parse_point
@@ -88,7 +88,7 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
 
 
 def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLimits) -> fmpq:
-    """Parse the number in `text[start:end]`, of at most `digits` digits; errors give the column in all of `text`."""
+    """Parse the number `text[start:end]` of at most `digits` digits; errors give the column counted from `text[0]`."""
     while start < end and text[start] in BLANKS:
         start += 1
     while start < end and text[end - 1] in BLANKS:
@@ -319,9 +319,9 @@ _OPERAND = "expected a number, a name or '('"
 
 
 class _Polynomial(NamedTuple):
-    """A polynomial, or a number, of known size: the `element` (fmpq_mpoly or fmpq).
+    """A polynomial or number `element` (fmpq_mpoly or fmpq), with its size.
 
-    The product of `common_denominator` and the element has integer coefficients of absolute value at most 2**bits.
+    `common_denominator` times `element` has integer coefficients of absolute value at most 2**`bits`.
 
     FLINT also stores one common denominator for all coefficients, so `bits` measures FLINT's representation as well.
     Numbers are stored as fmpq, which is much faster than as constant polynomials.
@@ -335,14 +335,14 @@ class _Polynomial(NamedTuple):
 
 
 class _Quotient(NamedTuple):
-    """A quotient of polynomials. The denominator has degree at least 1 and leading coefficient 1; None means 1."""
+    """A quotient of polynomials. The denominator has degree at least 1 and leading coefficient 1, or is None for 1."""
 
     numerator: _Polynomial
     denominator: _Polynomial | None
 
 
 class Token(str):
-    """A token of the text and its start; `kind` is "number", "name", "end", or (for a sign or bracket) the token."""
+    """A token, with its position `start` in the text; `kind` is "number", "name", "end", or the sign or bracket."""
 
     kind: str
     start_pos: int
@@ -544,7 +544,7 @@ class _Arithmetic:
                 self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
         def sum_of(values: list[_Polynomial]) -> _Polynomial:
-            """Add in pairs: if the terms were added one by one, the growing sum would be copied for each term."""
+            """Return the sum, computed in pairs: adding the values one by one would copy the growing sum each time."""
             while len(values) > 1:
                 unpaired_values = values[-1:] if len(values) % 2 else []
                 pairs = zip(values[::2], values[1::2], strict=False)
@@ -691,7 +691,7 @@ class _Arithmetic:
         return _Polynomial(value, common_denominator, bits, len(value), int(value.total_degree()))
 
     def polynomial(self, value: _Polynomial) -> fmpq_mpoly:
-        """The value as a polynomial even if it is a number."""
+        """Return the value as a polynomial, a number as a constant polynomial."""
         return self.ring.constant(value.element) if isinstance(value.element, fmpq) else value.element
 
     def check_bits(self, bits: int, column: int) -> None:
@@ -730,7 +730,7 @@ class _Arithmetic:
 
 
 def _constant(value: _Quotient) -> fmpq | None:
-    """Return the number that equals a value, or None if the value contains variables."""
+    """Return the value as a number; None if it contains variables."""
     numerator = value.numerator.element
     if not numerator:
         return fmpq(0)
@@ -740,5 +740,5 @@ def _constant(value: _Quotient) -> fmpq | None:
 
 
 def _bits(integer: fmpz) -> int:
-    """The least b >= 0 with |integer| <= 2**b; it is 0 for 1 and -1, since a product with these does not grow."""
+    """Return the least b >= 0 with |integer| <= 2**b; it is 0 for 1 and -1, since a factor 1 or -1 adds no bits."""
     return int((abs(integer) - 1).bit_length()) if integer else 0

@@ -15,28 +15,28 @@ from kahanmaps.algebra.work import count_work
 
 
 def product_units(length: int, other_length: int) -> float:
-    """Return the units of a product of two polynomials of these lengths, or of two series with as many terms."""
+    """Return the units of work for a product of two polynomials, or truncated series, with these numbers of terms."""
     min_length, max_length = (length, other_length) if length < other_length else (other_length, length)
     return 0.4 + max_length * (0.05 + min(min_length / 3000, 0.05 * min_length.bit_length()))
 
 
 def series_units(length: int) -> float:
-    """Return the units of inverting a series with this number of terms, or of a quotient of two such series."""
+    """Return the units of work for the inverse of a series with this number of terms, or of a quotient of two."""
     return 0.5 + 2 * product_units(length, length)
 
 
 def gcd_units(length: int, gcd_length: int = 0) -> float:
-    """Return the units of a gcd of two polynomials of this length, if the gcd has the length `gcd_length`."""
+    """Return the units of work for a gcd with `gcd_length` terms of two polynomials with `length` terms."""
     return 0.5 + length * (0.2 + min((length - gcd_length) / 500, 0.1 * sqrt(length)))
 
 
 def minpoly_units(length: int) -> float:
-    """Return the units of a search for the shortest linear recurrence of a sequence with this number of terms."""
+    """Return the units of work for the shortest linear recurrence of a sequence with this number of terms."""
     return 3 + length * (1.2 + min(length / 100, 0.2 * sqrt(length)))
 
 
 def roots_units(length: int, root_count: int = 0) -> float:
-    """Return the units of finding the `root_count` roots of a polynomial of this length modulo a 61-bit prime."""
+    """Return the units of work for the `root_count` roots, modulo a 61-bit prime, of a polynomial of `length` terms."""
     return 150 * (product_units(length, length) + product_units(root_count, root_count) * root_count.bit_length())
 
 
@@ -52,7 +52,7 @@ def counted_product(left: Any, right: Any) -> Any:
 def factored(polynomial: Any) -> list[tuple[Any, int]]:
     """Return the irreducible factors over Q of a polynomial in several variables, with multiplicities.
 
-    The work is counted by the number of terms, which the caller must bound.
+    Work is counted in proportion to the number of terms, which the caller must bound.
     """
     count_work(50 + 10 * len(polynomial))
     return [(factor, int(k)) for factor, k in polynomial.factor()[1]]

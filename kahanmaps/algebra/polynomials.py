@@ -125,7 +125,7 @@ def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
-    """Return the approximate number of decimal digits of the longest coefficient, over a common denominator.
+    """Return the approximate number of digits of the longest coefficient if all have one common denominator.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> digits_of([x/3, 1000*y])
@@ -233,7 +233,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
 
 
 def _power(powers: list[Any], exponent: int) -> Any:
-    """Return powers[1]^exponent from a list of powers, which is extended as needed."""
+    """Return powers[1]^exponent, where powers[k] = powers[1]^k; the list is extended if it is too short."""
     while len(powers) <= exponent:
         powers.append(powers[-1] * powers[1])
     return powers[exponent]
@@ -277,7 +277,7 @@ def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RationalFunction(LatexDisplay):
-    """A quotient of two polynomials over Q; the denominator has coprime integer coefficients and a positive first one.
+    """A quotient of polynomials over Q; the denominator has coprime integer coefficients, the first of them positive.
 
     Common factors are not canceled, since a gcd of large polynomials is expensive. Two rational functions are equal if
     their cross products are equal.

@@ -119,7 +119,7 @@ def format_factored(function: RationalFunction) -> str:
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
-    """Factor a function: return primitive polynomials with exponents, and a number; None if that is no shorter text.
+    """Return ([(P_i, e_i), ...], c): the function is c prod P_i^e_i, P_i primitive; None if this is no shorter text.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
     Common factors of numerator and denominator are canceled.
@@ -212,11 +212,11 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
 
 @dataclass(frozen=True)
 class Notation:
-    """The notation of a language for formulas: functions for names, positive numbers and powers, and separators.
+    """How a language writes formulas: `name`, `number` and `power` write a name, a positive number and a power.
 
-    `signs` are the minus of the first term, the plus and the minus of later terms. `gap` separates terms, `times`
+    `signs` are the minus of the first term, the plus and the minus of others. `gap` is between terms, `times` between
     factors. `enclosed` puts brackets around a sum, `fraction` joins numerator and denominator, `row` groups a sum or a
-    product. Terms are in the order of the ring; with `eps_first`, eps is the first factor of each term.
+    product. Terms are in the order of the ring. If `eps_first` is True, eps is the first factor of each term.
     """
 
     name: Callable[[str], str]
@@ -294,10 +294,10 @@ PLAIN = Notation(str, str, "{}^{}".format)
 
 
 def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_mpoly]:
-    """Return whether a quotient has a minus sign, and numerator and denominator without it.
+    """Return (is_negative, P, Q): the quotient is -P/Q if `is_negative`, else P/Q.
 
-    Both have integer coefficients and a positive first term. A polynomial is not changed: for P the result is False, P
-    and 1, whatever the coefficients and signs of P.
+    P and Q have integer coefficients and a positive first term. For a polynomial P the result is (False, P, 1),
+    whatever the coefficients and signs of P.
     """
     numerator, denominator = function.numerator, function.denominator
     if function.is_polynomial or numerator.is_zero():
@@ -356,7 +356,7 @@ def _field_data(value: Any) -> Any:
 
 
 def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:
-    """Return attributes of a value as plain data; `key="attribute"` stores an attribute under another key."""
+    """Return {name: attribute of the value, as plain data}; `key="attribute"` stores the attribute under `key`."""
     attribute_of = {**dict(zip(names, names, strict=True)), **others}
     return {key: plain(getattr(value, attribute)) for key, attribute in attribute_of.items()}
 
@@ -379,7 +379,7 @@ def spreadsheet_safe(text: str) -> str:
 
 def csv_line(cells: Iterable[str]) -> str:
     """Return a line of a CSV file."""
-    # Some versions of the csv module quote a line end only if it occurs in the terminator; "\r\n" contains both.
+    # Some versions of the csv module quote "\r" or "\n" in a cell only if the terminator contains it.
     line = StringIO(newline="")
     csv.writer(line, lineterminator="\r\n").writerow(cells)
     return line.getvalue().removesuffix("\r\n") + "\n"

@@ -20,9 +20,9 @@ _MAX_FACTORED_BITS = 140  # a cofactor with at most this number of bits is facto
 
 @dataclass(frozen=True)
 class BadPrimes:
-    """The primes of bad reduction of an elliptic curve over Q; for a number field, the primes of Q below the bad ones.
+    """The primes of bad reduction of an elliptic curve over Q, or the primes of Q below those of a number field.
 
-    At the primes `bad` the reduction is bad (proved), at `undecided` it is not known. `bad_cofactors` are unfactored
+    At the primes `bad` the reduction is bad (proved); at `undecided` this is not known. `bad_cofactors` are unfactored
     composite integers all of whose prime factors are bad; of `undecided_cofactors` some prime factors may be bad. At
     all other primes the reduction is good (proved). `minimal_discriminant` is for a curve over Q, None if not known.
     """
@@ -35,7 +35,7 @@ class BadPrimes:
 
     @property
     def text(self) -> str:
-        """The primes in one line."""
+        """The bad primes, cofactors and undecided primes as text in one line."""
         texts = [", ".join(map(str, self.bad)) or "none"]
         if self.bad_cofactors:
             texts.append(f"and all primes of {', '.join(map(str, self.bad_cofactors))} (composite, not factored)")
@@ -54,7 +54,7 @@ class BadPrimes:
 
 
 def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
-    """Return the prime factors found for a nonzero integer, and the composite cofactors that remain.
+    """Return the prime factors found of a nonzero integer, and its remaining composite factors.
 
     >>> factor_within_bound(fmpz(-12))
     ({2, 3}, set())

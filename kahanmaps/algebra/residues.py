@@ -80,7 +80,7 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
     """Return the simplest fractions with these residues, computed together; None if a residue has no simple one.
 
-    If k fractions have a common denominator, they are also found if their heights are longer than sqrt(modulus), up to
+    k fractions with a common denominator are also found if their heights are larger than sqrt(modulus), up to
     about modulus^(k/(k+1)), as a short vector of a lattice (LLL). The result is a guess that must be checked.
 
     >>> m = 2**61 - 1
@@ -94,7 +94,7 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     sample = [residues[i] for i in nontrivial_indices[::step]]
     denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(sample)
     if k > 1:
-        # The least q > 0 with small q r modulo `modulus`, provided that both are smaller than for random residues.
+        # The least q > 0 with small q r modulo `modulus` for each residue r, unless random residues have such a q.
         rows = [[1, *sample], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
@@ -128,9 +128,9 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
 def from_residues(
     modulo: Callable[[int], Sequence[Sequence[int]] | None], max_primes: int
 ) -> list[tuple[fmpq, ...]] | None:
-    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with one more prime.
+    """Return the simplest fractions with the residues `modulo(prime)`, found with some primes, tested with another.
 
-    The residues come in groups of numbers that probably share a denominator. Returns None if `modulo` returns None, or
+    `modulo` returns lists: the fractions of one list probably share a denominator. Returns None if `modulo` does, or
     if `max_primes` primes do not suffice. Every call uses the same primes: since the result is checked, an unsuitable
     prime costs only time.
 

@@ -31,7 +31,7 @@ _GUARD_BITS = 64  # bits of working precision beyond the requested ones
 
 
 class Root:
-    """A root of the monic irreducible `polynomial`; if `near` is given, the real root closest to `near`.
+    """A root of the monic irreducible `polynomial`: the real root closest to `near`, or any root if `near` is None.
 
     >>> root = parse_root("root of 2*t^2 - 4 near 1.4")
     >>> root, root.number_field, root == parse_root("root of t^2 - 2 near 3/2")
@@ -54,7 +54,7 @@ class Root:
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
             with suppress(InputError):  # the error is raised later, when the real number is needed
-                # Use the same text for all `near` with the same root: its shortest decimal of 4, 8, ... digits.
+                # Replace `near` by the root to 4, 8, ... digits, the first that suffice: equal roots get equal text.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -70,7 +70,7 @@ class Root:
 
     @cached_property
     def number_field(self) -> EtaleAlgebra:
-        """Q[t]/g, where the class of t is the root."""
+        """Q[t]/g for g = `polynomial`; the class of t is the root."""
         return EtaleAlgebra(self.polynomial)
 
     def over(self, field: Field) -> Any:
@@ -85,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # A bound for all conjugates: the root is b/q for an algebraic integer b, bounded by Cauchy's bound.
+            # The root is b/q for an algebraic integer b; Cauchy's bound holds for all conjugates of b.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
@@ -94,7 +94,7 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Reduce a polynomial modulo the minimal polynomial of its k-th variable: to 0 if it vanishes at the root."""
+        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; 0 if it vanishes at the root."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
@@ -105,7 +105,7 @@ class Root:
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
     def residues(self, field: PrimeField) -> list[int]:
-        """Return all distinct roots of g in GF(p) as integers. Raises BadPrime if there are none."""
+        """Return the distinct roots of the polynomial in GF(p), as integers. Raises BadPrime if there are none."""
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
@@ -132,7 +132,7 @@ class Root:
                 raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
             center = arb(0 if near is None else near)
             closest, *others = sorted(real_roots, key=lambda root: float(abs(root - center)))
-            if others and (near is None or not abs(closest - center) < abs(others[0] - center)):  # the two may overlap
+            if others and (near is None or not abs(closest - center) < abs(others[0] - center)):  # balls may overlap
                 texts = ", ".join(root.str(6, radius=False) for root in real_roots)
                 example = real_roots[-1].str(4, radius=False)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {example}")

@@ -72,7 +72,7 @@ class SolutionComponent:
 
 @dataclass
 class Solutions:
-    """The result of `solve_system`: linear families and points, unsolved parts, and parts without rational points.
+    """The result of `solve_system`: `components` are linear families and points, `unsolved` the parts not solved.
 
     `conjugate` lists the parts without a rational point; `irrational` describes them, in the same order.
     """
@@ -86,7 +86,7 @@ class Solutions:
 
     @property
     def complete(self) -> bool:
-        """Whether every rational solution is in one of the components."""
+        """Whether every rational solution is in one of `components`."""
         return not self.unsolved
 
 
@@ -167,7 +167,7 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
 
 
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
-    """Find coordinates in which cubic forms in `count` variables may decouple: a matrix with the new basis, or None.
+    """Return T for which the cubic forms at T y, y of `count` variables, may decouple; None if none was found.
 
     If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all its
     elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic
@@ -201,7 +201,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
             power = power * ratio
         blocks.append(nullspace(QQ, annihilator))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
-    # Return None unless the forms decouple: new coordinates would only make the coefficients longer.
+    # Return None unless the forms decouple: other coordinates would only make their coefficients longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
     T_hessian = T.transpose() * hessian() * T
     is_decoupled = all(T_hessian[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
@@ -209,7 +209,7 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
 
 
 class _Solver:
-    """The recursion of `solve_system`; `stop_reason` is not empty once a limit has ended it."""
+    """The recursion of `solve_system`; `stop_reason` is empty until a limit ends the recursion."""
 
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
@@ -246,7 +246,7 @@ class _Solver:
                 new_equations = [q.compose(*gens, ctx=context) for q in original_equations]
                 self.solve(new_equations, tuple(q.compose(*gens, ctx=context) for q in values))
                 return
-        # The reduced basis may hide factors of the original equations, as for x f, y g, z h: factor both.
+        # Equations that factor, as x f, y g, z h, may have a basis whose elements do not factor: factor both.
         factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original_equations)
         if factors is not None:
             for factor in sorted(factors, key=lambda q: (degree(q), str(q))):
@@ -315,8 +315,8 @@ class _Solver:
 
 
 def _factors_to_branch_on(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """Return the factors of the equation that is best to branch on; None if no equation factors."""
-    # Factors of high degree lead to long branches, so the equation whose largest factor has the least degree is taken.
+    """Return the factors of the equation whose largest factor has the least degree; None if no equation factors."""
+    # Factors of high degree lead to long branches.
     products = []
     for p in equations:
         variable_count = sum(e > 0 for e in p.degrees())

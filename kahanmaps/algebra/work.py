@@ -75,13 +75,13 @@ class Budget:
         return self.spent >= self.units
 
     def part(self, fraction: float) -> Budget:
-        """Return a budget of this fraction of the remaining units."""
+        """Return a new budget that has this fraction of the units left in `self`."""
         return Budget(self.left * fraction)
 
     def share(self, weights: Sequence[float]) -> Iterator[Budget]:
         """Yield budgets for stages, in proportion to their weights; each is created when the stage begins.
 
-        Units that a stage does not use are passed to the later stages.
+        Units that a stage leaves are available to the later stages.
         """
         for k, weight in enumerate(weights):
             yield self.part(weight / sum(weights[k:]))

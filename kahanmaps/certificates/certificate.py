@@ -71,7 +71,7 @@ ASSOCIATES = "associates"  # given as the other system: the associated systems o
 
 
 class Certificate(str):
-    """The text of a certificate, with the names of its claims.
+    """The text of a certificate; `claims` are the names of its claims.
 
     `seconds` is an estimate of the processor time that the program takes to check it, from the sizes of the identities.
     """
@@ -312,7 +312,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
 
 
 def _prepare(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
-    """The formulas of a single map over Q, and the equation of this map."""
+    """Return the formulas of a file with one map over Q, and the equation of this map."""
     if checker not in CHECKERS:
         raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
     if file.map.root is not None:
@@ -379,7 +379,7 @@ def _equivalence_claim(file: SystemFile, data: MapData, other: SystemFile, by: S
 def _known_claims(
     formulas: Formulas, planes: _Planes, checker: str = ""
 ) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
-    """Yield the claims of the file, then those from theorems, as names with functions that compute the identities."""
+    """Yield pairs (name, function that returns the claims of this name): those of the file, then those of theorems."""
     H, file, data = formulas.H, formulas.file, planes.data
 
     def single_claim(prove: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:

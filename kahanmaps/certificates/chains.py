@@ -51,8 +51,8 @@ class RationalPoint:
 class Chain(EquationClaim):
     """The points x = point 0, point 1, ..., each the image of an earlier point, two of which are equal.
 
-    `maps` has a letter for each map. For each point except x, `arrows` contains the letter of the map, the number of
-    the preimage, and the index of the point in `values`, which begin with x. The points numbered `equal_points` agree.
+    `maps` has a letter for each map. `arrows` contains, for point 1, 2, ..., the letter of the map, the number of the
+    preimage, and the index of the point in `values`; x has index 0. `equal_points` are the numbers of the equal points.
     """
 
     maps: Mapping[str, MapData]
@@ -61,7 +61,7 @@ class Chain(EquationClaim):
     equal_points: tuple[int, int]
 
     def value_of(self, point: int) -> int:
-        """Return the index in `values` of a point."""
+        """Return the index in `values` of the point with this number."""
         return self.arrows[point - 1][2] if point else 0
 
 
@@ -122,7 +122,7 @@ def periodic(f: MapData, period: int) -> Chain:
 
 
 def apply(data: MapData, point: RationalPoint) -> RationalPoint:
-    """Return the image of a point that depends on x. Raises InputError if the image has too many terms."""
+    """Return the image of a rational point under the map. Raises InputError if the image has too many terms."""
     fractions = []
     for numerator in data.numerators:
         gcd = numerator.gcd(data.determinant)
@@ -135,7 +135,7 @@ def apply(data: MapData, point: RationalPoint) -> RationalPoint:
 
 
 def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tuple[fmpq_mpoly, list[int]]:
-    """Return the polynomial at the point times powers of the point's denominators, and the exponents of these powers.
+    """Return (v d, e): v is the value at the point, d the product of the point's denominators to the powers e.
 
     Raises InputError if the result has too many terms.
     """

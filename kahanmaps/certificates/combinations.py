@@ -31,9 +31,9 @@ Row = tuple[fmpq_mpoly, ...]
 
 @dataclass(frozen=True)
 class OrbitIntegral(EquationClaim):
-    """I(x, x~) = P/Q with P(y, z) - P(x, y) = first . e(x, y) + second . e(y, z); Q does not contain the variables.
+    """I(x, x~) = P/Q with P(y, z) - P(x, y) = `first` . e(x, y) + `second` . e(y, z), where e(x, y) = M(x) y - r(x).
 
-    P, Q, `first` and `second` are polynomials over Z in the names `three_points`.
+    P, Q, `first` and `second` are polynomials over Z in the names `three_points`; Q does not contain the variables.
     """
 
     numerator: fmpq_mpoly
@@ -44,10 +44,10 @@ class OrbitIntegral(EquationClaim):
 
 @dataclass(frozen=True)
 class AffineSymmetry(EquationClaim):
-    """The affine map T(x) = `image`/`divisor`, for which `multiple` times e(T x, T y) is `matrix` times e(x, y).
+    """The affine map T(x) = `image`/`divisor` takes the map `data` to the map `target`, the same for a symmetry.
 
-    If `reversing`, e(T y, T x) replaces e(T x, T y). The e of the images belongs to the map `target`, e(x, y) to the
-    map `data`. For a symmetry both maps are equal; otherwise T takes the map `data` to `target`.
+    For e(x, y) = M(x) y - r(x) of `data` and e' of `target`, k e'(T x, T y) = R e(x, y), or k e'(T y, T x) = R e(x, y)
+    if `reversing`: then T takes `data` to the inverse of `target`. k is `multiple`, R is `matrix`.
     """
 
     target: MapData
@@ -70,7 +70,7 @@ class AffineSymmetry(EquationClaim):
 
 @dataclass(frozen=True)
 class ChangedFunction(EquationClaim):
-    """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; each function is a pair of polynomials over Z."""
+    """P(T z)/Q(T z) = p(z)/q(z), T z = `image`/`divisor`: `old_function` is (P, Q) over Z, `new_function` (p, q)."""
 
     image: Row
     divisor: int
@@ -89,7 +89,7 @@ def row_multiples(data: MapData) -> list[fmpq]:
 
 
 def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegral:
-    """Return the identity for T(x, x, x~); H is a polynomial of degree at most 3 in the variables and the symbols.
+    """Return the identity for H(x) + grad H(x) . (x~ - x)/3, where H has degree at most 3 in the variables.
 
     Raises:
         FalseClaim: if the map is not the Kahan map of J grad H with a constant skew J.
@@ -151,7 +151,7 @@ def affine_symmetry(
     target: MapData | None = None,
     about: str = "",
 ) -> AffineSymmetry:
-    """Return the identity by which T(x) = S x + shift takes the map to itself, `target`, or (`reversing`) its inverse.
+    """Return the identity: T(x) = S x + shift takes the map to `target` (None: itself), or its inverse if `reversing`.
 
     Raises:
         FalseClaim: if the identity does not hold, or T is not invertible.

@@ -45,11 +45,11 @@ class Monomial:
         return Monomial(self.constant**exponent, tuple(exponent * power for power in self.powers))
 
     def divide_by(self, exponents: Sequence[int]) -> Monomial:
-        """Return the quotient by the monomial with these exponents."""
+        """Return the quotient of this monomial by the monomial with these exponents and constant 1."""
         return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, exponents, strict=True)))
 
     def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """Return the polynomial for these values of D, c_1, ... Raises InputError if it has too many terms."""
+        """Return the monomial with the polynomials `values` for D, c_1, ...; InputError if it has too many terms."""
         total = values[0] ** 0 * self.constant
         for value, power in zip(values, self.powers, strict=True):
             for _ in range(power):
@@ -57,7 +57,7 @@ class Monomial:
         return total
 
     def text(self, D: str, multiply: str = "*", power: str = "^") -> str:
-        """Return the monomial as text, with this name for D; an empty name omits the powers of D."""
+        """Return the monomial as text, in which D has the name `D`; if this is empty, the power of D is omitted."""
         names = [D, *(f"c{j}" for j in range(1, len(self.powers)))]
         pairs = [(name, k) for name, k in zip(names, self.powers, strict=True) if name and k]
         factors = [name if k == 1 else f"{name}{power}{k}" for name, k in pairs]
@@ -67,7 +67,7 @@ class Monomial:
 
 @dataclass(frozen=True)
 class DarbouxFactor:
-    """A factor P with D^k P(N/D) = C P, where P and C are polynomials over Z, and the exponent of P in a product.
+    """A Darboux polynomial P over Z, D^k P(N/D) = C P with `cofactor` C over Z, and its exponent in a product.
 
     k is `degree`: the degree of P in the variables, or a larger number if P has a factor of D.
     """
@@ -97,11 +97,11 @@ class DarbouxProduct:
 
     @property
     def degree(self) -> int:
-        """The sum of the degrees of the factors."""
+        """The sum of degree times exponent over the factors."""
         return sum(factor.degree * factor.exponent for factor in self.factors)
 
     def cofactor(self, degree: int, count: int) -> Monomial:
-        """Return C with D^degree P(N/D) = C P, a monomial in D and c_1, ..., c_count."""
+        """Return C with D^degree P(N/D) = C P for this product P: a monomial in D and c_1, ..., c_count."""
         total = Monomial(1, (degree - self.degree, *[0] * count))
         for factor in self.factors:
             total *= factor.cofactor**factor.exponent
@@ -122,7 +122,7 @@ class DarbouxProducts:
 
     @property
     def cofactors(self) -> list[Monomial]:
-        """For each product P the C with D^k P(N/D) = C P, where k is the largest degree of a product."""
+        """The cofactors C of the products P: D^k P(N/D) = C P, where k is the same `degree` for all."""
         return [product.cofactor(self.degree, len(self.common_factors)) for product in self.products]
 
 
@@ -159,7 +159,7 @@ class InvariantVolume(Claim):
 
     @property
     def balance(self) -> tuple[Monomial, Monomial, Monomial]:
-        """The monomials c, l, r with C D^(n + 1) = c l and B = c r; the claim is then l = r D^n det L(x, N/D).
+        """The monomials (c, l, r) with C D^(n + 1) = c l and B = c r; the claim is then l = r D^n det L(x, N/D).
 
         C is the cofactor of P, B the cofactor of Q, and n the dimension.
         """
@@ -282,9 +282,9 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
 def _factor_with_cofactors(
     data: MapData, P: fmpq_mpoly, max_degree: int, splits: bool
 ) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
-    """Return the content of P, and its factors with their k, exponents and cofactors; None if one has no cofactor.
+    """Return (c, [(f, k, e, C), ...]): P = c times the product of f^e, D^k f(N/D) = C f; None if some f has no C.
 
-    Unless P `splits`, it is the only factor. If f has a factor of D, f may divide D^k f(N/D) only for some k larger
+    If `splits` is False, P is the only f. If f has a factor of D, f may divide D^k f(N/D) only for some k larger
     than deg f. Such k are tried up to `max_degree`, the degree of P and Q for an integral P/Q, and n + 1 more if dx/phi
     with phi = P/Q is invariant.
     """

@@ -33,10 +33,10 @@ _MAX_STEPS = 5  # the largest n
 
 @dataclass(frozen=True)
 class PositiveEntropy(Claim):
-    """The proof that the dynamical degree is above `lower`: forms of F_1, ..., F_n and of `inverse`, and two degrees.
+    """The proof that the dynamical degree is above `lower`; `forms` are F_1, ..., F_n, `inverse` is F_1 of the inverse.
 
-    The forms are in the variables, the symbols, eps and a last, homogenizing variable: c_1 F_1 is (N : D), and
-    c_(k+1) F_(k+1) = F_1(F_k) for the `factors` c. `degree` is deg F_n; `line_degree` that of the line's 2n-th image.
+    They are forms in the variables and a last, homogenizing variable. c_1 F_1 is (N : D), c_(k+1) F_(k+1) is F_1(F_k),
+    where `factors` are the c_k. `degree` is deg F_n, `line_degree` is that of the 2n-th image of `LINE`.
     """
 
     inverse: tuple[fmpq_mpoly, ...]
@@ -49,9 +49,9 @@ class PositiveEntropy(Claim):
 
 
 def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) -> PositiveEntropy:
-    """Return the degrees which prove that the dynamical degree is above 1, for a map of the plane and its inverse.
+    """Return degrees that prove that the dynamical degree of a map of the plane, with this inverse, is above 1.
 
-    They give the best bound within the limits; with `is_short`, the first bound above 1.
+    They give the best lower bound within the limits, or, if `is_short`, the first one above 1.
 
     Raises:
         InputError: if no such degrees are found within the limits; this proves nothing about the map.
@@ -95,7 +95,7 @@ def homogenizing(names: Sequence[str]) -> str:
 
 
 def _degree(forms: Sequence[fmpq_mpoly]) -> int:
-    """Return the degree in the two variables and the homogenizing variable."""
+    """Return the degree of the forms in the two variables and the homogenizing variable."""
     return max(int(e[0] + e[1] + e[-1]) for form in forms for e in form.monoms())
 
 
@@ -107,14 +107,14 @@ def _forms(data: MapData) -> list[fmpq_mpoly]:
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
-    """Return the forms over Z divided by their primitive common factor, and this common factor."""
+    """Return (forms/g, g), where g is the primitive greatest common divisor of the forms, over Z."""
     gcd = reduce(fmpq_mpoly.gcd, forms)
     gcd *= common_denominator(gcd)
     return tuple(form / gcd for form in forms), gcd
 
 
 def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
-    """Return the degree of the image of the line after `steps` steps modulo a prime; None if a step is undefined."""
+    """Return the degree of the image of `LINE` after `steps` steps modulo a prime; None if a step is undefined."""
     line = [nmod_poly(list(point), prime) for point in LINE]
     try:
         for _ in range(steps):
@@ -125,7 +125,7 @@ def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | N
 
 
 def _curve_image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
-    """Return the image of a curve modulo the prime, without common factors. Raises InputError if the image is 0."""
+    """Return the image of a curve under the map with these forms, without common factors. InputError if it is 0."""
     powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], prime)} for _ in curve]
 
     def power(k: int, exponent: int) -> nmod_poly:

@@ -40,7 +40,7 @@ MAX_PRODUCTS = 20_000_000  # products of terms to expand one side: some ten seco
 
 @dataclass
 class Limits:
-    """The factor by which MAX_TERMS and MAX_PRODUCTS are multiplied, and the number of terms of all products so far."""
+    """`multiple` is the factor of MAX_TERMS and MAX_PRODUCTS, `terms` the number of terms of all sides so far."""
 
     multiple: float = 1.0
     terms: int = 0
@@ -51,7 +51,7 @@ _LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B0
 
 @contextmanager
 def limited(effort: int) -> Iterator[Limits]:
-    """Set the limits for the identities of a certificate: they double with each step of `effort` above 1."""
+    """Set the limits for the identities of a certificate; each increase of `effort` by 1 doubles them."""
     token = _LIMITS.set(limits := Limits(units_at(effort, 1.0)))
     try:
         yield limits
@@ -60,7 +60,7 @@ def limited(effort: int) -> Iterator[Limits]:
 
 
 def check_limits(terms: int, products: int = 0) -> None:
-    """Check the size of one side of an identity: its number of terms, and the number of products of terms to expand it.
+    """Check the size of one side of an identity: its terms, and the products of two terms that its expansion takes.
 
     Raises:
         InputError: if one of these numbers exceeds its limit.
@@ -81,7 +81,7 @@ class FalseClaim(InputError):
 
 @dataclass(frozen=True)
 class MapData:
-    """A map by its equation: `rows` of (M | r), polynomials over Z in `names`: the variables, the symbols and eps.
+    """A map with the equation M x~ = r: `rows` of (M | r) over Z in the `names` of the variables, the symbols and eps.
 
     `new` are names for the coordinates of x~. The solution x~ = N/D is computed when it is first used. Raises
     InputError if the solution is too long.
@@ -146,7 +146,7 @@ class MapData:
         return result
 
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
-        """Return functions of x, evaluated at x and at x~, in the ring of `derivative`."""
+        """Return the values at x, and those at x~, of polynomials in x, in the ring of `two_points`."""
         n, context = self.dim, ring(self.two_points)
         letters = context.gens()
         points = letters[:n], letters[n : 2 * n]
@@ -154,11 +154,11 @@ class MapData:
         return at_x, at_image
 
     def with_rows(self, rows: Sequence[Row]) -> MapData:
-        """Return the map in the same variables whose equation has the rows of (M | -r)."""
+        """Return the map in the same variables with the equation M x~ = r, given the rows of (M | -r)."""
         return map_data([[*row[:-1], -row[-1]] for row in rows], self.variables, self.new, self.names)
 
     def _solve(self, right_side: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """Return det M, then det M times the solution y of M y = r = `right_side`; (M | r) annihilates (y, -1)."""
+        """Return [det M, det M y_1, ...] for the solution y of M y = r = `right_side`; (M | r) annihilates (y, -1)."""
         n = self.dim
         rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right_side, strict=True)]
         *minors, last_minor = kernel_minors(rows, times)

@@ -68,12 +68,12 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """Return the text of det(M) x~: if `at_n` the names of N, else products that Cramer's rule rewrites to N."""
+        """Return texts of det(M) x~_i: if `at_n` the names n1, ..., else products that Cramer's rule makes n1, ..."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
     def constants(self) -> list[str]:
-        """The symbols and eps, as variables of the section."""
+        """The line that declares the symbols and eps, in a list; no line if there are none."""
         letters = [self.letters[name] for name in self.data.names[self.data.dim :]]
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
@@ -192,7 +192,7 @@ class _Script:
     def _fraction_text(
         self, polynomial: fmpq_mpoly, numerators: Sequence[str], denominators: Sequence[str]
     ) -> tuple[str, str]:
-        """Return the value of a polynomial at fractions as a numerator and a product of powers of denominators."""
+        """Return numerator and denominator, as texts, of a polynomial at the fractions with these texts."""
         distinct_denominators = [q for q in dict.fromkeys(denominators) if q]
         count = len(numerators)
         constants = [self.letters[name] for name in names_of(polynomial)[count:]]
@@ -209,7 +209,7 @@ class _Script:
         return " + ".join(terms), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
-        """Return the pattern that splits the hypothesis `maps` into its parts: (A1 & A2)."""
+        """Return the pattern that splits the hypothesis `maps` into one for each coordinate, as (A1 & A2)."""
         names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
         return f"({' & '.join(names)})" if len(names) > 1 else names[0]
 
@@ -279,7 +279,7 @@ class _Script:
         ]
 
     def expand_tactic(self, *names: str) -> str:
-        """Return the tactic that unfolds all definitions and proves a polynomial identity."""
+        """Return the tactic that unfolds the definitions of the map and `names`, and proves a polynomial identity."""
         n = self.data.dim
         definitions = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         definitions += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
@@ -418,7 +418,7 @@ class _Script:
         ]
 
     def derivative(self) -> tuple[list[str], str]:
-        """Return the definitions of l11, l12, ..., the entries of L, and these names."""
+        """Return the lines that define l11, l12, ..., the entries of L, and the text "l11 l12 ..."."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
         entries_of_L = [entry for row in self.data.derivative for entry in row]
@@ -436,7 +436,7 @@ class _Script:
         return lines, " ".join(names)
 
     def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
-        """State the lemma that d (called `name`) is a derivative: P(x + t e_s) = P(x) + t d + t^2 (polynomial)."""
+        """State the lemma P(x + t e_s) = P(x) + t d + t^2 (polynomial); P is called `function`, d is called `name`."""
         names, t_name, x_text = names_of(P), "t_", " ".join(self.xs)
         context = ring((*names, "".join(names) + "_"))  # t may be a variable, so take a name longer than all others
         *letters, t = context.gens()
@@ -464,7 +464,7 @@ class _Script:
         def entry_text(
             letter: str, i: int, j: int, point: str, entry_format: str = "{}", point_format: str = "{}"
         ) -> str:
-            """Return entry i, j of A T A^T den; the formats are for the entries `letter` of A and for those of T."""
+            """Return entry i, j of A (den T) A^T; the formats apply to entries of A (`letter`11, ...) and of den T."""
             a = [[entry_format.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
             minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in name_of_pair.items())
             return " + ".join(
@@ -640,7 +640,7 @@ _PROOF_METHODS: dict[type[Claim], tuple[Any, str]] = {
 
 
 def _new_statements(lines: Sequence[str], statement_of: dict[str, str], ending: str) -> list[str]:
-    """Return the statements not yet in `statement_of`; `ending` is appended to a name that another statement has.
+    """Return the statements not yet in `statement_of`; a name that another statement has gets `ending` appended.
 
     A statement uses earlier statements only, so that a changed name is known before it is used.
     """
@@ -732,7 +732,7 @@ def _homogeneous_text(
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
-    """Return det times an entry of L (of degree at most 1 in x~), with det(M) x~, or N if `at_n`, for x~."""
+    """Return the text of det times an entry of L, of degree at most 1 in x~; det x~ is written as N if `at_n`."""
     letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
     letters[image] = script.image_letters(at_n)
     return _homogeneous_text(entry, letters, 1, image, "det")

@@ -185,7 +185,7 @@ def _form_text(polynomial: fmpq_mpoly) -> str:
 
 
 def _nonzero_lemma(name: str, polynomial: fmpq_mpoly) -> Iterator[str]:
-    """Yield the lemma that a polynomial is not 0, since its value is not 0 at a point with small coordinates."""
+    """Yield the lines of the lemma that a polynomial is not 0: its value at a point with small coordinates is not."""
     for x, y, h, e in product(range(1, polynomial.total_degree() + 2), repeat=4):
         if value := polynomial(x, y, e, h):
             yield f"Lemma {name}_nonzero : nonzero {name}. Proof. exists {x}, {y}, {h}, {e}."

@@ -258,7 +258,7 @@ class _Script:
         self.define(name, f"({self.text(polynomial)})" + " * one" * (self.language is PYTHON))
 
     def check(self, label: str, identity: str) -> None:
-        """Append a check of an identity, in which ^ stands for a power."""
+        """Append a check of an identity, a text in which ^ means a power in every language."""
         identity = identity.replace("^", self.language.power)
         identity = identity.replace("&&", "and") if self.language is PYTHON else identity
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.language is GP))
@@ -291,7 +291,7 @@ class _Script:
         self.lines[-1] += f"  {self.language.comment}0 where new is the image of old"
 
     def solution(self) -> None:
-        """Append the definitions of N and D."""
+        """Append the definitions of N and D, and the checks that D is not 0 and M N = D r."""
         self.define("N", self.vector(self.data.numerators))
         self.polynomial("D", self.data.determinant)
         self.check("D is not 0", "D != 0")
@@ -349,9 +349,9 @@ class _Script:
         self.products(claim.product, label, "P", [0])
 
     def products(self, fraction: DarbouxProducts, label: str, names: str, powers: Sequence[int]) -> list[str]:
-        """Append each product with its identities, factor by factor; return D^power P(N/D)/P for the given powers.
+        """Append each product P with the identities of its factors; return the texts of D^k P(N/D)/P, k in `powers`.
 
-        The exponents of a product are written only once, so that all checks depend on the same exponents.
+        The script contains the exponents of a product only once, so that all checks use the same exponents.
         """
         for j, common_factor in enumerate(fraction.common_factors, 1):
             self.polynomial(f"c{j}", common_factor)
@@ -500,7 +500,7 @@ class _Script:
         return text.replace(", ", "/") if self.language is GP else f"QQ({text})"
 
     def fraction(self, claim: InvariantVolume | OrbitIntegral) -> None:
-        """Append the numerator P and the denominator Q."""
+        """Append the definitions of the numerator P and the denominator Q of a claim."""
         self.polynomial("P", claim.numerator)
         self.polynomial("Q", claim.denominator)
         self.check("Q is not 0", "Q != 0")

@@ -89,7 +89,7 @@ def certify(
 
 
 def _without_bound(evidence: Evidence) -> Evidence:
-    """Return the evidence of random points for a proved claim, without its probability of error."""
+    """Return the evidence of random points without the probability of error, for a claim that is proved."""
     summary = evidence.summary.partition("; false with probability")[0]
     return Evidence(evidence.method, summary, {k: v for k, v in evidence.data.items() if k != "error_bound"})
 
@@ -140,7 +140,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """Decide a claim supported by random points by expansion; return `decision` otherwise, or if expansion fails."""
+    """Expand an identity that `decision` calls supported; return the result, or `decision` if there is none."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

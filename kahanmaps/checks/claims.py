@@ -19,7 +19,7 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
     """The certainty of a claim. `holds` is its truth value; `bool` of a certainty raises TypeError.
 
-    Checks return one of the first four values. DERIVED means that the statement follows exactly from the measured
+    Checks return one of the first four members. DERIVED means that the statement follows exactly from the measured
     singularity patterns; NOTE marks a remark, which has no certainty.
     """
 
@@ -40,7 +40,7 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
 @dataclass(frozen=True)
 class Evidence(ResultPart):
-    """The reason for a verdict: the method, a sentence, and plain data for scripts."""
+    """The reason for a verdict: the name of the method, a sentence, and plain data for scripts."""
 
     method: str
     summary: str

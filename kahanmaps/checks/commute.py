@@ -39,7 +39,7 @@ def commutativity(
 ) -> Identity:
     """Return Phi_f o Phi_g = Phi_g o Phi_f as an identity.
 
-    A system stands for its Kahan map. The map of g is taken at eps times `ratio`, where eps belongs to the map of f.
+    A system stands for its Kahan map. The map of f is taken at eps, the map of g at `ratio` times eps.
     """
     f_map, g_map = as_map(f), as_map(g)
 

@@ -146,7 +146,7 @@ class Identity:
             yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence except the bounds."""
+        """Return the data of the evidence, except the bounds; `undefined` is the number of points without sides."""
         return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
 
 
@@ -161,7 +161,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """The result at a random point: `prime` is None if no sides are defined there, `decision` None unless refuted."""
+    """The result at a random point: `prime` is None if no sides are defined there; a `decision` ends the test."""
 
     prime: int | None = None
     decision: Decision | None = None
@@ -294,7 +294,7 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
 
 
 def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:
-    """Return the two sides at a point as a witness; None if the sides are equal."""
+    """Return a witness with the point and its two `sides`; None if the sides are equal."""
     left, right = sides
     if _sides_agree(field, sides):
         return None

@@ -160,7 +160,7 @@ def check_measure(
 
 
 def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
-    """Return the identity dPhi P(x) dPhi^T = P(x~), with denominators cleared."""
+    """Return the identity dPhi P(x) dPhi^T = P(x~) for the matrix P of `tensor`, without denominators."""
     n = map_.dim
 
     def sides(field: Field, point_and_values: tuple[Any, ...], eps_value: Any) -> Sides | None:

@@ -101,7 +101,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class OrbitRun:
-    """An exact orbit along which identities are tried."""
+    """An exact orbit, along which identities are tested."""
 
     start: tuple[Any, ...]
     points: tuple[tuple[Any, ...], ...]
@@ -169,7 +169,7 @@ def run_orbit(
 
 
 def try_along_orbit(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
-    """Try an identity at every point of an exact orbit."""
+    """Return the evidence of an identity at every point of an exact orbit, and a witness if it fails at one."""
     tried_count = undefined_count = 0
     number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
     ground_field = number_fields[0] if number_fields else identity.ground
@@ -247,7 +247,7 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
 
 
 def claimed_tensor(file: SystemFile, claim: Any) -> MatrixPoissonTensor | None:
-    """Convert a matrix of formulas to a tensor. Raises InputError if it is not a skew-symmetric matrix."""
+    """Convert a matrix of formulas to a tensor. Raises InputError if the matrix is not skew-symmetric."""
     claim = getattr(claim, "tensor", claim) if isinstance(claim, ResultPart) else claim
     if claim is None or isinstance(claim, MatrixPoissonTensor):
         return claim

@@ -36,7 +36,7 @@ class Check:
     """A check. `question` is shown in lists, `headline` and `text` in the help of its command.
 
     `function` is "module:name" of a function (file, settings, extra), for two systems (file, other, settings, eps2),
-    that returns a Report. `examples` are command lines without "kahanmaps check-NAME", `outcome` is that of status 0.
+    that returns a Report. `examples` are arguments of "kahanmaps check-NAME". `outcome` says what exit status 0 means.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Check:
 
     @property
     def command(self) -> str:
-        """The name of the command and of the task of this check."""
+        """The name of the command for this check, and of its task in experiments."""
         return f"check-{self.name}"
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:

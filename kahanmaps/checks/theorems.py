@@ -29,7 +29,7 @@ MAX_FACTORS = 8
 
 
 def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
-    """Return the evidence that a theorem applies; None unless every hypothesis holds."""
+    """Return the evidence that a theorem applies, given pairs (hypothesis, whether it holds); None if one fails."""
     distinct_hypotheses = list(dict.fromkeys(hypotheses))
     if not all(is_true for _, is_true in distinct_hypotheses):
         return None
@@ -70,8 +70,8 @@ def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
 def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
-    The space is the sum of the eigenspaces of C for 1, -1 and 0. On these, f splits into three separate systems, and g
-    is f, -f and 0. So Phi_g is there Phi_f, its inverse, and the identity. The lemma also holds for inhomogeneous f and
+    The space is the sum of the eigenspaces of C for 1, -1 and 0. f splits into a system on each, and there g
+    is f, -f and 0. So Phi_g is Phi_f, its inverse, and the identity. The lemma also holds for inhomogeneous f and
     needs no Hamiltonian structure.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
@@ -211,7 +211,7 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
 
 
 def _coefficient_matrix(system: QuadraticSystem) -> fmpq_mat:
-    """Return the coefficients: a row for each component, a column for each monomial of degree at most 2."""
+    """Return the coefficients of a system: a row for each component, a column for each monomial of degree <= 2."""
     n = system.dim
     rows = []
     for i in range(n):

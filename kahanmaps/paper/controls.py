@@ -16,7 +16,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 @dataclass(frozen=True)
 class Control:
-    """A negative control: the violated hypothesis as text, and the function that changes the objects."""
+    """A negative control: `function` changes the objects so that a hypothesis fails; `breaks` says how it fails."""
 
     breaks: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -38,7 +38,7 @@ def broken_J(objects: PaperObjects) -> PaperObjects:
 
 
 def broken_f(objects: PaperObjects) -> PaperObjects:
-    """Add a random vector times the square of a random linear form to f; H is unchanged."""
+    """Add a random vector times the square of a random linear form to f, without changing H."""
     p, u = objects.vector("break 1"), objects.vector("break 2")
     return objects.replace(
         base=SystemOver(objects.K, objects.f.tensor + objects.tensor(p, u, u), objects.f.B, objects.f.c)
@@ -53,13 +53,13 @@ def broken_B(objects: PaperObjects) -> PaperObjects:
 
 
 def repeated_root(objects: PaperObjects) -> PaperObjects:
-    """Replace A by A + (lambda_2 - lambda_1) E_1: A stays skew-Hamiltonian, and H one of its cubics."""
+    """Replace lambda_1 by lambda_2 in A: A is still skew-Hamiltonian, and A nabla^2 H = nabla^2 H A^T still holds."""
     A = objects.A + objects.projector(0) * (objects.lam[1] - objects.lam[0])
     return objects.replace(A=A, roots=(objects.lam[1], *objects.lam[1:]), known_chi=None)
 
 
 def linear_f(objects: PaperObjects) -> PaperObjects:
-    """Replace H by its quadratic part: then f is linear, and its maps with different time steps commute."""
+    """Replace H by a random quadratic form: then f is linear, and its maps with different time steps commute."""
     zero = objects.zeros(objects.n * objects.n, objects.n)
     return objects.inhomogeneous().replace(
         d3H=zero, gradient_of_linear_part=objects.zeros(objects.n, 1), base=None, draw=objects.vector
@@ -73,11 +73,11 @@ def _random_rank_1_matrix(objects: PaperObjects) -> Any:
 CONTROLS: dict[str, Control] = {
     "A": Control(
         "A is not skew-Hamiltonian", lambda o: o.replace(A=o.A + _random_rank_1_matrix(o))
-    ),  # H, J, roots unchanged
+    ),  # H, J and the roots are not changed
     "H": Control("H is outside the space of A", broken_H),
     "J": Control("J is not the standard structure, and A^T J = J A fails", broken_J),
     "f": Control("f is not Hamiltonian", broken_f),
-    # Add a random matrix times the first component of v to f'' v.
+    # Add v_1 times a random matrix to f'' v.
     "f''": Control("f'' is not the derivative of f'", lambda o: o.replace(error_of_second=_random_rank_1_matrix(o))),
     "B": Control("B^2 = I fails: B_i(lambda_i) = 2", broken_B),
     # Set B_i(lambda_i) = 1: then every B_i is I, and all associated systems are f.
@@ -106,7 +106,7 @@ CONTROLS: dict[str, Control] = {
 
 
 def broken(name: str, objects: PaperObjects) -> PaperObjects:
-    """Return the objects changed by a control; vectors that were drawn before are unchanged."""
+    """Return the objects changed by the control `name`; vectors already drawn keep their values."""
     broken_objects = CONTROLS[name].function(objects)
     broken_objects.draw = objects.vector
     return broken_objects

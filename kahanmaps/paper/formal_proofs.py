@@ -46,13 +46,13 @@ class Expression:
     __rmul__ = __mul__
 
     def times(self, other: Expression) -> Expression:
-        """Return the (non-commutative) product of two linear combinations of words."""
+        """Return the product of two combinations of words; the product of two words joins them."""
         pairs = product(self.coefficients.items(), other.coefficients.items())
         return combine([(left + right, a * b) for (left, a), (right, b) in pairs])
 
 
 def combine(terms: list[tuple[Term, Scalar]]) -> Expression:
-    """Add up terms with coefficients."""
+    """Return the sum of the pairs (term, coefficient) as one expression."""
     total: dict[Term, Scalar] = {}
     for term, coefficient in terms:
         total[term] = total.get(term, fmpq_poly()) + coefficient
@@ -66,7 +66,7 @@ def letter(name: str) -> Expression:
 
 @dataclass(frozen=True)
 class Multilinear:
-    """A multilinear map known only by its symmetry: 1 for symmetric, -1 for skew, 0 for none."""
+    """A multilinear map of which only the symmetry is known: 1 means symmetric, -1 skew, 0 none."""
 
     name: str
     symmetry: int = 0
@@ -95,7 +95,7 @@ X, Y, Z = letter("x"), letter("y"), letter("z")
 
 
 class KahanEquation:
-    """Kahan's equation E = 0 for f(x) = Q(x, x) + B x + c, with the matrices M = I - eps f' and P = I + eps f'."""
+    """Kahan's equation E(x, x~) = 0 for f(x) = Q(x, x) + B x + c, with M = I - eps f'(x) and P = I + eps f'(x)."""
 
     def __init__(self, Q: Multilinear = Q, is_homogeneous: bool = False) -> None:
         self.Q = Q
@@ -136,7 +136,7 @@ def map_of_any_homogeneous_system(Q: Multilinear = Q) -> Pairs:
 
 
 def jacobian_of_any_map(Q: Multilinear = Q) -> Pairs:
-    """Yield the identity that implies (10): to first order E changes by M(x) w - P(y) v if x, y change by v, w."""
+    """Yield the identity that implies (10): E(x + v, y + w) = E(x, y) + M(x) w - P(y) v to first order in v and w."""
     kahan, v, w = KahanEquation(Q), letter("v"), letter("w")
     first_order = kahan.M(X, w) - kahan.P(Y, v)
     yield kahan.E(X + v, Y + w) - kahan.E(X, Y), first_order - Q(v, w) * (2 * EPS)
@@ -164,7 +164,7 @@ def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:
     """Yield the identities that imply (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
 
     Transposition gives det(I + eps J S) = det(I - eps S J). Two products of block matrices, with factors of determinant
-    1 on one side, show that this is det(I - eps J S).
+    1 on one side, show that det(I - eps S J) = det(I - eps J S).
     """
     one, zero = Expression({(): fmpq_poly([1])}), Expression({})
     J, S = letter("J"), letter("S")

@@ -32,7 +32,7 @@ _IN_K = (
 
 
 def cache_by_id(method: Method) -> Method:
-    """Cache the values of a method by the `id` of its arguments; references keep the arguments alive."""
+    """Cache the values of a method by the `id` of its arguments; the cache keeps the arguments alive."""
     name = method.__name__
 
     @wraps(method)
@@ -50,8 +50,8 @@ class PaperObjects:
     """The paper's objects over the field `K`.
 
     `d3H` are the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw` gives
-    x and the other vectors by name (random at a point, indeterminate in a proof). `step_eps` is the eps of the maps,
-    and `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
+    x and other vectors by name (random at a point, indeterminate in a proof). `step_eps` is the eps of the maps;
+    `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
     and `error_of_second`, an error of the tensor f''.
 
     A method whose name ends with an underscore takes the paper's index: `f_i(i)` is f_i, and `H_tilde_(i, x)` is H~_i.
@@ -63,7 +63,7 @@ class PaperObjects:
     step_eps: Any = None
     method: str = "kahan"
     error_of_second: Any = None
-    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if these are
+    used: set[str] = field(default_factory=set)  # names of the vectors used so far, and "roots" if roots were used
     _cache: dict[Any, Any] = field(default_factory=dict)
     A: Any
     d3H: Any
@@ -228,7 +228,7 @@ class PaperObjects:
     # ---- derivatives --------------------------------------------------------------------------------------------
 
     def slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any) -> Any:
-        """Return the exact derivative at x along v of a scalar function of (objects, point), by dual numbers."""
+        """Return the derivative at x along v of the scalar function(objects, point), by dual numbers."""
         return function(self.over_dual_numbers(), self._dual_point(x, v)).slope
 
     @cache_by_id
@@ -238,7 +238,7 @@ class PaperObjects:
         return dual.matrix(self.n, 1, [dual.dual(a, b) for a, b in zip(x.entries(), v.entries(), strict=True)])
 
     def second_slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any, w: Any) -> Any:
-        """Return the second derivative of a scalar function at x along v and w."""
+        """Return the second derivative at x along v and w of the scalar function(objects, point)."""
 
         def along_w(o: Any, x: Any) -> Any:
             dual: Any = o.K
@@ -247,7 +247,7 @@ class PaperObjects:
         return self.slope(along_w, x, v)
 
     def gradient(self, function: Callable[[Any, Any], Any], x: Any) -> Any:
-        """Return the gradient at x of a scalar function of (objects, point), a column."""
+        """Return the gradient at x, a column, of the scalar function(objects, point)."""
         return self.K.column([self.slope(function, x, self.unit(k)) for k in range(self.n)])
 
     # ---- A, f and x ---------------------------------------------------------------------------------------------
@@ -299,7 +299,7 @@ class PaperObjects:
         return self.A_to(i) * gradient
 
     def H(self, x: Any, i: int = 0) -> Any:
-        """Return H_i(x) by Euler's formula for each degree; nabla H_i = A^i nabla H_0 if such an H_i exists."""
+        """Return H_i(x) by Euler's formula for each degree; nabla H_i = A^i nabla H_0 if this is a gradient."""
         return self.potential(self.A_to(i), x)
 
     def gradient_of_chain(self, i: int, x: Any) -> Any:
@@ -307,7 +307,7 @@ class PaperObjects:
         return self.gradient(lambda o, x: o.H(x, i), x)
 
     def potential(self, matrix: Any, x: Any) -> Any:
-        """Return at x the function with gradient `matrix` nabla H_0 that is 0 at 0, if there is one."""
+        """Return K(x) for the function K with K(0) = 0 and nabla K = `matrix` nabla H_0, if there is one."""
         value = self.dot(x, matrix * (self._square_matrix(self.d3H * x) * x)) * self.number(1, 6)
         if self.hessian_of_quadratic_part is not None:
             value = value + self.dot(x, matrix * (self.hessian_of_quadratic_part * x)) * self.number(1, 2)
@@ -337,7 +337,7 @@ class PaperObjects:
 
     @property
     def lam(self) -> tuple[Any, ...]:
-        """The roots of chi, which are the eigenvalues of A; each eigenvalue is double."""
+        """The roots of chi, where chi^2 is the characteristic polynomial of A: its double eigenvalues."""
         self.used.add("roots")
         if self.roots is None:
             raise LookupError("the roots of chi do not lie in this field")
@@ -388,7 +388,7 @@ class PaperObjects:
         return product
 
     def associates(self) -> Iterator[Any]:
-        """Yield the matrices B of the associated systems up to sign, except I."""
+        """Yield the matrices B of the associated systems J B nabla H_0, one of B and -B, without I."""
         if self.associate_matrices is not None:
             yield from self.associate_matrices
             return
@@ -398,7 +398,7 @@ class PaperObjects:
             yield self._cache["B", signs]
 
     def all_signs(self) -> tuple[tuple[int, ...], ...]:
-        """The sign vectors s of the associated systems that are tested."""
+        """The sign vectors s of the associated systems J B_s nabla H_0 that are tested."""
         count = len(self.lam)
         if self.sign_vectors is not None:
             return self.sign_vectors
@@ -491,7 +491,7 @@ class PaperObjects:
         return self.trace(self.projector(i).transpose() * self.square(x)) * self.number(1, 2)
 
     def block_determinant(self, i: int, x: Any) -> Any:
-        """Return D_i, the determinant of f' on the plane of lambda_i."""
+        """Return D_i, the determinant of f'(x) on the eigenspace of A^T for lambda_i, a plane."""
         return -self.eigenvalue_of_square(i, x)
 
     @cache_by_id
@@ -601,7 +601,7 @@ class PaperObjects:
         return objects
 
     def arbitrary_system(self, is_homogeneous: bool = False) -> SystemOver:
-        """Return a quadratic system without special structure: f'', B and c are random."""
+        """Return a quadratic system f = Q + B x + c whose Q, B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
         for j in range(n):
@@ -661,7 +661,7 @@ class PaperObjects:
         """Return S and the companion matrix W of chi, for which A S = S diag(W, W^T) and S^T J S = J.
 
         A is self-adjoint for the form u^T J w. Hence e, A e, ..., A^{m-1} e span an isotropic space, and so do h, A h,
-        ..., from whose span the dual basis is taken.
+        ..., from whose span the basis dual to e, A e, ... is taken.
         """
         m, K = self.m, self.K
         e, h = self.vector("e"), self.vector("h")
@@ -672,7 +672,7 @@ class PaperObjects:
         return S, self.companion(self.chi)
 
     def companion(self, chi: Sequence[Any]) -> Any:
-        """Return the companion matrix of a monic polynomial chi of degree m, with -chi in its last column."""
+        """Return the companion matrix of a monic polynomial: its last column has the negative coefficients of chi."""
         m, one, zero = self.m, self.K.one, self.K.zero
         entries = [-chi[i] if j == m - 1 else one if i == j + 1 else zero for i in range(m) for j in range(m)]
         return self.K.matrix(m, m, entries)
@@ -713,7 +713,7 @@ class PaperObjects:
 
 
 def _times_linear(K: Field, polynomial: Sequence[Any], root: Any) -> list[Any]:
-    """Return (t - root) times a polynomial in t, given by its coefficients, constant term first."""
+    """Return (t - root) times a polynomial in t; both are lists of coefficients, constant term first."""
     product = [K.zero, *polynomial]
     for k, coefficient in enumerate(polynomial):
         product[k] = product[k] - root * coefficient

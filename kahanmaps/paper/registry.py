@@ -49,15 +49,15 @@ class ClaimKind(StrEnum):
 
     EQUAL = "equal"  # both sides are equal at all points
     DIFFERENT = "different"  # each pair differs at some point: one point for all pairs is a proof
-    # The maximal rank of the left side is the right side. One point over Q or GF(p) shows that it is not smaller, since
-    # ranks do not grow modulo p; that it is not larger needs a reason (`at_most`).
+    # The maximal rank of the left side is the right side. One point over Q or GF(p) proves "not smaller", since
+    # ranks do not grow modulo p; "not larger" needs a reason (`at_most`).
     ATTAINED = "attained"
     EXISTS = "exists"  # both sides are equal for some choice of the free vectors: one point over Q is a proof
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement or display of the paper.
+    """A statement or display of the paper.
 
     `place` is the number of the statement in the paper ("Lemma 3", "(28)"), `label` its label in the LaTeX source.
     `breaks` lists the controls: inputs that violate one hypothesis, for which the claim must be refuted.
@@ -93,12 +93,12 @@ class Claim:
         return m >= self.least_m and (self.only_m is None or m == self.only_m)
 
     def blocks_for_proof(self, m: int) -> int:
-        """The number of blocks that a proof in normal form needs."""
+        """The number of planar blocks of the normal form that a proof for this m needs."""
         return 1 if self.blockwise else min(m, 2) if self.pairwise else m
 
     @property
     def range_of_m(self) -> str:
-        """The m for which the statement makes sense, in words."""
+        """The values of m for which the statement makes sense, as text."""
         return f"m = {self.only_m}" if self.only_m is not None else f"m >= {self.least_m}"
 
     @property
@@ -161,7 +161,7 @@ def same(K: Field, left: Any, right: Any) -> bool:
 
 @dataclass(frozen=True)
 class ClaimOutcome:
-    """The outcome of a claim for given objects: the number of pairs, and the first pair that contradicts the claim."""
+    """The outcome of a claim for `objects`: the number of pairs compared, and the first pair that refutes the claim."""
 
     objects: PaperObjects
     pairs: int
@@ -188,7 +188,7 @@ def outcomes(
     points: Iterable[PaperObjects | None],
     change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
 ) -> Iterator[ClaimOutcome]:
-    """Yield the outcomes of a claim at the changed points, omitting points at which it is undefined."""
+    """Yield the outcomes of a claim at the points after `change`, except those at which the claim is undefined."""
     for objects in points:
         if objects is not None:
             with suppress(*UNDEFINED, LookupError):  # LookupError: the roots of chi are needed but not in K
@@ -196,7 +196,7 @@ def outcomes(
 
 
 def witness_of(outcome: ClaimOutcome) -> Witness | None:
-    """Return the point at which a claim failed, with both sides or, for matrices, the first entry that differs."""
+    """Return the point at which a claim failed, with its two sides; for matrices only the first entry that differs."""
     if outcome.failure is None:
         return None
     objects = outcome.objects

@@ -41,7 +41,7 @@ MAX_SIGN_VECTORS = 32
 
 
 class MemberObjects(PaperObjects):
-    """A given member at a point: if the library has its own code for a value, this code computes it.
+    """A given member at a point: values for which the library has code of its own are computed by this code.
 
     Over dual numbers (for derivatives) and in variations, values are computed as in `PaperObjects`.
     """
@@ -113,7 +113,7 @@ def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
-    """Return a sample of sign vectors (all vectors with one sign -1, and random ones); None stands for all vectors."""
+    """Return all sign vectors with one sign -1, and some random ones; None, for all vectors, if there are few."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
     single_flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
@@ -125,14 +125,14 @@ def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | Non
 
 
 def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
-    """Return random vectors of K^n."""
+    """Return a function that returns a random vector of K^n for each name."""
     return lambda name: K.column([K.random(rng) for _ in range(n)])
 
 
 def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[PrimeField, tuple[Any, ...]] | None:
     """Return a random prime field of 63 bits in which chi has m distinct roots, with the roots, or None.
 
-    Random primes are tried until chi has this property, so that the prime is uniform among those that have it.
+    The prime is uniform among the primes modulo which chi has m distinct roots; None after `tries` other primes.
     """
     m = chi.degree()
     for _ in range(tries):
@@ -161,9 +161,9 @@ def point_over(
 
 
 def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
-    """Return random A, H, x and eps over GF(p): a random normal form, transformed by a random symplectic matrix.
+    """Return random A, H, x and eps over GF(p): a random normal form, transformed by a random symplectic matrix S.
 
-    The matrix is a product of five symmetric shears, alternately upper and lower.
+    S is a product of five symmetric shears, alternately upper and lower.
     """
     n = 2 * m
     roots = tuple(K.random(rng) for _ in range(m))
@@ -196,7 +196,7 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
 
 
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
-    """Return the normal form with indeterminate roots, planar cubics and eps; `vectors` are the names of vectors.
+    """Return the normal form with indeterminate roots, planar cubics, eps, and vectors with the names `vectors`.
 
     A change of determinant 1 of each block moves the point to (u, v) = (1, 0) and makes the coefficient of u^2 v in h
     vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated, since the system stands for
@@ -224,7 +224,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
             return K.column([K.one] * m + [K.zero] * m)
         return K.column([by_name[symbol] for symbol in symbols[name]])
 
-    # Blocks may be permuted, and signs act block by block: vectors with -1 on the first blocks represent all.
+    # Blocks may be permuted, and signs act block by block: sign vectors with -1 on the first blocks represent all.
     signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
     objects = PaperObjects(
         K=K,
@@ -267,7 +267,7 @@ def member_functions(
 
 
 def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
-    """Return a member's normal form at a random exact point: one planar system over Q[t]/chi, for all roots at once."""
+    """Return a member's normal form, one planar system over Q[t]/chi for all roots of chi, at a random exact point."""
     planar_form = normal_form(member)
     K = EtaleAlgebra(planar_form.chi)
     root = K.generator
@@ -367,7 +367,7 @@ def _symbol_names(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
 def _member_data(member: FamilyMember, K: Field) -> dict[str, Any]:
     """Return the data of a member over K: A, the third derivatives of H and, if chi has repeated roots, the matrices B.
 
-    These B have one sign for each irreducible factor of chi, on the kernel of the power of this factor.
+    Such a B is I or -I on the kernel of p(A)^e, for each irreducible factor p of chi of multiplicity e.
     """
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]
@@ -379,7 +379,7 @@ def _member_data(member: FamilyMember, K: Field) -> dict[str, Any]:
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
-    """Return diag(roots, roots) and the third derivatives of a sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
+    """Return A = diag(roots, roots) and the d3H of H = sum over the blocks of a u^3 + b u^2 v + c u v^2 + d v^3."""
     m = len(roots)
     n = 2 * m
     A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])
@@ -394,5 +394,5 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
 
 
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
-    """Return sign vectors of two systems with the maximal number of factors B_i: bounds for this pair hold for all."""
+    """Return the two sign vectors with the most factors B_i: bounds for them hold for all pairs; None for m = 1."""
     return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))

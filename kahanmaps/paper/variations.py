@@ -15,7 +15,7 @@ from kahanmaps.paper.objects import PaperObjects
 
 @dataclass(frozen=True)
 class Variation:
-    """A variation: its title, the least m for which it exists, and the theorem that proves claims without expansion."""
+    """A change of the objects by `function`, for m >= `least_m`; `theorem` proves claims about it without expansion."""
 
     title: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -48,7 +48,7 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
     S, _ = o.symplectic_normal_form()
     A = -(S * o.block_diagonal(o.companion(chi)) * o.J * S.transpose() * o.J)
     p = o.replace(A=A, known_chi=chi, base=None, draw=o.vector)
-    # Third derivatives of a sum of l(M_a(x)^3) in the space of A; t^k and C_k are dual bases for the functional l.
+    # H is a sum of l(M_a(x)^3), a cubic of A: the functional l on Q[t]/chi makes t^k and C_k(t) dual bases.
     terms = []
     for name in ("d1", "d2", "d3"):
         powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
@@ -68,7 +68,7 @@ def derogatory(o: PaperObjects) -> PaperObjects:
 
 
 def _associate_matrices(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return (B,), where B = I - 2 E and E is the projector of A for the simple third root; () if m < 3."""
+    """Return (B,), B = I - 2 E, where E projects onto the eigenspace of A for the simple third root; () if m < 3."""
     if o.m < 3:
         return ()
     E, simple_root = o.I, roots[2]

@@ -87,7 +87,7 @@ NOTE_ON_RANDOM_MEMBERS = (
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """The options of `verify`: sections (None: all), order of the series, bits of complex balls, and controls."""
+    """The options of `verify`: sections (None: all), order of series in eps^2, bits of complex balls, and controls."""
 
     sections: tuple[int, ...] | None = None
     order: int = 3
@@ -188,7 +188,7 @@ def verify(
 
 
 class Verifier:
-    """Verifies claims: at random points over GF(p), by a proof, at exact points, and with controls.
+    """Verifies claims at random points over GF(p), by proofs, at points over Q, and with controls.
 
     `member` is a given member, or None for the generic member; `m` is half the dimension.
     """
@@ -207,7 +207,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return a finding for each claim; or with controls, one for each control of each claim, and one for all."""
+        """Return a finding for each claim; with controls, instead, one for each control of a claim, and one for all."""
         sections = self.options.sections
         applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]
@@ -236,7 +236,7 @@ class Verifier:
         return findings
 
     def point(self, needs_roots: bool, number: int) -> PaperObjects | None:
-        """Return the random point with this number over GF(p); None if the roots of chi are needed and not found."""
+        """Return random point `number` over GF(p); None if the roots of chi are needed and not found."""
         # For the generic member, and if chi splits over Q, all claims use the same points.
         must_split = needs_roots and self.member is not None and self.roots is None
         key = (must_split, number)
@@ -255,7 +255,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # At least 1/m! of all primes split chi, so that this fails with probability at most e^-40.
+                        # chi splits at 1/m! or more of all primes, so the search fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
@@ -280,7 +280,7 @@ class Verifier:
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, needs_roots: bool) -> int:
-        """Return a bound for the degree of the field that contains all numbers."""
+        """Return a bound for the degree over Q of a field with all coefficients, and the roots of chi if needed."""
         if self.member is None or not needs_roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
@@ -307,7 +307,7 @@ class Verifier:
         form = normal_form(self.member)
 
         def common_factor(coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
-            """Return the factor of chi at whose roots all of these elements of Q[t]/chi vanish."""
+            """Return the factor of chi whose roots are common zeros of these elements of Q[t]/chi."""
             return reduce(fmpq_poly.gcd, coefficients, form.chi)
 
         factor_of_zeros = common_factor(form.coefficients)
@@ -475,7 +475,7 @@ class Verifier:
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
-        """Return the notes on the complete table."""
+        """Return the notes below the table of findings."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
         notes = [diagnosis(self.member.A)]
@@ -489,7 +489,7 @@ class Verifier:
         return notes
 
     def controls(self, claim: Claim) -> list[Finding]:
-        """Return a finding for each control of a claim: on its input the claim should be refuted."""
+        """Return a finding for each control of a claim: the claim should be refuted for the objects of the control."""
         if claim.misprint:
             return [self.verify_claim(claim)]
         # One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
@@ -571,13 +571,13 @@ class ClaimAtPoints:
 
     @property
     def where(self) -> str:
-        """The assumption on the random primes."""
+        """The assumption on the random primes, as text; empty if there is none."""
         if self.conjugates == 1:
             return ""
         return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
 
     def trials(self, seed: int) -> Iterator[Trial]:
-        """Yield the values of the claim at random points."""
+        """Yield the result of the claim at each random point."""
         for number in count():
             objects = self._verifier.point(self._needs_roots, number)
             if objects is None:
@@ -604,7 +604,7 @@ class ClaimAtPoints:
                 yield Trial(objects.K.characteristic)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence, except the bounds."""
+        """Return the data of the evidence, except the bounds; `undefined` is the number of points without a value."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
 
 

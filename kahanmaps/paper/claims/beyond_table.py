@@ -82,7 +82,7 @@ def table(report: Report) -> str:
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
-    """Return data that refute a statement as text and as witness; None if none with at most seven ones refute it."""
+    """Return (text, witness) of objects that refute a statement; None if none with at most seven ones do."""
     m, roots, slots, further_objects = _SEARCH_SPACES[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
@@ -108,9 +108,9 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 
 
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_objects: Any) -> PaperObjects:
-    """Return objects in normal form: A = diag(roots, roots), H the sum of the monomials, x of the unit vectors.
+    """Return objects in normal form: A = diag(roots, roots), H and x sums of monomials and unit vectors `ones`.
 
-    If `ones` contain index pairs of J, J has the entry 1 at these pairs {x_i, x_j}, -1 at {x_j, x_i}, and 0 elsewhere.
+    If `ones` contains index pairs (i, j) of J, J has the entry 1 there, -1 at (j, i), and 0 elsewhere.
     """
     n = 2 * m
     cubic, hessian, linear, J = ([0] * n**k for k in (3, 2, 1, 2))
@@ -121,7 +121,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_obj
         elif kind == "J":
             J[indices[0] * n + indices[1]], J[indices[1] * n + indices[0]] = 1, -1
         else:
-            # Add 1 to the third (second, first) derivative along the coordinates, in each order.
+            # Add 1 to the third (second, first) derivative along the coordinates of the monomial, in each order.
             coordinates = [i for i, e in enumerate(indices) for _ in range(e)]
             entries = {3: cubic, 2: hessian, 1: linear}[len(coordinates)]
             for permutation in itertools.permutations(coordinates):
@@ -142,7 +142,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_obj
 
 
 def _slots(m: int, degrees: Sequence[int], is_planar: bool = True) -> list[Slot]:
-    """Return slots for monomials of these degrees (of one plane if `is_planar`) and for coordinates of x."""
+    """Return slots for the coordinates of x and the monomials of these degrees (in one plane each if `is_planar`)."""
     slots: list[Slot] = []
     for degree in degrees:
         for exponent in monomials(2 * m, degree):

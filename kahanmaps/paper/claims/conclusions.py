@@ -126,12 +126,12 @@ def translations(o: PaperObjects) -> Pairs:
 
 
 def _level(o: PaperObjects, i: int, x: Any) -> Any:
-    """Return h/(1 + eps^2 D) at a point of plane i."""
+    """Return H(x)/(1 + eps^2 D_i(x)) at a point x of plane i."""
     return o.H(x) / (o.K.one + o.eps * o.eps * o.block_determinant(i, x))
 
 
 def _plane(o: PaperObjects, i: int) -> tuple[Any, Any, Any]:
-    """Return the point x in plane i, which is a vector of a symplectic basis, the other vector, and disc(h)."""
+    """Return (e, e', disc(h)): e is the component of x in plane i, (e, e') a symplectic basis of this plane."""
     E = o.projector(i).transpose()
     x, v = E * o.x, E * o.vector("v")
     e_prime = v * (o.K.one / o.dot(x, o.J * v))
@@ -144,7 +144,7 @@ def _plane(o: PaperObjects, i: int) -> tuple[Any, Any, Any]:
 
 
 def _restriction(o: PaperObjects, basis: tuple[Any, Any]) -> Cubic:
-    """Return h(u e + v e') as a cubic in u, v, w, homogenized if H has terms of lower degree."""
+    """Return H(u e + v e') for `basis` = (e, e'), as a cubic form in u, v, w; w homogenizes lower terms of H."""
     zero = o.zeros(o.n, 1)
     quadratic, linear = o.hess(zero), o.grad(zero)
     cubic: Cubic = {}

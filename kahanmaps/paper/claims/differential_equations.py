@@ -325,7 +325,7 @@ def _product_rule(o: PaperObjects, v: Any) -> Any:
 
 
 def _system_matrix(o: PaperObjects, factor_23: Any) -> tuple[Any, Any, Any]:
-    """Return the 4 x 4 matrix with entry (2,3) = `factor_23` q_3, the unknowns, and the right-hand side."""
+    """Return (M, u, b) of the paper's 4 x 4 linear system M u = b, with entry (2,3) of M = `factor_23` q_3."""
     eps_squared = o.eps * o.eps
     q1, q2, q3 = (o.q(i, o.x) for i in o.each)
     d = o.K.one - eps_squared * o.p0(o.x)

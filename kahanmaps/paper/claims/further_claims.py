@@ -215,7 +215,7 @@ def paper_integral(o: PaperObjects) -> Pairs:
 
 
 def _modified_K_of(k: int) -> Callable[[PaperObjects, Any], Any]:
-    """Return the modified Hamiltonian of the k-th associated field as a function of objects and point."""
+    """Return the function (objects, point) whose value is the modified Hamiltonian of the k-th associated field."""
     return lambda o, x: o.modified_K(list(o.associates())[k], x)
 
 

@@ -303,7 +303,7 @@ def _long_form(o: PaperObjects, x: Any) -> Any:
 
 
 def _first_order_equations(o: PaperObjects) -> tuple[Any, Any]:
-    """Return the equations of first order in eps^2 for the d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
+    """Return the equations of order eps^2 for the d_l pi_k, and their solutions nabla pi_k = C_k w."""
     n, m = o.n, o.m
     powers = [o.A_to(k).transpose() * o.J for k in range(m)]
     rows = []
