@@ -77,7 +77,7 @@ def rational(value: Any) -> fmpq:
 
 
 def integer(value: Any, name: str) -> int:
-    """Convert an integer of Python, FLINT, numpy or SymPy to int. InputError: its text calls the value `name`.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError about `name` for others.
 
     >>> integer(7, "m")
     7

@@ -71,7 +71,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
     """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
     The space is the sum of the eigenspaces of C for 1, -1 and 0. f splits into a system on each, and there g
-    is f, -f and 0. So Phi_g is Phi_f, its inverse, and the identity. The lemma also holds for inhomogeneous f and
+    is f, -f and 0. So Phi_g is Phi_f, its inverse and the identity there. The lemma also holds for inhomogeneous f and
     needs no Hamiltonian structure.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
