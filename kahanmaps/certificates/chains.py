@@ -2,7 +2,7 @@
 
 Every point that a composition passes through is written as a vector of rational functions of x, and the equation of the
 map is verified for each step. For Phi_f and Phi_g let y = Phi_f(x), z = Phi_g(x). One vector w satisfies M_g(y) w =
-r_g(y) and M_f(z) w = r_f(z): hence w is both Phi_g(y) and Phi_f(z). No composition is expanded twice.
+r_g(y) and M_f(z) w = r_f(z): hence w is both Phi_g(y) and Phi_f(z), and only this one vector is stored for both.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Certification of identities: by a theorem, by expansion, at random points, and along an exact orbit.
 
 Proof and experiment are independent: if a proved claim fails at a point, this program contains an error, and reports
-it as such. A false claim may pass at random points, with a probability that the evidence bounds. If both sides can be
-expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) is run over the field
-of rational functions, within a budget that counts products of two terms.
+it as such. A false claim may pass at random points; the evidence contains a bound of the probability. If both sides
+can be expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) is run over the
+field of rational functions, within a budget that counts products of two terms.
 """
 
 from __future__ import annotations

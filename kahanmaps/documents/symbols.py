@@ -83,8 +83,8 @@ def _require_parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, 
     """Return the names without repetition. Raises InputError for a name that is not a parameter."""
     for name in symbols:
         if name not in file.parameters:
-            known_names = ", ".join(file.parameters) or "none"
-            raise InputError(
-                f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known_names}"
-            )
+            known_names = ", ".join(file.parameters)
+            expected = f"eps or a parameter of the system: {known_names}" if known_names else "eps"
+            reason = "" if known_names else ": this system has no parameters"
+            raise InputError(f"found the symbol {quoted(name)}, expected {expected}{reason}")
     return tuple(dict.fromkeys(symbols))

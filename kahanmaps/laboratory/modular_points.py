@@ -135,7 +135,7 @@ class ModularFlow(ModularMap):
 
     It has the interface of a map, so that the same searches find its integrals. A solution x(t) is a power series, and
     the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough
-    coefficients are 0. For a flow P + P' with P' = f . grad P replaces P(x~) in the searches for maps. Bilinear
+    coefficients are 0. The searches for maps use P(x~); for a flow, P(x~) means P + P' with P' = f . grad P. Bilinear
     expressions such as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
 
     Raises BadPrime if the prime divides a denominator.

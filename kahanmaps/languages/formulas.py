@@ -35,7 +35,7 @@ class Formulas:
     """The formulas of a system file; the parameters `symbols` stay symbolic, all other parameters are numbers.
 
     An algebraic number is also a symbol. `names` are the variables, then the symbols. `rhs`, its derivatives `jacobian`
-    and `H` are polynomials in these names; other formulas also contain eps. For maps other than Kahan's `rhs` is empty.
+    and `H` are polynomials in these names; other formulas also contain eps. If the map is not Kahan's, `rhs` is empty.
     `new` are names for the coordinates of the image x~ of a point.
     """
 

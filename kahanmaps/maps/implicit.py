@@ -4,8 +4,8 @@ M is a matrix and r a vector of polynomials. For Kahan's method and f(x) = Q(x, 
 (I + eps B) x + 2 eps c; for a map given by rational functions, M is the diagonal matrix of their denominators. Other
 discretizations that are linear in the new point have this form as well. There are three kinds of objects:
 
-* `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
-  `ImplicitMap`.
+* `MapFamily` is the map over Q, with eps as a parameter. Its subclass `ImplicitMap` is made from M and r: to add a
+  discretization, write a function that returns one.
 * `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
   (usually one), each an `ElementaryMap` with an equation.
 * `Equation` contains the coefficients of M and r over that field (equation.py), which all evaluators use; the generic

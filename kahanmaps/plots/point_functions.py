@@ -1,4 +1,4 @@
-"""Functions of many points in floating point: coordinates, integrals and other quantities that pictures show."""
+"""Functions in floating point, evaluated at many points at once: coordinates, integrals, and others for pictures."""
 
 from __future__ import annotations
 

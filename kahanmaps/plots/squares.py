@@ -1,8 +1,9 @@
 """Test whether two maps commute at one point: compute Phi_f^i Phi_g^j x and Phi_g^j Phi_f^i x exactly.
 
 The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). In the
-picture arrows of f start from points Phi_g^j x and their images under f, arrows of g from points Phi_f^i x and their
-images under g. An arrow of g ends in a ring, an arrow of f in a dot. If the maps commute, every ring contains a dot.
+picture an arrow of f leads from Phi_f^i Phi_g^j x to Phi_f^(i+1) Phi_g^j x, an arrow of g from Phi_g^j Phi_f^i x to
+Phi_g^(j+1) Phi_f^i x. An arrow of g ends in a ring, an arrow of f in a dot. If the maps commute, every ring contains a
+dot.
 """
 
 from __future__ import annotations

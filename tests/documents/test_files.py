@@ -229,7 +229,7 @@ def test_symbols_at_the_numbers_of_the_file_give_its_system(name):
     [
         (load("euler_top"), ["a4"], "found the symbol 'a4', expected eps or a parameter of the system: a1, a2, a3"),
         (load("lorenz"), ["x"], "found the symbol 'x'"),
-        (system("x y", "x*y", "1"), ["a"], "a parameter of the system: none"),
+        (system("x y", "x*y", "1"), ["a"], "expected eps: this system has no parameters"),
         # a term that is not there only because the file says a = 0
         (
             system("x y", "a*x^3 + y", "x", a=0),

@@ -529,13 +529,17 @@ class Store(HtmlDisplay):
     def _pending_query(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
-        """Return a query for the pending tasks in a chunk of the plan, and its values for each experiment."""
+        """Return the SQL text that selects the pending tasks in a chunk of the plan, and values to run it with.
+
+        `format` inserts the columns and a JOIN into the text. The values are, for each experiment, the experiment and
+        the last three parameters of the text.
+        """
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
         chosen = self.experiments(experiments)
         # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once and is in
-        # one shard, and the yielded tasks need not be stored.
+        # one shard, without a list of the tasks already yielded.
         restriction = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
         sql = f"""
             SELECT {{}} FROM plan AS p {{}}

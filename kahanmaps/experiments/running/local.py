@@ -207,7 +207,7 @@ class LocalWorkers:
         return _record_of({**data, "outcome": Outcome.CRASHED, "message": ending_text})
 
     def _end(self, worker: _Worker) -> None:
-        """Kill a worker. A thread of its pool notices this after some tenths of a second."""
+        """Kill a worker. A thread waits for the end of its pool, which takes some tenths of a second."""
         self._workers.remove(worker)
         worker.kill()
         self._ending = [thread for thread in self._ending if thread.is_alive()]

@@ -4,10 +4,10 @@ A variety reconstructed from some of the primes must also appear modulo all othe
 a component over Q; `scan` confirms it at members on the variety.
 
 A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 in the field:
-for most fields more than half of the primes. The Chinese remainder theorem combines, for several primes, one residue of
-any conjugate point. The equations are small integer relations between products of the coordinates, which are short
-vectors of a lattice: an equation over Q for the first coordinate, and for each further coordinate an equation over the
-field of the earlier coordinates.
+for most fields more than half of the primes. One residue modulo each of several primes is taken, no matter of which of
+the conjugate points, and these are combined by the Chinese remainder theorem. The equations are small integer
+relations between products of the coordinates, which are short vectors of a lattice: an equation over Q for the first
+coordinate, and for each further coordinate an equation over the field of the earlier coordinates.
 """
 
 from __future__ import annotations

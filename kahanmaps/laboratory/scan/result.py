@@ -99,8 +99,9 @@ class Scan(PrintableResult):
 
     `generic` are the degrees d_1, ..., d_N of a generic member, `sweeps` the special members modulo each prime, and
     `unassigned` the numbers of special members on no component: points over number fields or of a height above
-    `height`, or special by chance. `symmetric` has changes of parameters that permute the special members, as images of
-    the parameters. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was not done.
+    `height`, or special by chance. `symmetric` contains changes of parameters that permute the special members; each is
+    given by the images of the parameters. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was
+    not done.
     """
 
     file: SystemFile

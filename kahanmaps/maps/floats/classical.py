@@ -95,7 +95,9 @@ def composition(method: str) -> list[fmpq]:
 
 
 def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
-    """Return the numbers of evaluations of f and of linear systems in `steps` steps, `repeated` with more iterations.
+    """Return the numbers of evaluations of f and of linear systems in `steps` steps.
+
+    `repeated` of these steps were repeated by the careful step, with more iterations.
 
     >>> work("midpoint", 100), work("midpoint", 100, 1)
     ((300, 300), (309, 309))

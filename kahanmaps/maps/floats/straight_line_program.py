@@ -7,7 +7,7 @@ machine code for vectors of orbits (machine_code.py).
 
 `solve` writes a program for the solution of M y = r, where the positions of zeros in M are known. Rows and columns with
 a single entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal
-form are such blocks, with complex entries at a complex root), larger blocks by Gaussian elimination.
+form are such blocks, with complex entries for a complex eigenvalue), larger blocks by Gaussian elimination.
 
 Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 of the numbers
 from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the diagonal, in

@@ -8,8 +8,8 @@ and additions. With natural lifts of the points around a base point, chi as in `
 
 with m = (Y_u + 8 gamma)/x_u and m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is the difference between the zero of
 chi and the base point (docs/mathematics.md). If the level cubic consists of three lines (gamma = 0), Psi^3 is a
-projective map of each line, given by the power of a 2 x 2 matrix. If delta = 0, there is a formula for P_n: see
-`parabolic_ratio`.
+projective map of each line to itself, and its iterates are powers of a 2 x 2 matrix. If delta = 0, there is a formula
+for P_n: see `parabolic_ratio`.
 
 P_n is the value of the rational map Psi^n, even if the orbit by single steps would reach a pole W = 0 before.
 """

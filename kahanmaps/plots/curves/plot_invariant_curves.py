@@ -1,8 +1,8 @@
 """Plots of the planes of a member: in each plane the orbit and its invariant cubic, colored by step.
 
 Dots of the same color are the projections of the same point to the planes. Each projection moves along its own curve,
-which shows that the map is a product. A panel shows a window with most of the dots, or a disc, the whole projective
-plane.
+which shows that the map is a product. A panel shows a window with most of the dots, or the whole projective plane
+as a disc.
 """
 
 from __future__ import annotations

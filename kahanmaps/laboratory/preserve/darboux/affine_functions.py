@@ -1,8 +1,9 @@
 """Affine integrals and invariant hyperplanes, exactly over Q, of the flow of a quadratic system.
 
-The Kahan map inherits the integrals, and a hyperplane at each eps at which the map is defined on it (`under_map`). If
-v . f = 0, the map conserves v . x. If l = v . x + w satisfies l' = l L along the flow (an affine Darboux function: the
-hyperplane l = 0 is invariant, and L is the affine cofactor), the defining equation of the map gives
+The Kahan map has these integrals too. It sends each invariant hyperplane of the flow into itself, if at the given eps
+it is defined at a generic point of the hyperplane (`under_map`). If v . f = 0, the map conserves v . x. If
+l = v . x + w satisfies l' = l L along the flow (an affine Darboux function: the hyperplane l = 0 is invariant, and L is
+the affine cofactor), the defining equation of the map gives
 
     l(x~) (1 - eps L(x)) = l(x) (1 + eps L(x~)),
 

@@ -10,8 +10,8 @@ along the orbits on which P/Q = c. The search reverses this:
    the sum of the spaces U is not direct, the search looks for matrices A of rank 2, whose 4 x 4 Pfaffians vanish.
 
 Multiples of known spaces of lower degree form a subspace W_T, which is split off first. A matrix A that comes from
-multiples has entries on W_T only. The entries of A between a complement of W_T and W_T are the corrections that turn
-elements of the complement into Darboux polynomials.
+multiples has entries on W_T only. Let V be a complement of W_T. The entries of A with one index in V and the other in
+W_T give the elements of W_T that are added to elements of V to obtain Darboux polynomials.
 
 Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discrete Darboux polynomials.
 
@@ -22,7 +22,7 @@ relations as monomials do, and the same null spaces give the combinations with a
 
 If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
 be integrals, but the ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are integrals (F~ is F one step
-later). For the values of F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
+later). Indeed, the values of F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations

@@ -24,11 +24,11 @@ _PRIME = 2**61 - 1  # modulo which skipped points are shown to exist
 class EllipticSteps:
     """The steps of an orbit by Somos sequences.
 
-    A step of a composition consists of one step of each factor. After these steps of factors the point lies in turn on
-    several curves, and `groups` has a row for each curve. The row has for each group of coordinates its Coordinates, or
-    an index if the group is copied from the point one step of a factor before: the index of the group there. The
-    sequences begin at the point with the number `skipped` of the orbit, and the forms are used from the point on that
-    is `first` steps of factors later.
+    A step of a composition consists of one step of each factor. Let s be the length of `groups`: after n s + k steps of
+    factors, 0 <= k < s, the point lies on the k-th of s curves, which `groups[k]` describes. This row contains for each
+    group of coordinates its Coordinates or, if the last step of a factor only copied the group, the index that the
+    group had before that step. The sequences begin at the point with the number `skipped` of the orbit. The forms give
+    the points from `first` steps of factors after that point on.
     """
 
     name = "Somos sequences along the orbit"
