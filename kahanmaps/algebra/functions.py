@@ -9,7 +9,8 @@ each operation is slower, but quotients with many factors stay small. Work is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
+from fractions import Fraction
+from itertools import chain, pairwise
 from threading import Lock
 from typing import Any
 
@@ -18,7 +19,7 @@ from flint.utils.flint_exceptions import DomainError
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix
-from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.minors import PairsCheck, kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.work import count_work, counted
@@ -110,11 +111,6 @@ class FunctionField(Field):
         if self.budget < 0:
             raise BudgetExceeded(_BUDGET_MESSAGE)
         count_work(1 + product_count / 100)
-
-    def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
-        """Raise BudgetExceeded at once if the budget is too small for the products of all these pairs."""
-        if sum(len(left) * len(right) + 1 for left, right in pairs) > self.budget:
-            self.pay(self.budget + 1)
 
     def fraction(self, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> Function:
         """Return numerator / denominator, in lowest terms if this field reduces."""
@@ -383,13 +379,42 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
             minors = [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
         else:
             entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
-            kernel = kernel_minors(entries, field.times, field.require)
+            kernel = kernel_minors(entries, field.times, _products_check(field, entries))
             minors = [field.context.constant(0) if minor is None else minor for minor in kernel]
     except BudgetExceeded:
         _cache_minors((key, budget), None, 0, counted() - units_before)
         raise
     _cache_minors(key, minors, budget - field.budget, counted() - units_before)
     return minors
+
+
+def _products_check(field: FunctionField, rows: Sequence[Sequence[fmpq_mpoly | None]]) -> PairsCheck:
+    """Return the check of `kernel_minors` that raises BudgetExceeded if all further products cost more than the budget.
+
+    The products of the next row are counted. Those of later rows are forecast, because the longest minors come last,
+    and a failure there would waste the work done before. The forecast assumes that the terms per minor grow like a
+    power of the number of rows: by 4, 9/4, 16/9, ... for a square, each factor computed from the smallest one so far.
+    """
+    pair_counts: list[int] = []  # for each row after the first, the number of products if no minor cancels
+    patterns = [[None if entry is None else 1 for entry in row] for row in rows]
+    kernel_minors(patterns, check_pairs=lambda pairs: pair_counts.append(len(pairs)))
+    means: list[Fraction] = []  # the products of terms per pair, for each row up to the next one
+
+    def check(pairs: list[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
+        product_count = sum(len(left) * len(right) + 1 for left, right in pairs)
+        means.append(Fraction(product_count + 1, len(pairs) + 1))
+        k = len(means)
+        mean, forecast = means[-1], Fraction(product_count)
+        if k > 1:
+            excess = max(Fraction(0), min(b / a for a, b in pairwise(means)) - 1)
+            for row in range(k, len(pair_counts)):
+                excess *= Fraction(row - 1, row + 1)
+                mean *= 1 + excess
+                forecast += mean * pair_counts[row]
+        if forecast > field.budget:
+            field.pay(field.budget + 1)
+
+    return check
 
 
 def _cache_minors(key: _Key, minors: list[fmpq_mpoly] | None, product_count: int, units: int) -> None:

@@ -3,6 +3,8 @@
 A quotient is never reduced; what has to hold is that its value at rational points is right.
 """
 
+import random
+
 import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import given
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.polynomials import evaluate, ring
+from kahanmaps.algebra.work import counted
 
 NAMES = ["x", "y"]
 small = st.integers(-4, 4)
@@ -108,6 +111,35 @@ def test_the_budget_is_spent_before_the_work_is_done():
         power = power * power
     with pytest.raises(BudgetExceeded):
         _ = power * power * power * power
+
+
+@pytest.mark.parametrize("is_second_row_short", [False, True])
+def test_a_solution_that_exceeds_the_budget_is_refused_before_the_longest_minors(is_second_row_short):
+    """The exact number of products suffices, and 60 percent are refused early, also if the rows differ in length."""
+    rng = random.Random(20261129)
+    coefficients = [[[rng.randrange(1, 99) for _ in range(6)] for _ in range(6)] for _ in range(5)]
+
+    def solve(budget: int, scale: int) -> tuple[int, float]:
+        """Return the remaining budget (negative after a refusal) and the units of work; results are cached by scale."""
+        K = FunctionField(["x", "y", "z", "u", "v"], budget=budget)
+        gens, units = [K.one, *K.variables], counted()
+        lengths = [2 if is_second_row_short and i == 1 else 6 for i in range(5)]
+        rows = [
+            [sum((gens[k] * K.convert(scale * entry[k]) for k in range(length)), K.zero) for entry in row]
+            for row, length in zip(coefficients, lengths, strict=True)
+        ]
+        try:
+            K.matrix(5, 5, [entry for row in rows for entry in row[:5]]).solve(K.column([row[5] for row in rows]))
+        except BudgetExceeded:
+            return -1, counted() - units
+        return K.budget, counted() - units
+
+    remaining, units = solve(10**6, 1)
+    needed = 10**6 - remaining
+    assert solve(needed, 2) == (0, units)
+    remaining, units_before_refusal = solve(needed * 6 // 10, 3)
+    assert remaining < 0
+    assert units_before_refusal < 0.65 * units  # 0.85 without a forecast
 
 
 def test_the_digits_of_the_iterates_of_an_affine_map_grow_linearly():
