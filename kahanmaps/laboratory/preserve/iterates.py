@@ -153,8 +153,7 @@ def verdict_on_ratio(
 ) -> tuple[Certainty, Evidence]:
     """Decide whether the ratio has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of ratios whose identity was too long to expand. The identity of a ratio with such a
-    length, or a larger one, is not expanded.
+    `too_long` collects the lengths of ratios whose identity was too long; no such or longer ratio is expanded again.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()
