@@ -179,16 +179,16 @@ def find_densities(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         flow: search for densities of the differential equation instead, div(f/phi) = 0.
-        max_degree: the largest degree of phi; by default at most 12, and as large as the number of unknowns allows.
-        integrals: the known integrals. If no other density is found, products of powers of their factors are tried. By
-            default the integrals are searched for in this case.
+        max_degree: the largest degree of phi; by default 12, or less if a phi would have too many unknown coefficients.
+        integrals: the known integrals. If the other searches find no density, products of powers of factors of the
+            integrals are tried. By default the integrals are searched for in this case.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. That there are no others up to a degree is
+        A `DensitySearch`; formulas are exact, proved or supported. That there are no other densities up to a degree is
         measured modulo primes, not proved.
 
     Raises:
@@ -291,9 +291,9 @@ def _search_polynomials(
         budget,
     )
     if product is not None:
-        # With a product, degrees above that of the product are not needed, and the others get a part of the budget.
+        # Degrees above that of a known product are not needed, and the other degrees get a third of the budget.
         degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
-    # If the space of a degree is 0, so are those of lower degrees: from one tried degree to the next monomials double.
+    # The space of a degree contains those of lower degrees: try degrees with about twice as many monomials each time.
     degrees, tried_degree = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
         low_degrees = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))

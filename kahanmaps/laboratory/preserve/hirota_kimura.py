@@ -95,7 +95,7 @@ class Profile:
 
     `codimensions` are the codimensions of the varieties that these polynomials define, and `with_known` is the largest
     codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. `agree`
-    says whether all maps gave the same numbers, `complete` whether all requested degrees were tried, `cut` why not.
+    says whether all maps gave the same numbers. Unless `complete`, `cut` says why not all requested degrees were tried.
     """
 
     dim: int
@@ -401,7 +401,7 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leading = []  # monomials: relations of lower degree with these leading monomials imply those of their multiples
+    leading = []  # monomials; a relation whose leading monomial is a multiple of one of these is implied
     if degree > 1:
         lower_exponents = _descending_exponents(maps[0].dim, degree - 1)
         leading = [

@@ -1,9 +1,9 @@
 """The search for integrals of a map in closed form, from the map alone.
 
-First comes a lower bound of the number of integrals: from theorems (hamiltonian_structure.py) and from the codimension
-of orbits, which is measured (hirota_kimura.py). Then the search looks for spaces of polynomials with a common cofactor
-modulo a prime (search.py); ratios of their elements are integrals. The coefficients are functions of eps and of the
-parameters that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py).
+Theorems (hamiltonian_structure.py) and the measured codimension of orbits (hirota_kimura.py) give lower bounds of the
+number of integrals. Then the search looks for spaces of polynomials with a common cofactor modulo a prime (search.py):
+ratios of elements of one space are integrals. The coefficients are functions of eps and of the parameters that stay
+symbols; they are interpolated, and every formula is verified as an identity (laboratory.py).
 Integrals that theorems give are added if the search missed them. Finally, formulas in iterates are tried (iterates.py).
 """
 
@@ -130,7 +130,7 @@ class IntegralSearch(Search):
     """The result of `find_integrals`.
 
     `integrals`, `time_dependent` integrals and integrals `in_iterates`, whose formulas contain iterates of x, are
-    functionally independent together. `profile` holds the dimensions of the relations along orbits (measured).
+    together functionally independent. `profile` holds the dimensions of the relations along orbits (measured).
     `by_theorems` is the number of independent integrals that theorems give the Kahan map, at random values of the
     symbols; `theorems` names these theorems (hamiltonian_structure.py). `reason` says what is missing and why; it is
     empty if nothing is missing. `period_at_values` is the period of the map at the values that the file gives the
@@ -353,7 +353,7 @@ def integrals_of(
         on_result(build_result(profile, UNFINISHED))
         share = next(budgets)
         cofactors = laboratory.cofactors()
-        # For a vector field, `candidates` would be too many; most denominators are products of these polynomials.
+        # For a vector field, `candidates` would be too many; most denominators have no factors but these polynomials.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
         denominator_cofactors = denominators_among(factors, laboratory.map.dim)

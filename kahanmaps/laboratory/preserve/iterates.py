@@ -105,7 +105,7 @@ class RatioOfIterates:
     def numerator_and_denominator(
         self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]
     ) -> tuple[Any, Any]:
-        """Return numerator and denominator of I at successive points of an orbit; `values`: of the symbols and eps."""
+        """Return numerator and denominator of I at successive orbit points, for `values` of the symbols and eps."""
         rows = [
             [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
             for x, iterate in zip(points, points[self.two_point_basis.shift :], strict=False)
@@ -153,7 +153,7 @@ def verdict_on_ratio(
 ) -> tuple[Certainty, Evidence]:
     """Decide whether the ratio has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of ratios whose identity was too long; no such or longer ratio is expanded again.
+    `too_long` collects the lengths of ratios whose identity was too long; at these and larger lengths none is expanded.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()
@@ -210,7 +210,7 @@ def integrals_in_iterates(
     Source: petrera-suris-2018.
     """
     independent = copy(independent)
-    independent.rows = list(independent.rows)  # so that the argument does not change
+    independent.rows = list(independent.rows)  # the argument `independent` must not change
     integrals_in_x, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     restriction = _restrict_map(laboratory)
     level_laboratory, replace_levels = (laboratory, None) if restriction is None else restriction

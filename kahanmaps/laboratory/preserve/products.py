@@ -1,7 +1,7 @@
 """Integrals and densities of any degree that are products of powers of known polynomials, by lattices of exponents.
 
 Let x~ = Phi(x) be the image of x, and P = g_1^k_1 ... g_r^k_r, with exponents of either sign. Then P(x~)/P(x) =
-C_1^k_1 ... C_r^k_r with C_i = g_i(x~)/g_i(x). If P(x~)/P(x) = 1, P is an integral. If it is det dPhi(x), dx/P is an
+C_1^k_1 ... C_r^k_r with C_i = g_i(x~)/g_i(x). If this quotient is 1, P is an integral. If it is det dPhi(x), dx/P is an
 invariant volume form. If it is another constant c, c^-n P(x_n) is a time-dependent integral of the orbits x_0, x_1, ...
 
 On a random line modulo a prime p, all C_i and det dPhi are quotients of polynomials in one variable. These are products
@@ -160,7 +160,7 @@ class _Line:
             self._apply(factor)
 
     def _apply(self, factor: ElementaryMap) -> None:
-        """Apply one of the maps that compose the map to the curve `image`, and multiply the Jacobi determinants."""
+        """Replace `image` by its image under a factor of the map; multiply by the Jacobi determinant of the factor."""
         p, n, curve = self.prime, factor.dim, self.image
         map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
@@ -178,7 +178,7 @@ class _Line:
             denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
-        # Remove the common factor: each further map would multiply its degree, and its zeros are not at infinity.
+        # Remove the common factor: each further map would multiply its degree, and its zeros need not be at infinity.
         forms = _interpolate(homogeneous_image, n * map_degree * curve_degree, p)
         common_factor = reduce(nmod_poly.gcd, forms)
         self.image = [entry // common_factor for entry in forms]
@@ -392,7 +392,7 @@ def _build_products(
 ) -> Products:
     """Build the result of `products_of` from vectors: the exponent of det dPhi, then those of the polynomials.
 
-    `constant_one` are the vectors with constant 1; `densities` has pairs of 1 or -1 and the vectors with a power of it.
+    `constant_one` are the vectors with constant 1. `densities` are pairs of a constant 1 or -1 and a basis of vectors.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
@@ -478,6 +478,6 @@ def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list
                     row[str(q)] = row.get(str(q), 0) + s * int(k)
         rows.append(row)
     keys = sorted({key for row in rows for key in row} | {"sign"})
-    # Signs matter modulo 2 only: this is the meaning of an additional row, whose exponent is dropped from the result.
+    # Signs matter modulo 2 only, so a row with the sign 2 is added. Its exponent is dropped from the result.
     exponent_rows = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
     return [vector[:-1] for vector in relations(exponent_rows)]

@@ -32,7 +32,7 @@ class FoundFunction(LatexDisplay, ResultPart):
 class Search(PrintableResult):
     """The request of a search: the system file, the symbols that formulas contain, and eps (None: a symbol as well).
 
-    With `flow` it is for invariants of the flow, not of its Kahan map. Random points are taken modulo the `primes`.
+    With `flow` the search is for invariants of the flow, not of the map. Random points are taken modulo the `primes`.
     """
 
     file: SystemFile

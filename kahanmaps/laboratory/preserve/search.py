@@ -57,7 +57,7 @@ from kahanmaps.maps.kahan import KahanMap
 # The largest degree, by dimension, in the search for polynomials with a given cofactor.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000  # monomials of a polynomial in this search
-SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # of a prime, values of the symbols and eps
+SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # arguments: a prime, values of `names`
 
 _SAMPLES = (150, 600, 3000)  # numbers of samples; all coefficients are tried with 150 before any is tried with 600
 _MAX_COEFFICIENTS = 6  # the number of coefficients that are tried to distinguish spaces
@@ -237,7 +237,7 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
 def _most_similar_spaces(
     spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
-    """Return, for each model, the space with most coefficients in common; irrational ones are never in common.
+    """Return, for each model, the space that has most coefficients in common with it; irrational ones never count.
 
     Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
@@ -260,7 +260,7 @@ def interpolate_bases(
 ) -> tuple[list[list[fmpq_mpoly]], str]:
     """Interpolate bases of all spaces as polynomials in (variables, symbols, eps).
 
-    `reference` is the prime of the search. Returns the bases and an empty text, or no bases and the reason for this.
+    `reference` is the prime of the search. Returns the bases and an empty text, or no bases and the reason why.
     """
     if repeat_search(result, laboratory.maps[1], reference) is None:
         return [], "the polynomials found at one eps do not exist at another"
@@ -313,7 +313,7 @@ def find_branches(
     """Find a coefficient that distinguishes spaces of one zero pattern on every map; `names` are the symbols and eps.
 
     `model` holds the spaces on one map; `spaces_at(prime, values)` returns the spaces on another map in any order, or
-    None at special values. Returns None if the spaces are conjugate over an extension of Q, or at a limit of the work.
+    None at special values. Returns None if the spaces are conjugate over an extension of Q, or at the work limit.
     """
     distinguishing_positions = [
         (i, k)

@@ -117,8 +117,8 @@ class CommutingSystems(PrintableResult):
     """The quadratic g whose Kahan maps commute with that of f; if `complete`, there are no others of this shape.
 
     `basis` and `dimension` describe the space of all g of this shape with [f, g] = 0. `irrational` describes solutions
-    that are not rational, `discarded` counts g that solve the equations without commuting maps. `every_g_commutes` is
-    True if f = 0 and the shape is "quadratic"; then only g = 0 is listed. `undecided` has the open questions.
+    that are not rational; `discarded` counts solutions of the equations whose maps do not commute. `every_g_commutes`
+    is True if f = 0 and the shape is "quadratic"; then only g = 0 is listed. `undecided` lists the open questions.
     """
 
     _parts, _noun = "nontrivial", ("commuting system", "commuting systems")

@@ -141,7 +141,7 @@ class _SeriesMap:
 
 @dataclass(frozen=True)
 class CommutingSpace:
-    """A basis of all g with [f, g] = 0, f first; `matrices` has the B with g = B f (empty for other shapes of g).
+    """A basis of all g with [f, g] = 0, f first; `matrices` has the B with g = B f, () for the shape "quadratic".
 
     If the components of f are linearly dependent, B is not unique, and `matrices` has one B for each g. If `dimension`
     exceeds the number of fields, the space is too large: `dimension` is then an upper bound, and f is the only field.

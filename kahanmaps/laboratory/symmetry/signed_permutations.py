@@ -2,8 +2,8 @@
 
 Let (S x)_{p(i)} = s_i x_i with a permutation p. Each equation from f(S x) = sign S f(x), sign = 1 or -1, relates only
 two coefficients of f. Take variables y_i = e_i x_i, e_i > 0, for which the logarithms of the absolute values of the
-coefficients have the least sum of squares. S maps these e to e with the same property, and they are unique up to
-scalings that do not change f. So in the variables y each s_i is 1 or -1, and S is a signed permutation. Logarithms of
+coefficients have the least sum of squares. S maps such scales e to scales with the same property, and these are unique
+up to scalings that do not change f. So in the variables y each s_i is 1 or -1: S is a signed permutation. Logarithms of
 coefficients in y are rational combinations of logarithms of coprime integers. An S that is not rational is dropped.
 
 The search is a backtracking over images of the variables; it drops a partial permutation if one equation fails.

@@ -3,8 +3,8 @@
 Let Phi be the Kahan map of x' = f(x), and T(x) = S x + r. Kahan's method is equivariant under affine changes of
 variables. So T is a symmetry (T Phi T^{-1} = Phi for every eps) if f(T(x)) = S f(x), and a reversing symmetry
 (T Phi T^{-1} = Phi^{-1} for every eps) if f(T(x)) = -S f(x). Conversely, the terms of first order in eps of these
-relations are the equations for f. All coefficients of these polynomials in x are compared exactly, so every symmetry
-that is reported is proved.
+relations give the equations for f. Both sides of these equations are polynomials in x, whose coefficients are compared
+exactly: every reported symmetry is proved.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ class Symmetries(PrintableResult):
     `infinitesimal` is a basis of the fields of weight 0, linear fields first; `scaling` is a field of weight 1 or None.
     `signed` are the T whose linear part S is a signed permutation of the variables or of scaled variables
     (signed_permutations.py); `others` are further linear T. `generators` generate the group of `signed` or, without
-    infinitesimal symmetries, of `signed` and `others`; `group_of` says which of these. `order` is the number of linear
-    parts S of the group (None: unknown). `searched` lists the completed searches, `undecided` the open questions.
+    infinitesimal symmetries, of `signed` and `others`; `group_of` names the kind of its matrices S. The number of these
+    is `order` (None: unknown). `searched` lists the completed searches, and `undecided` the open questions.
     """
 
     _parts, _noun = "generators", ("generator", "generators")

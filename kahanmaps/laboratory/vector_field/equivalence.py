@@ -2,9 +2,9 @@
 
 P is an invertible matrix, q a vector, c a number. With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's
 method is equivariant under affine changes of variables: the map of f at eps is the map of g at eps/c, in the variables
-y. In dimension 2 all P are tried, in other dimensions P = c T F: F is I or a basis from invariant hyperplanes or lines
-of fixed points of f, and T is a permutation matrix, in dimension at most 5 also times a diagonal matrix. The parameters
-of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still exist.
+y. In dimension 2 all P are tried. In other dimensions P = c T F. Here F is I or a basis from invariant hyperplanes or
+lines of fixed points of f, and T is a permutation matrix, in dimension at most 5 also a product of one with a diagonal
+matrix. Parameters of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still exist.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def _solve_for_equivalence(
     defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
     defaults += g.defaults.values()
     highest_equations, lower_equations = _equivalence_equations(f, g, frame, entries, unknowns)
-    # First c, q and T have their default values: the equations for the parameters are then usually linear.
+    # In the first attempt c, q and T have their default values: the equations for the parameters are usually linear.
     default_equations = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     fixed_shift, fixed_scale = default_equations[: n + 1], default_equations[n + 1 :][: len(entries)]
     shift = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
@@ -242,7 +242,7 @@ def _equivalence_equations(
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
     """Return the coefficients of g(P x + q) - c P f(x) as two lists: for degree 2 in x, and for lower degrees in x.
 
-    The coefficients of div g(P x + q) - c div f(x) are added. They vanish too, and have lower degree in the unknowns.
+    The coefficients of div g(P x + q) - c div f(x) are added: they vanish for each solution, and their degree is lower.
     """
     n = f.dim
     joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])

@@ -1,13 +1,13 @@
 """Backward error analysis: the vector field whose flow is the Kahan map, as a series in eps, exactly over Q.
 
 The map x + 2 eps (I - eps f')^{-1} f = x + sum_n 2 eps^n f'^{n-1} f is the flow at time 2 eps of a formal vector field
-F = f + eps^2 F_2 + eps^4 F_4 + .... With D = sum_k eps^k F_k . grad, comparing the coefficients [eps^n] gives
+F = f + eps^2 F_2 + eps^4 F_4 + .... Let D = sum_k eps^k F_k . grad, and let [eps^m] be the coefficient of eps^m. Then
 
     sum_{j=1}^n 2^j/j! [eps^{n-j}] D^j x = 2 f'^{n-1} f.
 
 This equation determines F_{n-1} from F_0 = f, ..., F_{n-2}. Kahan's method is symmetric, so F_k = 0 for odd k. The
 first correction is F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map that is a series in eps is an integral of F. An
-integral I_0 of f survives to eps^k if there are polynomials I_2, ..., I_k such that I_0 + eps^2 I_2 + ... is an
+integral I_0 of f survives to eps^k if there are polynomials I_2, ..., I_k such that I_0 + ... + eps^k I_k is an
 integral of F up to eps^k: f . grad I_2j = -sum_{i=1}^j F_2i . grad I_2(j-i). Sources: hairer-lubich-wanner-2006,
 chapter IX; cmoq-2013, where Kahan's method is a Runge-Kutta method.
 """
@@ -96,7 +96,7 @@ class ModifiedField(ResultPart):
         }
 
     def lines(self) -> list[str]:
-        """Return the terms of the series and the integrals, one a line with tabs; of long polynomials only the size."""
+        """Return a line with tabs for each term of the series and each integral; a long polynomial gives its size."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):

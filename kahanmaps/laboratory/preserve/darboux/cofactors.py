@@ -52,7 +52,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8  # points beyond the number of unknowns
 _DETERMINANT_BUDGET = 20_000_000  # products of terms in the expansion of a determinant
-_DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
+_DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators up to degree 6 are allowed
 _MAX_WORK = 4_000_000  # entries of matrices in one search, about two seconds
 _MAX_DIMENSION = 16  # in higher dimension even a sparse determinant takes too long to expand
 

@@ -51,9 +51,9 @@ ScaledProduct = tuple[CofactorProduct, int]  # a product of cofactors and its nu
 
 @dataclass(frozen=True)
 class DarbouxPolynomials(LatexDisplay, ResultPart):
-    """A basis of all P up to a degree with P(x~) = C(x) P(x); the text `cofactor` is C, C[g] = g(x~, -eps)/g(x, eps).
+    """A basis of all P up to a degree with P(x~) = C(x) P(x), with one verdict for all P: proved or supported.
 
-    For a flow `cofactor` is K in P' = K P. The verdict holds for all P: proved by expansion, or supported.
+    `cofactor` is C as text, where C[g] stands for g(x~, -eps)/g(x, eps). For a flow it is K in P' = K P.
     """
 
     cofactor: str

@@ -17,12 +17,12 @@ Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discre
 
 The same search works for functions of a point and its k-th iterate instead of polynomials of degree 2
 (`TwoPointBasis`). With X = (1, x) and Y = (1, y), where y is the k-th iterate of x, the monomial X_i X_j stands for the
-polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. Along an orbit these functions satisfy linear
-relations like monomials, and the same null spaces give their combinations with a common cofactor.
+polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. These functions satisfy linear relations along
+orbits, as monomials do, and the same null spaces give their combinations with a common cofactor.
 
 If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
 be integrals, but the ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are integrals (F~ is F one step
-later). Indeed, the vectors F(x) on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
+later). Indeed, the vectors F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
     """Compute the spaces with a common cofactor from `solutions`, the matrices A on complement + multiples.
 
     Let B be the block of A on the complement. The projections of the spaces to the complement are eigenspaces of a
-    random E with E B = B E^T for all these A.
+    random E such that E B = B E^T for every A.
     """
     k, size, rng = len(complement), len(complement) + len(multiples), random.Random(prime)
     # The columns of the blocks B span the sum of these projections. With an echelon basis b_i of the sum, each block is

@@ -107,8 +107,8 @@ def flow_polynomials(
     budget = budget or Budget()
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known_polynomials: dict[str, fmpq_mpoly] = {}
-    # Factors of the right-hand sides come first: the search does not find a common factor of all, whose zeros are fixed
-    # points; and if there are infinitely many P, as for x' = x, y' = y, formulas need these factors.
+    # Factors of the right-hand sides come first: the search does not find a common factor of all of them, whose zeros
+    # are fixed points; and of infinitely many P of one degree, as for x' = x, y' = y, it lists none.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known_polynomials.setdefault(str(P), P)
@@ -191,7 +191,7 @@ class _Search:
             vectors, is_complete = self._search_modulo(flow, budget)
             unlifted = list[list[int]]()
             for vector in vectors:
-                if not self._try_lift(vector, prime):  # a power of the prime shows whether it is conjugate
+                if not self._try_lift(vector, prime):  # a power of the prime decides: rational or conjugate
                     residues, modulus = self._lift_to_power(vector, prime), prime**_PRECISION
                     is_known = residues and self._try_lift(residues, modulus)
                     if not is_known and not any(_is_irrational(c, modulus) for c in residues):

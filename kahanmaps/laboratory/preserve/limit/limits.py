@@ -100,7 +100,7 @@ class FlowAndMap:
     search for integrals of the flow, or None if there are already as many limits as possible. `density` is a density of
     the flow; `density_search` is the search for densities, or None if `density` is the limit of a density of the map.
     `polynomials` are the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to
-    `polynomials_degree` there are no others (measured; 0: no search); `polynomials_reason` says why the next is open.
+    `polynomials_degree` there are no others (measured; 0: no search). `polynomials_reason`: why higher ones are open.
     """
 
     limits: tuple[Limit, ...]
@@ -442,7 +442,7 @@ def _collect_polynomials(
     polynomials = {str(P): P for P in candidates if degree_in(P, n) > 1}
     for function in functions:
         for polynomial, other in permutations((function.numerator, function.denominator)):
-            # If P is irreducible and has the degree of Q, it is no more special than all members P - c Q of the pencil.
+            # If P is irreducible and has the degree of Q, it is no more special than any P - c Q of the pencil.
             factors = irreducible_factors(polynomial)
             is_generic = [k for _, k in factors] == [1] and degree_in(polynomial, n) == degree_in(other, n)
             for factor, _ in [] if is_generic else factors:

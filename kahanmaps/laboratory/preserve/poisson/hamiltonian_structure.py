@@ -143,7 +143,7 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
     count_work(n**4 + 5 * n**3)
     over_Q = system.over(QQ)
     unit_vectors = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
-    # K f'(x) must be symmetric, first at a random point, which leaves few K, then at the origin and in each direction.
+    # Impose that K f'(x) is symmetric: first at a random point, which leaves few K, then at 0 and in each direction.
     jacobians = [over_Q.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), over_Q.B]
     jacobians += [over_Q.hessian_times(unit) for unit in unit_vectors]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
