@@ -54,7 +54,7 @@ _SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at ea
 MAX_UNKNOWNS = 1800  # monomials up to a degree
 MAX_INDEPENDENT = 800  # monomials that no relation of lower degree reduces; their elimination takes about a second
 _SETTLED_DEGREES = 4  # degrees that must be tried before a profile counts as settled
-_SPARE_BITS = 40  # a number must be shorter by this than a random residue modulo two primes, which has 122 bits
+_SPARE_BITS = 40  # a number must have so many bits less than a random residue modulo two primes, which has 122 bits
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # exponents of eps, in the order of the trials
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 

@@ -54,7 +54,7 @@ from kahanmaps.maps.kahan import SystemLike
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500  # of numerator and denominator together: longer formulas are not printed in a report
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
-_CONJUGATE_PRIMES = 4  # two conjugate pencils are rational modulo all of these and the first with probability 1/32
+_CONJUGATE_PRIMES = 4  # conjugate pencils are rational modulo the first and all of these primes with probability 1/32
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class IntegralSearch(Search):
     `integrals`, `time_dependent` integrals and integrals `in_iterates`, whose formulas contain iterates of x, are
     together functionally independent. `profile` holds the dimensions of the relations along orbits (measured).
     `by_theorems` is the number of independent integrals that theorems give the Kahan map, at random values of the
-    symbols; `theorems` names these theorems (hamiltonian_structure.py). `reason` says what is missing and why; it is
+    symbols; `theorems` is a phrase on these (hamiltonian_structure.py). `reason` says what is missing and why; it is
     empty if nothing is missing. `period_at_values` is the period of the map at the values that the file gives the
     symbols, if orbits close there.
     """

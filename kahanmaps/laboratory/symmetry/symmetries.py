@@ -98,7 +98,7 @@ class Symmetries(PrintableResult):
     """The result of `linear_symmetries`: the symmetries of a Kahan map, and the searches that were completed.
 
     `infinitesimal` is a basis of the fields of weight 0, linear fields first; `scaling` is a field of weight 1 or None.
-    `signed` are the T whose linear part S is a signed permutation of the variables or of scaled variables
+    `signed` are the T(x) = S x + r whose S is a signed permutation of the variables or of scaled variables
     (signed_permutations.py); `others` are further linear T. `generators` generate the group of `signed` or, without
     infinitesimal symmetries, of `signed` and `others`; `group_of` names the kind of its matrices S. The number of these
     is `order` (None: unknown). `searched` lists the completed searches, and `undecided` the open questions.

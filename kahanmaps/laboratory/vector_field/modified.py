@@ -96,7 +96,7 @@ class ModifiedField(ResultPart):
         }
 
     def lines(self) -> list[str]:
-        """Return a line with tabs for each term of the series and each integral; a long polynomial gives its size."""
+        """Return a tab-separated line for each component and integral; long polynomials are replaced by their sizes."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):

@@ -108,7 +108,7 @@ def flow_polynomials(
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known_polynomials: dict[str, fmpq_mpoly] = {}
     # Factors of the right-hand sides come first: the search does not find a common factor of all of them, whose zeros
-    # are fixed points; and of infinitely many P of one degree, as for x' = x, y' = y, it lists none.
+    # are fixed points; and it leaves out the members of pencils, such as all linear P for x' = x, y' = y.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known_polynomials.setdefault(str(P), P)

@@ -36,7 +36,7 @@ _SPARE = 4  # points beyond the number of unknowns
 def casimir_candidates(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[tuple[str, RationalFunction]]:
-    """Yield pairs for functions of the integrals that may be Casimirs: a text in their names, the expanded function.
+    """Yield possible Casimirs, each as a text in the names of the integrals and as an expanded function.
 
     Args:
         laboratory: the reductions of the map modulo primes.
@@ -74,7 +74,7 @@ def casimir_candidates(
 def _find_products(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
 ) -> Iterator[RationalFunction]:
-    """Yield the products of powers of at least two integrals that are Casimirs."""
+    """Yield the Casimirs that are products of powers of at least two integrals."""
     p, rows = map_.prime, list[list[int]]()
     for _ in range(_SPARE + len(integrals)):
         values, fields = _evaluate_fields(map_, tensor, integrals)
@@ -101,7 +101,7 @@ def _find_products(
 def _find_polynomials(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """Yield a basis of the polynomials of degree at most 2 in the integrals that are Casimirs."""
+    """Yield a basis of the Casimirs that are polynomials of degree at most 2 in the integrals."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MAX_TERMS else 1
     powers = exponents_up_to(len(integrals), degree)[1:]
 
@@ -125,7 +125,7 @@ def _find_polynomials(
 def _find_fractions(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """Yield quotients of affine functions of the integrals that are Casimirs.
+    """Yield Casimirs that are quotients of affine functions of the integrals.
 
     With J = (1, I_1, ...) the quotient (u.J)/(v.J) is a Casimir if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
     w_ab = u_a v_b - u_b v_a. This is linear in w, and any two independent rows of w span the same plane as u and v.

@@ -6,7 +6,7 @@ point, hence irreducible over the algebraic closure. If curves of the pencil hav
 these components replaces the given one. Two generic curves of degree d of the pencil meet only in the base points, and
 are smooth outside of these, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives their intersection
 number at each base point. If it may exceed the squared multiplicity of the curves there, the point is blown up, and so
-are base points infinitely near to it, until the curves are separated. For all multiplicities m_i (hartshorne-1977, V.3)
+are base points infinitely near to it, until the curves are separated. All multiplicities m_i satisfy (ibid., V.3)
 
     sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
 
@@ -89,7 +89,7 @@ class Pencil:
     def motion(self, growth: Growth) -> str:
         """Return a sentence on the restriction of the map to the curves I = c, given the growth of the map's degrees.
 
-        Without a conclusion it is "". An automorphism of a curve of genus 1 is a translation or has finite order.
+        It is "" if nothing follows. An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
             return "the map has finite order, since such a curve has only finitely many automorphisms"

@@ -144,7 +144,7 @@ class PoissonSearch(Search):
     """The result of `find_poisson`: tensors up to `degree`, and the reason if there are none.
 
     All tensors up to the degree are combinations of the listed ones and of products of polynomial integrals with
-    tensors of lower degree. `pencil` is the verdict that all combinations of listed tensors are Poisson (None: none).
+    tensors of lower degree. `pencil` says whether all combinations of listed tensors are Poisson (None: not tested).
     """
 
     _parts, _noun = "tensors", ("tensor", "tensors")
