@@ -209,7 +209,7 @@ def orbit_profile(
 
     Returns:
         The `Profile`, measured. The search ends at `max_degree`, or when the codimension is dim - 1, so that orbits lie
-        on curves (dim if orbits close). With too many monomials or a spent budget it ends early and is not complete.
+        on curves (dim if orbits close). It ends early with too many monomials or a spent budget: `complete` is False.
 
     Raises:
         NoPoint: if orbits meet the singular set.

@@ -201,7 +201,7 @@ def integrals_in_iterates(
         required: the number of independent integrals at which the search stops, known ones included.
         independent: the gradients of the known integrals, on the first map of the laboratory.
         budget: no further basis is tried after the budget is spent.
-        progress: called with each basis before it is tried.
+        progress: called with the text of each basis in which spaces were found.
 
     Returns:
         A list of (formula in x, origin, "" for no factored form), a list of (ratio in iterates, origin), none verified

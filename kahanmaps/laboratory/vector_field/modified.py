@@ -134,7 +134,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         A `ModifiedField`, exact.
 
     Raises:
-        InputError: for an order that is odd or out of range, and for systems that are not quadratic.
+        InputError: for an order that is odd or out of range, and for systems that are not quadratic over Q.
 
     >>> result = modified("weierstrass", 2)
     >>> result.fields[2], result.hamiltonian[2]

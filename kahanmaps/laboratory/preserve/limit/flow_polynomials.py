@@ -215,7 +215,7 @@ class _Search:
         return reason
 
     def _search_modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
-        """Return coefficients of monic polynomials modulo the prime of a flow, and whether there are no others."""
+        """Return coefficients of monic Darboux polynomials modulo the prime of a flow, and whether these are all."""
         spaces_so_far: list[Vectors] = []
         for k in range(_LINES):
             spaces = _Line(flow, self.degree, self.support, self.known_polynomials.values()).spaces()

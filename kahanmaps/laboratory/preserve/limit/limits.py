@@ -212,11 +212,11 @@ def flow_and_map(
     """Compare the integrals of a Kahan map, or of a polarized map, with the integrals of its differential equation.
 
     Args:
-        search: the integrals of the map, for every eps.
+        search: the result of `find_integrals` for the map, with eps as a symbol.
         densities: the densities of the map, if known. If the flow preserves the limit of one of them, this limit
             replaces the density of the flow that the search finds.
-        flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
-            integrals of the map are already the largest possible number.
+        flow: the result of `find_integrals` for the flow. By default integrals of the flow are searched for up to a low
+            degree, unless the integrals of the map have n - 1 independent limits in dimension n.
         known: the number of integrals that the map is known to have, if `search` shows fewer.
         effort: the work of the search: each step above 1 doubles it, each step below halves it.
         progress: called with a sentence at each stage of the search.
@@ -331,7 +331,7 @@ def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit,
 def _find_limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
     """Compute the integrals of the flow to which integrals of a polarized map tend.
 
-    A point of such a map consists of several successive points x, x_1, ... of a method of order 2.
+    A point of such a map consists of several successive points x, x_1, ... of an orbit of a method of order 2.
 
     Along a smooth solution x_k = x + h_k f + h_k^2/2 f'f + O(eps^3) with h_k = 2 k eps. So the terms of numerator and
     denominator of an integral up to eps^2 are known. The limit is known if these contain both leading terms.

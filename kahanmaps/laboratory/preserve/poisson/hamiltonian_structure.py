@@ -249,8 +249,8 @@ class InheritedIntegrals:
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
         """Return row vectors with the same span as the gradients of all inherited integrals at a point x.
 
-        `map_` is the map of the system modulo a prime that divides none of its denominators. At an indeterminacy point
-        of the map only the affine integrals are included.
+        `map_` is the map of the system modulo a prime that divides no denominator of the system. At an indeterminacy
+        point of the map only the affine integrals are included.
         """
         assert isinstance(map_.map, KahanMap)
         field, n, free = GF(map_.prime), map_.dim, self.quotient.free
