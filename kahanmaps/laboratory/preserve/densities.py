@@ -50,7 +50,7 @@ _FIRST_POWER = CofactorProduct((1,), 1)  # of det dPhi
 
 @dataclass(frozen=True)
 class FoundDensity(FoundFunction):
-    """A denominator phi(x, eps) of an invariant volume form dx/phi, with its verdict; `product` is phi in factors."""
+    """A denominator phi(x, eps) of an invariant volume form dx/phi; `product` is phi in factored form, or empty."""
 
     function: RationalFunction
     verdict: Certainty
@@ -103,7 +103,7 @@ class DensitySearch(Search):
 
     @property
     def reason(self) -> str:
-        """Why the search ended without a density, or before the requested degree."""
+        """Why there is no density, or why the search ended before the requested degree; empty otherwise."""
         if self.shows_none:
             polynomials_text = f"no polynomial of degree at most {self.degree}"
             return f"{polynomials_text}, and no product of powers of known ones, is a density"
@@ -111,7 +111,7 @@ class DensitySearch(Search):
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
-        """The density to print: the shortest proved one, or else the shortest; integrals times it give all others."""
+        """A tuple of the density to print: the shortest proved one, or else the shortest; () without a density."""
         return tuple(sorted(self.densities, key=lambda phi: (phi.verdict is not Certainty.PROVED, len(phi.text)))[:1])
 
     @property
@@ -171,7 +171,7 @@ def find_densities(
 ) -> DensitySearch:
     """Search for densities phi: the map preserves the volume form dx/phi.
 
-    The result is a basis of the polynomials phi of the least degree, or a product of powers if there is no polynomial.
+    The result is a basis of the polynomials phi of the least degree, or a product of powers if no polynomial is found.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
@@ -179,16 +179,16 @@ def find_densities(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         flow: search for densities of the differential equation instead, div(f/phi) = 0.
-        max_degree: the largest degree of phi; by default at most 12, and as large as the number of unknowns allows.
-        integrals: the known integrals. If no other density is found, products of powers of their factors are tried. By
-            default the integrals are searched for in this case.
+        max_degree: the largest degree of phi; by default 12, or less if a phi would have too many unknown coefficients.
+        integrals: the known integrals. If the other searches find no density, products of powers of factors of the
+            integrals are tried. By default the integrals are searched for in this case.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
         on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. That there are no others up to a degree is
+        A `DensitySearch`; formulas are exact, proved or supported. That there are no other densities up to a degree is
         measured modulo primes, not proved.
 
     Raises:
@@ -231,7 +231,7 @@ def densities_of(
         product, anti_invariant = _find_product_density(laboratory, max_degree, next(budgets))
         products = () if product is None else (product,)
         on_result(DensitySearch(*laboratory.request, products, -1, UNFINISHED, period, anti_invariant, flow=flow))
-        # Reserve a share for the search for integrals, unless the caller gives them or a product is known already.
+        # Reserve a share for the search for integrals, unless the caller gives the integrals or a product is known.
         polynomial_budget = budget if integrals is not None or product is not None else next(budgets)
         densities, degree, reason = _search_polynomials(laboratory, product, max_degree, polynomial_budget, progress)
         are_unproved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
@@ -280,9 +280,9 @@ def _search_polynomials(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Search for polynomial densities; the `product` is the result unless a simpler density is found.
+    """Search for polynomial densities; a known `product` is the result unless a simpler density is found.
 
-    Returns the densities, the largest degree that was tried, and the reason for which the search ended.
+    Returns the densities, the largest degree that was tried, and the reason why the search ended too early ("": none).
     """
     dim = laboratory.map.dim
     last_degree = max_degree if max_degree is not None else _MAX_DEGREE
@@ -291,9 +291,9 @@ def _search_polynomials(
         budget,
     )
     if product is not None:
-        # With a product higher degrees are not needed, and the lower degrees get only a part of the budget.
+        # Degrees above that of a known product are not needed, and the other degrees get a third of the budget.
         degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
-    # If the space of a degree is 0, the spaces of lower degrees are 0: each degree tried doubles the monomials.
+    # The space of a degree contains those of lower degrees: try degrees with about twice as many monomials each time.
     degrees, tried_degree = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
         low_degrees = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
@@ -336,9 +336,9 @@ def _search_polynomials(
 def _find_product_density(
     laboratory: Laboratory, max_degree: int | None, budget: Budget, integrals: Sequence[FoundIntegral] = ()
 ) -> tuple[FoundDensity | None, FoundDensity | None]:
-    """Search for a density that is a product of powers of known polynomials; return (invariant, anti-invariant).
+    """Search for a phi that is a product of powers of known polynomials.
 
-    At most one of the two is not None.
+    Returns (phi, None) if dx/phi is invariant, (None, phi) if it is anti-invariant, (None, None) if no phi is found.
     """
     polynomials = [polynomial for I in integrals for polynomial in (I.function.numerator, I.function.denominator)]
     try:
@@ -357,7 +357,7 @@ def _find_product_density(
 def _certify(
     laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
 ) -> tuple[Certainty, Evidence]:
-    """Certify that dx/phi is invariant, by the lemma on Lotka-Volterra systems or as an identity."""
+    """Certify phi(x~) = factor det dPhi phi (None: 1), by the lemma on Lotka-Volterra systems or as an identity."""
     if laboratory.system is not None and not laboratory.flow:
         proof = product_density_invariant(laboratory.system, phi)
         if proof is not None:
@@ -388,6 +388,6 @@ def _find_hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
 
 
 def _compute_space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
-    """Compute the space of P of degree at most `degree` with P(x~) = det dPhi P(x), on the monomials of the model."""
+    """Compute all P of degree at most `degree` with P(x~) = det dPhi P(x), with monomials of the `model` if given."""
     sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
     return cofactor_space(sample, _FIRST_POWER, degree, model)

@@ -1,15 +1,15 @@
 """Hirota-Kimura bases: polynomial relations along orbits, modulo primes.
 
 For a set of polynomials phi_1, ..., phi_M the null space K(x) of the orbit of x consists of all vectors c such that
-sum c_j phi_j = 0 at every point of the orbit. Its reduced echelon basis depends on the orbit only, so that a
-coefficient that is not the same number for all orbits is an integral of the map. The rank of the gradients of the
-relations at a point of the orbit is the codimension of their variety, and the number of independent integrals that
-they show. All this is measured, modulo two primes, for two eps and several orbits, and proves nothing.
+sum c_j phi_j = 0 at every point of the orbit. The reduced echelon basis of K(x) depends on the orbit only. So an entry
+of the basis that is not the same number for all orbits is an integral of the map. The rank of the gradients of these
+relations at a point of the orbit is the codimension of the variety that they define, and the number of independent
+integrals that they show. All this is measured, modulo two primes, for two eps and several orbits, and proves nothing.
 
 `sparse_relations` writes out the relations of one degree: their monomials, numbers and integrals. It takes the reduced
 echelon basis of the null space with monomials of the highest degree first, and leaves out relations that relations of
-lower degrees imply. A coefficient that differs for two orbits is an integral, named c1, c2, ... Another coefficient is
-a number times a power of eps or, if no such number fits, a function of eps, named e1, e2, ...
+lower degrees imply. A coefficient that differs for two orbits is an integral, named c1, c2, ... Any other coefficient
+is a number times a power of eps or, if no simple number fits, a function of eps, named e1, e2, ...
 Source: petrera-pfadler-suris-2009.
 """
 
@@ -54,8 +54,8 @@ _SPARE = 8  # points beyond the number of unknowns; a wrong relation holds at ea
 MAX_UNKNOWNS = 1800  # monomials up to a degree
 MAX_INDEPENDENT = 800  # monomials that no relation of lower degree reduces; their elimination takes about a second
 _SETTLED_DEGREES = 4  # degrees that must be tried before a profile counts as settled
-_SPARE_BITS = 40  # a number must be shorter by this than a random residue modulo two primes, which has 122 bits
-_POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
+_SPARE_BITS = 40  # a number must have so many bits less than a random residue modulo two primes, which has 122 bits
+_POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # exponents of eps, in the order of the trials
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 
 
@@ -63,11 +63,11 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 class OrbitRelations:
     """The space of the polynomials up to a degree that vanish along one orbit; `dimension` is its dimension.
 
-    On the orbit, `independent` monomials are linearly independent. `form` is the reduced echelon form of the values of
-    the monomials in `exponents_up_to`. If multiples of leading monomials were left out, `form` has only the other
+    `independent` is the rank of the monomials on the orbit. `form` is the reduced echelon form of the values of the
+    monomials in `exponents_up_to`. If multiples of leading monomials were left out, `form` has only the other
     monomials, whose relations imply all relations. `leading` are the monomials that depend linearly on earlier ones;
-    all multiples of leading monomials are leading. `normals` is a basis of the span of the gradients at `point`.
-    `period` is the number of points of a closed orbit, otherwise None.
+    all multiples of leading monomials are leading. `normals` is a basis of the span of the gradients of the relations
+    at `point`, a point of the orbit. `period` is the number of points of a closed orbit, otherwise None.
     """
 
     form: nmod_mat
@@ -95,7 +95,7 @@ class Profile:
 
     `codimensions` are the codimensions of the varieties that these polynomials define, and `with_known` is the largest
     codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. `agree`
-    says whether all maps gave the same numbers, `complete` whether all requested degrees were tried, `cut` why not.
+    says whether all maps gave the same numbers. Unless `complete`, `cut` says why not all requested degrees were tried.
     """
 
     dim: int
@@ -139,10 +139,10 @@ def relations_on_orbit(
     """Compute the polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
     `rank_bound` is an upper bound of the number of independent monomials, if one is known: `rank_bound` points and a
-    few more suffice. For a generic point the rank of the rows grows until it is final: if all relations of the points 0
-    to k hold at the point k + 1, they hold one step later for the points 1 to k + 2, and so on. `leading` are the
-    leading monomials of relations of lower degrees; their proper multiples are dependent and left out. Raises NoPoint
-    if orbits meet the singular set.
+    few more suffice. On a generic orbit the rank of the values grows with each point until it is final: if all
+    relations of the points 0 to k hold at point k + 1, those of the points 1 to k + 1 hold at point k + 2, and so on.
+    `leading` are the leading monomials of relations of lower degrees; proper multiples of these are left out, since
+    they are dependent. Raises NoPoint if orbits meet the singular set.
     """
     exponents = exponents_up_to(map_.dim, degree)
     support = _indices_of_non_multiples(map_.dim, degree, leading)
@@ -154,7 +154,7 @@ def relations_on_orbit(
     new_leading = frozenset(exponents[support[k]] for k in free_columns)
     if row_rank > rank_bound or not leading <= new_leading:
         return relations_on_orbit(map_, degree)  # `rank_bound` or `leading` came from a special orbit
-    # The gradient of a relation: its dependent monomial minus a combination of independent ones, differentiated.
+    # A relation is a dependent monomial minus a combination of independent ones. Differentiate it at the point.
     count_work(len(exponents) / 2 + map_.dim * len(support) / 3)
     monomial_gradients = [[row[k] for k in support] for row in monomial_derivatives(point, degree, map_.prime)]
     pivot_gradients = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - row_rank) for row in monomial_gradients]
@@ -164,7 +164,7 @@ def relations_on_orbit(
 
 
 def _indices_of_non_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
-    """Return the indices in `exponents_up_to` of the monomials that are no proper multiples of any in `leading`."""
+    """Return the indices, in `exponents_up_to`, of the monomials that are not proper multiples of leading ones."""
     exponents = exponents_up_to(dim, degree)
     is_multiple: list[bool] = []  # of a leading monomial, or equal to one
     support = []
@@ -209,7 +209,7 @@ def orbit_profile(
 
     Returns:
         The `Profile`, measured. The search ends at `max_degree`, or when the codimension is dim - 1, so that orbits lie
-        on curves (dim if orbits close). With too many monomials or a spent budget it ends early and is not complete.
+        on curves (dim if orbits close). It ends early with too many monomials or a spent budget: `complete` is False.
 
     Raises:
         NoPoint: if orbits meet the singular set.
@@ -269,8 +269,8 @@ def orbit_profile(
 class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
-    `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
-    entries are integrals. `agree`: whether all orbits gave this `dimension`. `period` is the period if orbits close.
+    `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; if not, it
+    is an integral. `agree` says whether all orbits gave this `dimension`. `period` is the period if orbits close.
     """
 
     functions: tuple[str, ...]
@@ -385,7 +385,7 @@ def sparse_relations(
     """Return the relations of degree `degree` that lower degrees do not imply; None if orbits disagree.
 
     `maps` are two or more maps of one system, with different primes. Relations with more than `max_terms` terms are
-    left out. The integrals of all these relations are numbered from `first` on; equal ones share a name.
+    left out. The integrals in all these relations are numbered from `first` on; equal integrals have the same name.
     Raises NoPoint if orbits meet the singular set.
 
     Source: petrera-pfadler-suris-2009.
@@ -401,7 +401,7 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leading = []  # monomials: relations of lower degree with these leading monomials imply those of their multiples
+    leading = []  # monomials; a relation whose leading monomial is a multiple of one of these is implied
     if degree > 1:
         lower_exponents = _descending_exponents(maps[0].dim, degree - 1)
         leading = [
@@ -452,7 +452,7 @@ def _relation_basis(map_: ModularMap, degree: int) -> list[list[int]]:
 
 
 def _number_text(coefficient: int, other_coefficient: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """Return a coefficient, given modulo two primes, as a simple number times a power of eps, or None if it is not."""
+    """Return a coefficient, given modulo two primes, as a simple number times a power of eps; None if none fits."""
     for power in _POWERS:
         residues = [
             [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]

@@ -1,10 +1,10 @@
 """The search for integrals of a map in closed form, from the map alone.
 
-First comes a lower bound of the number of integrals: from theorems (hamiltonian_structure.py) and from the codimension
-of orbits, which is measured (hirota_kimura.py). Then the search looks for spaces of polynomials with a common cofactor
-modulo a prime (search.py); ratios of their elements are integrals. The coefficients are functions of eps and of the
-parameters that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py).
-Integrals that theorems give and the search missed are added. The search ends with formulas in iterates (iterates.py).
+Theorems (hamiltonian_structure.py) and the measured codimension of orbits (hirota_kimura.py) give lower bounds of the
+number of integrals. Then the search looks for spaces of polynomials with a common cofactor modulo a prime (search.py):
+ratios of elements of one space are integrals. The coefficients are functions of eps and of the parameters that stay
+symbols; they are interpolated, and every formula is verified as an identity (laboratory.py).
+Integrals that theorems give are added if the search missed them. Finally, formulas in iterates are tried (iterates.py).
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
-_SHOWN_TERMS = 500  # of numerator and denominator together, in a report
+_SHOWN_TERMS = 500  # of numerator and denominator together: longer formulas are not printed in a report
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
-_CONJUGATE_PRIMES = 4  # two conjugate pencils are rational modulo these and the first prime with probability 1/32
+_CONJUGATE_PRIMES = 4  # conjugate pencils are rational modulo the first and all of these primes with probability 1/32
 
 
 @dataclass(frozen=True)
 class FoundIntegral(FoundFunction):
-    """An integral I(x, eps), a function of (variables, symbols, eps), with the verdict on I(x~) = I(x)."""
+    """An integral I(x, eps), a function of (variables, symbols, eps), with the verdict on I(x~) = I(x), x~ = Phi(x)."""
 
     name: str
     function: RationalFunction
@@ -94,9 +94,9 @@ class FoundIntegral(FoundFunction):
 
 @dataclass(frozen=True)
 class TimeDependentIntegral(ResultPart):
-    """A time-dependent integral c^-n I(x) at the n-th point x of an orbit, with I(x~) = c I(x) and c independent of x.
+    """A time-dependent integral c^-n I(x), where x is the n-th point of an orbit: I(x~) = c I(x), c independent of x.
 
-    For a flow the time-dependent integral is exp(-c t) I(x), with I' = c I.
+    For a flow the time-dependent integral is exp(-c t) I(x) with I' = c I. `integral` is I, and `factor` is c.
     """
 
     name: str
@@ -130,9 +130,9 @@ class IntegralSearch(Search):
     """The result of `find_integrals`.
 
     `integrals`, `time_dependent` integrals and integrals `in_iterates`, whose formulas contain iterates of x, are
-    functionally independent together. `profile` holds the dimensions of the relations along orbits (measured).
+    together functionally independent. `profile` holds the dimensions of the relations along orbits (measured).
     `by_theorems` is the number of independent integrals that theorems give the Kahan map, at random values of the
-    symbols; `theorems` names these theorems (hamiltonian_structure.py). `reason` says what is missing and why; it is
+    symbols; `theorems` is a phrase on these (hamiltonian_structure.py). `reason` says what is missing and why; it is
     empty if nothing is missing. `period_at_values` is the period of the map at the values that the file gives the
     symbols, if orbits close there.
     """
@@ -182,7 +182,7 @@ class IntegralSearch(Search):
     def is_exact(self) -> bool:
         """Whether there are exactly `codimension` integrals; if not, this number is a lower bound.
 
-        Relations of higher degrees could show more integrals, unless orbits lie on curves (or close).
+        Relations of higher degrees could show more integrals, unless generic orbits fill curves or are finite.
         """
         dim, has_profile = self.profile.dim, bool(self.profile.nullities)
         is_closed = self.profile.period is not None or self.period_at_values is not None
@@ -294,11 +294,11 @@ def integrals_of(
 ) -> IntegralSearch:
     """Run `find_integrals` on the maps of a laboratory."""
     flow, seed = laboratory.flow, laboratory.request[3]
-    # The stages: orbits; fast searches and their formulas; products; larger relations and their formulas; iterates.
-    # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
+    # Shares of the stages: orbits; fast searches and formulas; products; larger relations and formulas; iterates. Work
+    # that a stage does not use goes to later stages, and no stage can use up the share of a later one.
     budgets = budget.share([3, 4, 1, 3, 3])
     collection = _IntegralCollection(laboratory, progress)
-    # The integrals that theorems give, for each map of the laboratory; without symbols all maps have the same.
+    # The integrals that theorems give, for each map of the laboratory; without symbols they are the same for all maps.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
         systems = {
@@ -313,7 +313,7 @@ def integrals_of(
         if not laboratory.defect:
             pairs = zip(inherited, laboratory.maps, strict=True)
             by_theorems = min(integrals.count(map_) for integrals, map_ in pairs)
-    # The map modulo the first prime with the values that the file gives to the symbols, if it gives any.
+    # The map modulo the first prime, at the values that the file gives to the symbols, if it gives values to all.
     map_at_values, values = None, [laboratory.file.parameters.get(name) for name in laboratory.symbols]
     if values and None not in values:
         prime = laboratory.maps[0].prime
@@ -353,13 +353,13 @@ def integrals_of(
         on_result(build_result(profile, UNFINISHED))
         share = next(budgets)
         cofactors = laboratory.cofactors()
-        # A vector field would have too many candidates; the polynomials of its cofactors suffice for most denominators.
+        # For a vector field, `candidates` would be too many; most denominators have no factors but these polynomials.
         factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, share)
         denominator_cofactors = denominators_among(factors, laboratory.map.dim)
 
         def quick_search(map_: ModularMap) -> SpaceSearch:
-            # On each map half of the remaining work: the other half is for the formulas.
+            # The search on each map gets half of the work that is left; the other half is for the formulas.
             return search_spaces(
                 map_, profile, cofactors, denominator_cofactors, budget=share.part(0.5), progress=progress
             )
@@ -437,11 +437,11 @@ def _interpolate_formulas(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
-    """Interpolate the ratios of the polynomials that a search found on the map `base_map`.
+    """Interpolate the ratios of the polynomials that a search on the map `base_map` found.
 
-    If their spaces may be conjugate over an extension of Q, `search_on` repeats the search on maps modulo other primes,
-    until there are no conjugate spaces. Returns the map and the search that were used, the formulas, and the reason why
-    there are no further formulas. Raises NoPoint.
+    If two spaces may be conjugate over an extension of Q, `search_on` searches again on maps modulo other primes, on
+    which conjugate spaces may not exist. Returns the map and the result of the search that were used, the formulas, and
+    the reason why there are no further formulas. Raises NoPoint.
     """
     if may_be_conjugate(result):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
@@ -476,10 +476,10 @@ class _IntegralCollection:
         self.in_iterates: list[IntegralInIterates] = []
 
     def add_formulas(self, formulas: Sequence[Formula]) -> None:
-        """Add the formulas that are independent of the collected ones and not refuted, short formulas first."""
+        """Add the formulas that are independent of the collected integrals and not refuted, short formulas first."""
 
         def sort_key(formula: Formula) -> tuple[int, int, list[list[int]]]:
-            """Return the sort key: size, then monomials. The order must not depend on the primes."""
+            """Return the sort key: size and monomials of the numerator. The order must not depend on the primes."""
             P = formula[0].numerator
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
@@ -509,7 +509,7 @@ class _IntegralCollection:
 
     @property
     def _has_limit(self) -> bool:
-        """Return whether the limit eps -> 0 is defined: for flows, and for maps of any eps that approximate a flow."""
+        """Whether a limit eps -> 0 is defined: for flows, and for maps that approximate a flow, if eps is a symbol."""
         laboratory = self._laboratory
         approximates_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return approximates_flow and laboratory.eps is None and laboratory.root is None
@@ -549,7 +549,7 @@ class _IntegralCollection:
             self._add(gradient, *formula[:2], Certainty.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
-        """Add products of powers of known polynomials, among them time-dependent integrals."""
+        """Add integrals and time-dependent integrals that are products of powers of known polynomials."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
         if budget.is_spent:
             self.skipped_searches.append(f"products of powers of known polynomials were not tried: {SPENT}")
@@ -575,7 +575,7 @@ class _IntegralCollection:
                 self.time_dependent.append(TimeDependentIntegral(name, integral, product.constant, laboratory.flow))
 
     def add_in_iterates(self, required: int, budget: Budget) -> None:
-        """Add integrals in iterates of x, and further integrals in x alone, until there are `required` of them."""
+        """Add integrals in iterates of x, and further ones in x alone, until `required` integrals are known in all."""
         laboratory = self._laboratory
         # Time-dependent integrals do not count here.
         self._gradients = IndependentGradients(laboratory.maps[0], [integral.function for integral in self.integrals])

@@ -1,10 +1,10 @@
 """Integrals whose formulas contain iterates x~, x~~, ...: coefficients of bilinear relations along orbits.
 
-The search looks modulo a prime for bilinear functions F_0, F_1, ... of (x, x^(k)) whose values along every orbit span a
-line or a plane (darboux_spaces.py), and interpolates these functions. For a line the ratios of the F are integrals, for
-a plane the ratios of 2 x 2 minors. The identity to be verified says that such a ratio I has the same value one step
-later. It is written with x in the middle of the orbit segment, as I(x, x~) = I(x_, x) with the preimage x_ of x. So it
-contains one step forward and one step backward instead of two forward, which keeps the expansion short.
+Let x^(k) be the k-th iterate of x. The search looks, modulo a prime, for functions F_0, F_1, ... that are bilinear in
+(1, x) and (1, x^(k)), and whose vectors (F_0, F_1, ...) along every orbit span a line or a plane (darboux_spaces.py).
+It interpolates these functions. For a line the ratios F_a/F_b are integrals, for a plane the ratios of 2 x 2 minors. It
+verifies that such a ratio I has the same value one step later. For k = 1 this identity is written I(x, x~) = I(x_, x),
+where x_ is the preimage of x: a step forward and a step backward have shorter formulas than two steps forward.
 
 If there are affine integrals v.x, the search runs on their level sets v.x = c, which have fewer coordinates, so that
 relations of a lower degree suffice. The values c are symbols of this search; in the results v.x replaces c. Source:
@@ -53,8 +53,8 @@ from kahanmaps.maps.implicit import MapFamily
 class RatioOfIterates:
     """A function I of an orbit segment: the ratio of two `functions` or, for rank 2, of two minors of them.
 
-    The functions F_a are polynomials in (variables, variables of the k-th iterate, symbols, eps), F_a~ is F_a one step
-    later. `numerator` and `denominator` are indices: one index a stands for F_a, two for F_a F_b~ - F_b F_a~.
+    The functions F_a are polynomials in (variables, variables of the k-th iterate, symbols, eps); F_a~ is F_a one step
+    later. `numerator` and `denominator` are tuples of indices: (a,) stands for F_a, (a, b) for F_a F_b~ - F_b F_a~.
     """
 
     two_point_basis: TwoPointBasis
@@ -68,7 +68,7 @@ class RatioOfIterates:
         return self.two_point_basis.shift + self.two_point_basis.rank
 
     def with_limit(self, count: int) -> RatioOfIterates:
-        """Normalize a ratio that tends to a constant as eps -> 0; the first `count` variables are coordinates."""
+        """Normalize I if it tends to a constant as eps -> 0; the first `count` variables of F_a are coordinates."""
         if self.two_point_basis.rank > 1:
             return self
         result = normalized(self.formula[0], count)
@@ -77,7 +77,7 @@ class RatioOfIterates:
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
-        """The ratio and, for rank 2, the definitions of the names F0, F1, ... that abbreviate functions in it."""
+        """The ratio and, for rank 2, pairs (name, function) for the names F0, F1, ... of functions in the ratio."""
         if self.two_point_basis.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         names_in_use = self.functions[0].context().names()
@@ -105,7 +105,7 @@ class RatioOfIterates:
     def numerator_and_denominator(
         self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]
     ) -> tuple[Any, Any]:
-        """Return numerator and denominator at successive points of an orbit, at the values of the symbols and eps."""
+        """Return numerator and denominator of I at successive orbit points, for `values` of the symbols and eps."""
         rows = [
             [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
             for x, iterate in zip(points, points[self.two_point_basis.shift :], strict=False)
@@ -122,7 +122,7 @@ class RatioOfIterates:
 
 @dataclass(frozen=True)
 class IntegralInIterates(LatexDisplay, ResultPart):
-    """An integral in the iterates of a point, with the verdict on its conservation."""
+    """An integral whose formula contains iterates of x, with the verdict on its conservation."""
 
     name: str
     ratio: RatioOfIterates
@@ -151,9 +151,9 @@ class IntegralInIterates(LatexDisplay, ResultPart):
 def verdict_on_ratio(
     laboratory: Laboratory, ratio: RatioOfIterates, too_long: set[int] | None = None
 ) -> tuple[Certainty, Evidence]:
-    """Decide whether I has the same value one step later, as an identity for the map of the laboratory.
+    """Decide whether the ratio has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of orbit segments whose identity was too long to expand; longer ones are not tried.
+    `too_long` collects the lengths of ratios whose identity was too long; at these and larger lengths none is expanded.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()
@@ -199,18 +199,18 @@ def integrals_in_iterates(
     Args:
         laboratory: the map.
         required: the number of independent integrals at which the search stops, known ones included.
-        independent: the known integrals, on the first map of the laboratory.
+        independent: the gradients of the known integrals, on the first map of the laboratory.
         budget: no further basis is tried after the budget is spent.
-        progress: called with each basis before it is tried.
+        progress: called with the text of each basis in which spaces were found.
 
     Returns:
-        Formulas in x and in iterates, not yet verified, each with its origin (formulas in x also with an empty text for
-        a factored form); and a sentence on what was skipped because the work limit was reached. Raises NoPoint.
+        A list of (formula in x, origin, "" for no factored form), a list of (ratio in iterates, origin), none verified
+        yet; and a sentence on what was skipped because the work limit was reached, else "". Raises NoPoint.
 
     Source: petrera-suris-2018.
     """
     independent = copy(independent)
-    independent.rows = list(independent.rows)  # so that the argument does not change
+    independent.rows = list(independent.rows)  # the argument `independent` must not change
     integrals_in_x, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     restriction = _restrict_map(laboratory)
     level_laboratory, replace_levels = (laboratory, None) if restriction is None else restriction
@@ -232,7 +232,7 @@ def integrals_in_iterates(
                 functions = [_bilinear_function(P, basis_with_rank, level_laboratory.map) for P in basis]
                 if replace_levels is not None:
                     functions = [replace_levels(F, basis_with_rank.shift) for F in functions]
-                # These ratios generate all ratios of the functions.
+                # These ratios generate all ratios of functions or, for rank 2, of minors.
                 candidates = [RatioOfIterates(basis_with_rank, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
                 if basis_with_rank.rank == 2:
                     pairs = [(index, k) for k in range(2, len(functions)) for index in (0, 1)]
@@ -251,7 +251,7 @@ def integrals_in_iterates(
 
 
 def _names_in_formulas(map_: MapFamily, shift: int) -> tuple[str, ...]:
-    """Return the names in formulas: variables, variables of the iterate, symbols, eps."""
+    """Return the names in formulas: variables, variables of the `shift`-th iterate, symbols, eps."""
     names = map_.variables
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
 
@@ -316,7 +316,7 @@ def _restrict_map(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mp
 
 
 def gradient_of(ratio: RatioOfIterates, exact_map: MapFamily, map_: ModularMap, point: Point) -> list[int]:
-    """Return a multiple of the gradient of the ratio in the first point, on a map modulo a prime."""
+    """Return, modulo the prime of `map_`, a multiple of the gradient of the ratio with respect to its first point x."""
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]
     eps = field.convert(map_.eps)

@@ -1,17 +1,17 @@
 """Integrals and densities of any degree that are products of powers of known polynomials, by lattices of exponents.
 
-For polynomials g_1, ..., g_r let C_i = g_i(x~)/g_i(x). A product g_1^k_1 ... g_r^k_r with exponents of either sign is
-an integral if C_1^k_1 ... C_r^k_r = 1, and the phi of an invariant volume form dx/phi if this product is det dPhi. If
-C_1^k_1 ... C_r^k_r is another number c, then c^-n times the product of the g at step n is a time-dependent integral.
+Let x~ = Phi(x) be the image of x, and P = g_1^k_1 ... g_r^k_r, with exponents of either sign. Then P(x~)/P(x) =
+C_1^k_1 ... C_r^k_r with C_i = g_i(x~)/g_i(x). If this quotient is 1, P is an integral. If it is det dPhi(x), dx/P is an
+invariant volume form. If it is another constant c, c^-n P(x_n) is a time-dependent integral of the orbits x_0, x_1, ...
 
-On a random line modulo a prime all C_i and det dPhi are quotients of polynomials in one variable. In terms of coprime
-polynomials, which are computed by gcds without a factorization, each C_i is a vector of integers. The exponents k for
-which the product of powers is constant form a lattice. Polynomials in x without a common factor have none on a random
-line, except with a probability of about degree^2/p. The constants c are functions of eps and the symbols; they are
-interpolated, and their multiplicative relations form a lattice again.
+On a random line modulo a prime p, all C_i and det dPhi are quotients of polynomials in one variable. These are products
+of powers of coprime polynomials, which gcds give without a factorization; so each C_i is a vector of integer exponents.
+The k with constant P(x~)/P(x) form a lattice. Polynomials in x without a common factor have none on a random line,
+except with a probability of about degree^2/p. The constants c are functions of eps and the symbols, and are
+interpolated. The exponents of the multiplicative relations between several c form a lattice again.
 
 The g_i need not be Darboux polynomials, unlike in celledoni-2019: for the Lyness map (x, y) -> (y, (a + y)/x), neither
-x nor y is a Darboux polynomial, and dx dy/(x y) is invariant. Source: celledoni-2019.
+x nor y is a Darboux polynomial, but dx dy/(x y) is invariant. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolate
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
-_BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
+_BUDGET = 5_000_000  # products of terms in the expansion of a Jacobi determinant
 _MAX_CANDIDATES = 60  # polynomials whose powers are multiplied
-_MAX_TERMS = 20_000  # of an expanded product
+_MAX_TERMS = 20_000  # monomials of an expanded product
 _DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that this exponent is small in reduced bases
 
 
 @dataclass(frozen=True)
 class Product:
-    """A product I of powers g^k of the `factors`, a function of (variables, symbols, eps); it may be empty.
+    """A product I of powers g^k for the pairs (g, k) in `factors`: a function of (variables, symbols, eps).
 
-    `constant` is c in I(x~) = c I(x), a function of the symbols and eps; it is 1 for an integral. For a density it is
-    the c in phi(x~) = c det dPhi(x) phi(x), 1 or -1, and for a time-dependent integral of a flow the c in I' = c I.
+    `constant` is the c in I(x~) = c I(x), a function of the symbols and eps; for an integral c = 1. For a density phi,
+    phi(x~) = c det dPhi(x) phi(x) with c = 1 or -1. For a time-dependent integral of a flow, I' = c I.
     """
 
     factors: tuple[tuple[fmpq_mpoly, int], ...]
@@ -84,9 +84,9 @@ class Product:
 
 @dataclass(frozen=True)
 class Products:
-    """The result of `products_of`: integrals, a density (None without one), and time-dependent integrals.
+    """The result of `products_of`: integrals, the denominator phi of an invariant dx/phi, time-dependent integrals.
 
-    Without a density, `density` may be an anti-invariant phi (constant -1), so that |dx/phi| is invariant.
+    If there is no such phi, `density` is an anti-invariant phi (constant -1; |dx/phi| is invariant) or None.
     """
 
     integrals: tuple[Product, ...]
@@ -100,8 +100,8 @@ def candidates(
     """Collect irreducible polynomials over Q in (variables, symbols, eps) as candidate factors of integrals.
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
-    factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the given `polynomials`. For a flow they are the Darboux polynomials that are found within the budget.
+    factors of Jacobi determinants); the factors of the Jacobi determinants of Phi and Phi^-1, if these can be expanded;
+    and the factors of the given `polynomials`. For a flow they are the Darboux polynomials found within the budget.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -114,7 +114,7 @@ def candidates(
 
 
 def _irreducible_factors(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
-    """Return the primitive irreducible factors that contain one of the first n variables; the keys are texts."""
+    """Return the primitive irreducible factors, at eps if it is given, that contain one of the first n variables."""
     factors: dict[str, fmpq_mpoly] = {}
     for P in polynomials:
         if eps is not None:
@@ -129,7 +129,7 @@ def _irreducible_factors(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | 
 
 @counted_cache(4)  # may take half a second; the searches for integrals and for densities call it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, has_map_itself: bool) -> dict[str, fmpq_mpoly]:
-    """Return the factors of numerator and denominator of det dPhi^-1 and, if `has_map_itself`, also of det dPhi."""
+    """Return the factors of the Jacobi determinant of Phi^-1 and, if `has_map_itself`, also of that of Phi."""
     n, fractions = map_.dim, list[Function]()
     for is_inverse in (False, True) if has_map_itself else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
@@ -144,10 +144,10 @@ def _jacobian_factors(map_: MapFamily, eps: fmpq | None, has_map_itself: bool) -
 
 
 class _Line:
-    """A random line modulo the prime of a map, and the image of the line.
+    """A random line modulo the prime of a map, and the image of the line, both parametrized by t.
 
-    Both have homogeneous coordinates (X : Z), polynomials in t without common factor. On the line, det dPhi is
-    `numerator` / (Z^n `denominator`), where Z belongs to the image. Raises NoPoint.
+    `line` and `image` hold homogeneous coordinates (X : Z), polynomials in t without a common factor. On the line,
+    det dPhi is `numerator`/(Z^n `denominator`), where Z is the last coordinate of `image`. Raises NoPoint.
     """
 
     def __init__(self, map_: ModularMap) -> None:
@@ -160,7 +160,7 @@ class _Line:
             self._apply(factor)
 
     def _apply(self, factor: ElementaryMap) -> None:
-        """Apply one factor of the map to the image; its Jacobi determinant is numerator Z^n / (denominator Z~^n)."""
+        """Replace `image` by its image under a factor of the map; multiply by the Jacobi determinant of the factor."""
         p, n, curve = self.prime, factor.dim, self.image
         map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
@@ -178,7 +178,7 @@ class _Line:
             denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
-        # The common factor is removed: its degree would multiply in each further map, and its zeros are no zeros of Z~.
+        # Remove the common factor: each further map would multiply its degree, and its zeros need not be at infinity.
         forms = _interpolate(homogeneous_image, n * map_degree * curve_degree, p)
         common_factor = reduce(nmod_poly.gcd, forms)
         self.image = [entry // common_factor for entry in forms]
@@ -196,7 +196,7 @@ class _Line:
         )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
-        """Evaluate g on a curve (X : Z): the numerator Z^deg(g) g(X/Z)."""
+        """Return Z^deg(g) g(X/Z), the numerator of g on a curve (X : Z), as a polynomial in t."""
         n, p = self.map.dim, self.prime
         field = GF(p)
         parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]
@@ -216,7 +216,7 @@ class _Line:
 def _interpolate(function: Callable[[int], list[int]], max_degree: int, p: int) -> list[nmod_poly]:
     """Return the polynomials of degree at most `max_degree` with the values `function(t)` at t = 1, 2, ...
 
-    Raises NoPoint if too many of these points are indeterminacy points.
+    Raises NoPoint if `function` raises SingularStep for too many t.
     """
     nodes, rows, t, failure_count = list[int](), list[list[int]](), 0, 0
     while len(nodes) <= max_degree:
@@ -232,7 +232,7 @@ def _interpolate(function: Callable[[int], list[int]], max_degree: int, p: int) 
 
 
 def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
-    """Return nonconstant coprime polynomials such that the given ones are products of powers of them, up to constants.
+    """Return nonconstant coprime polynomials; the given ones are constants times products of powers of these.
 
     >>> P, Q = nmod_poly([1, 1], 101), nmod_poly([2, 1], 101)
     >>> [B.degree() for B in coprime_base([P * P * Q, P * Q])]
@@ -298,7 +298,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
 
 
 def _reduce_basis(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
-    """Return a basis (LLL) of the lattice of the vectors, short if entry i of a vector is multiplied by weights[i]."""
+    """Return an LLL-reduced basis of the lattice of the vectors, where entry i of a vector counts weights[i] times."""
     if not vectors:
         return []
     reduced_rows = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
@@ -308,7 +308,7 @@ def _reduce_basis(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> l
 def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Products:
     """Find the products of powers of the polynomials that are integrals, time-dependent integrals or a density.
 
-    The exponents are computed modulo one prime, and the results are not verified. Raises NoPoint.
+    The exponents are computed modulo one prime. The products are not verified as identities. Raises NoPoint.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("lotka_volterra"))
@@ -319,7 +319,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     n, context, field = laboratory.map.dim, ring(laboratory.map.names), laboratory.field
     one, minus_one = (RationalFunction(context.constant(c), context.constant(1)) for c in (1, -1))
     if field is not None and laboratory.flow:
-        # For P with cofactor K: sum k K is 0 for integrals, div f for densities, free of x if time-dependent.
+        # With P_i' = K_i P_i, sum k_i K_i is 0 for integrals, div f for densities, free of x if time-dependent.
         gens = context.gens()
         cofactors = [
             field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
@@ -336,7 +336,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         return _build_products(polynomials, n, constant_one, [(one, constant_one)], time_dependent)
     line = _Line(laboratory.maps[0])
     values_on_line, values_on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
-    # det dPhi and the quotients C_i = g_i(x~)/g_i(x) on a random line, as vectors over a coprime base.
+    # det dPhi and the quotients C_i = g_i(x~)/g_i(x) on a random line, as vectors of exponents of a coprime base.
     base = coprime_base([*values_on_line, *values_on_image, line.image[-1], line.numerator, line.denominator])
     Z, N, M = (_exponents(P, base) for P in (line.image[-1], line.numerator, line.denominator))
     rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]
@@ -390,14 +390,14 @@ def _build_products(
     densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
     time_dependent: Sequence[tuple[list[int], RationalFunction]],
 ) -> Products:
-    """Build the result from exponent vectors.
+    """Build the result of `products_of` from vectors: the exponent of det dPhi, then those of the polynomials.
 
-    `constant_one` are the vectors with constant 1; `densities` are pairs of a constant, 1 or -1, and its vectors.
+    `constant_one` are the vectors with constant 1. `densities` are pairs of a constant 1 or -1 and a basis of vectors.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
     for v in (v for v in constant_one if v[0] == 0):
-        # Choose between I and 1/I: positive degree or, for degree 0, positive first exponent.
+        # Choose I or 1/I so that the degree is positive or, if it is 0, so that the first exponent is positive.
         degree = sum(k * d for k, d in zip(v, degrees, strict=True))
         integrals.append(v if (degree, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
 
@@ -414,7 +414,7 @@ def _build_products(
     density = None
     for constant, vectors in densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in vectors if abs(v[0]) == 1), None)
-        while vector is not None and density is None:  # multiply by integrals while this lowers the cost
+        while vector is not None and density is None:  # multiply phi by integrals while this lowers the cost
             neighbours = [_linear_combination((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
             best_neighbour = min(neighbours, key=cost, default=vector)
             if cost(best_neighbour) >= cost(vector):
@@ -429,7 +429,7 @@ def _build_products(
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:
-    """Interpolate the numbers that `constants` returns for a map, in the symbols and eps; None for each failure."""
+    """Interpolate the numbers `constants(map)` as functions of the symbols and eps; None where this fails."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
 
@@ -456,7 +456,7 @@ def _linear_combination(weights: Sequence[int], vectors: Sequence[Sequence[int]]
 
 
 def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:
-    """Return a basis over Z of all k with f_1^k_1 ... f_r^k_r = 1, for functions other than 0.
+    """Return a basis over Z of all k with f_1^k_1 ... f_r^k_r = 1, for nonzero `functions` f_1, ..., f_r.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> functions = [parse_rational_function(text, ["a"]) for text in ("-4*a^2", "2*a", "3", "-1")]
@@ -478,6 +478,6 @@ def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list
                     row[str(q)] = row.get(str(q), 0) + s * int(k)
         rows.append(row)
     keys = sorted({key for row in rows for key in row} | {"sign"})
-    # Signs matter modulo 2 only, by an additional row 2 * sign. The exponent of this row is dropped from the result.
+    # Signs matter modulo 2 only, so a row with the sign 2 is added. Its exponent is dropped from the result.
     exponent_rows = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
     return [vector[:-1] for vector in relations(exponent_rows)]

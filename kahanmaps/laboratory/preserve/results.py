@@ -1,4 +1,4 @@
-"""The part that the results of all searches for invariants share: the request, and the note on periodic orbits."""
+"""What the results of all searches for invariants have in common: the request, and the note on periodic orbits."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 
-_CLOSES_WITHIN = 64  # points of an orbit, about the number in a search for relations of a low degree
+_CLOSES_WITHIN = 64  # points of an orbit; a search for relations of a low degree uses about as many
 
 
 class FoundFunction(LatexDisplay, ResultPart):
-    """Base class of the functions that searches find: `function` is the formula, which can be called as I(x, eps)."""
+    """Base class of a function I that a search finds: `function` is its formula; I(x, eps) evaluates the formula."""
 
     function: RationalFunction
 
@@ -32,7 +32,7 @@ class FoundFunction(LatexDisplay, ResultPart):
 class Search(PrintableResult):
     """The request of a search: the system file, the symbols that formulas contain, and eps (None: a symbol as well).
 
-    With `flow` the search is for the differential equation, not its map. Random points are taken modulo the `primes`.
+    With `flow` the search is for invariants of the flow, not of the map. Random points are taken modulo the `primes`.
     """
 
     file: SystemFile
@@ -65,7 +65,7 @@ class Search(PrintableResult):
 
 
 def common_orbit_period(maps: Sequence[ModularMap]) -> int | None:
-    """Return the period of random orbits, one of each map; None if they differ or do not close within 64 points."""
+    """Return the period of a random orbit of each map; None if periods differ or an orbit has 64 or more points."""
     try:
         [*other_periods, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
     except NoPoint:
@@ -74,7 +74,7 @@ def common_orbit_period(maps: Sequence[ModularMap]) -> int | None:
 
 
 def closing_note(period: int | None, eps: fmpq | None, map_: MapFamily) -> str:
-    """Return the sentence on orbits that close after `period` steps at this eps (None: any); empty without a period.
+    """Return a sentence on orbits that close after `period` steps at this eps (None: every eps); "" without a period.
 
     >>> from kahanmaps.documents.catalog import load
     >>> closing_note(4, fmpq(1), load("weierstrass").map)

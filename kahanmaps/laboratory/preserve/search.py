@@ -2,13 +2,13 @@
 
 A search runs on one map: modulo a prime, at one eps, at one value of each symbol. It records the steps that gave a
 space: affine integrals, the relations of a degree, a product of cofactors. The steps are repeated on maps with other
-primes, eps and values of the symbols, which gives the coefficients of the same polynomials for an interpolation.
+primes, eps and values of the symbols. From the bases on these maps, the coefficients are interpolated.
 
 Interpolation needs the same space on every map. If two spaces have bases with the same zero pattern, a single map,
 modulo one prime and at one value of the symbols, does not determine which space is which. Take a coefficient w in which
-the spaces differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k), whose
-coefficients do not depend on the order of the spaces, so that they can be interpolated. A linear factor of chi over Q
-gives the coefficient w_i of one space as a function of the symbols and eps, and its value identifies this space on any
+the spaces differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k). The
+coefficients of chi do not depend on the order of the spaces, so they can be interpolated. A linear factor of chi over Q
+gives w_i for one space as a function of the symbols and eps. The value of this function identifies the space on any
 other map. A factor of higher degree belongs to spaces conjugate over an extension of Q, without formulas over Q.
 """
 
@@ -56,11 +56,11 @@ from kahanmaps.maps.kahan import KahanMap
 
 # The largest degree, by dimension, in the search for polynomials with a given cofactor.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
-_MAX_TERMS = 1000  # monomials of these polynomials
-SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # for a prime and values of the names
+_MAX_TERMS = 1000  # monomials of a polynomial in this search
+SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # arguments: a prime, values of `names`
 
 _SAMPLES = (150, 600, 3000)  # numbers of samples; all coefficients are tried with 150 before any is tried with 600
-_MAX_COEFFICIENTS = 6  # that are tried to distinguish spaces
+_MAX_COEFFICIENTS = 6  # the number of coefficients that are tried to distinguish spaces
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8  # points beyond the number of unknowns
 AFFINE = "v.x with v.f(x) = 0"
@@ -69,13 +69,13 @@ _SPARE_BITS = 20  # bits by which a fraction must be shorter than the fraction o
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one zero pattern that differ in the coefficient at `position`; for the i-th space it is `roots[i]`."""
+    """Spaces of one zero pattern; the basis of the i-th space has the entry `roots[i]` at `position` (row, column)."""
 
     position: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
     def in_order(self, spaces: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
-        """Return the spaces on a map in the order of the roots; None if two roots are equal there or one is missing."""
+        """Return the spaces in the order of the roots; None if two have the same entry on this map or one is absent."""
         field = GF(map_.prime)
         parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
         row, column = self.position
@@ -88,7 +88,7 @@ class Branches:
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
-    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None if there are none."""
+    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None if no v.x is an integral."""
     n, prime = map_.dim, map_.prime
     changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
     vectors = null_space(changes, n, prime)
@@ -106,7 +106,7 @@ def search_spaces(
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SpaceSearch:
-    """Search for spaces whose ratios give as many independent integrals as the profile shows, by fast methods only.
+    """Search by fast methods for spaces, until ratios of their elements give as many integrals as the profile shows.
 
     The fast methods are: affine integrals, relations along orbits whose span has a small dimension, polynomials with
     known cofactors, and numerators over known denominators. After the `budget` is spent, only affine integrals are
@@ -145,10 +145,10 @@ def add_relation_spaces(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> str:
-    """Add spaces contained in the span of the relations of a degree until they give as many integrals as orbits show.
+    """Search the spans of relations along orbits for spaces, until they give as many integrals as the profile shows.
 
-    Only degrees in which the relations of all orbits span at most `max_dimension` dimensions are tried. Returns a
-    sentence on the degrees that were skipped because the work limit was reached; empty otherwise.
+    Only degrees in which the relations of all orbits span at most `max_dimension` dimensions are tried. `result` gets
+    the spaces. Returns a sentence on the degrees that were skipped at the work limit, "" if none was skipped.
     """
     small_nullities = takewhile(lambda nullity: nullity < max_dimension, profile.nullities)
     for degree in [degree for degree, nullity in enumerate(small_nullities, 1) if nullity]:
@@ -178,8 +178,8 @@ def repeat_search(
 ) -> SpaceSearch | None:
     """Repeat the steps of a search on another map; return None if the spaces there have other zero patterns.
 
-    `reference` is the prime of the given search. Spaces with the same zero pattern are in any order unless `branches`
-    has an entry for them.
+    `reference` is the prime of the `original` search. Spaces of one step with the same zero pattern are in any order,
+    unless `branches` has an entry for them.
     """
     repeated = SpaceSearch(cofactors=original.cofactors)
     steps = list(zip(original.steps, original.spaces, strict=True))
@@ -198,8 +198,8 @@ def repeat_search(
             spaces = two_point_spaces(map_, step.two_point_basis)
         else:
             spaces = darboux_spaces(map_, step.degree, repeated.all_spaces) or []
-        # Sort as in the model: by zero pattern and, for equal patterns, by branches. There may be more spaces than in
-        # the model, see `may_be_conjugate`.
+        # Order the spaces as in `model`: by zero pattern and, for equal patterns, by branches. There may be more spaces
+        # than in `model`, see `may_be_conjugate`.
         by_pattern, step_branches, ordered_spaces = (
             group_by_pattern(spaces),
             branches.get(step_index, {}),
@@ -237,7 +237,7 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
 def _most_similar_spaces(
     spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
-    """Return for each model the space that shares most coefficients with it; conjugate spaces share none of them.
+    """Return, for each model, the space that has most coefficients in common with it; irrational ones never count.
 
     Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
@@ -260,7 +260,7 @@ def interpolate_bases(
 ) -> tuple[list[list[fmpq_mpoly]], str]:
     """Interpolate bases of all spaces as polynomials in (variables, symbols, eps).
 
-    `reference` is the prime of the search. Returns the bases and an empty text, or no bases and the reason.
+    `reference` is the prime of the search. Returns the bases and an empty text, or no bases and the reason why.
     """
     if repeat_search(result, laboratory.maps[1], reference) is None:
         return [], "the polynomials found at one eps do not exist at another"
@@ -310,10 +310,10 @@ def find_branches(
     budget: Budget,
     root: Root | None = None,
 ) -> Branches | None:
-    """Find a coefficient that distinguishes spaces of one zero pattern at every value of `names`.
+    """Find a coefficient that distinguishes spaces of one zero pattern on every map; `names` are the symbols and eps.
 
     `model` holds the spaces on one map; `spaces_at(prime, values)` returns the spaces on another map in any order, or
-    None at special values. Returns None if the spaces are conjugate over an extension of Q, or if the budget is spent.
+    None at special values. Returns None if the spaces are conjugate over an extension of Q, or at the work limit.
     """
     distinguishing_positions = [
         (i, k)

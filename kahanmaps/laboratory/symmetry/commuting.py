@@ -1,12 +1,12 @@
-"""Search for all quadratic systems g of a given shape whose Kahan maps commute with the Kahan map of f for every eps.
+"""Search for quadratic systems g of a given shape whose Kahan maps commute with that of a given f, for every eps.
 
-The search has three stages. First, the condition [f, g] = 0 gives a linear space of candidates. Second, the next terms
-of the commutator, in powers of eps, must vanish: these are polynomial equations on that space, solved over Q. Both
-conditions are necessary, so no solution is discarded. Third, every solution is certified as an identity in x and eps:
-proved, or supported at random points.
+The search has three stages. First, [f, g] = f' g - g' f = 0 gives a linear space of candidates g. Second, the next
+terms in eps of Phi_f o Phi_g - Phi_g o Phi_f must vanish, where Phi_f and Phi_g are the Kahan maps: these are
+polynomial equations on the space, solved over Q. Both conditions are necessary, so no solution is discarded. Third,
+that Phi_f and Phi_g commute is certified for every solution g: it is proved, or supported at random points.
 
 A quadratic system f in n variables over a number field K of degree m is also a quadratic system in n m variables over
-Q, with the same Kahan map (docs/beyond.md). So the solutions g over K are among the rational solutions of this system.
+Q, with the same Kahan map (docs/beyond.md). So all g over K are among the rational solutions for the larger system.
 """
 
 from __future__ import annotations
@@ -53,19 +53,19 @@ from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
-ORDERS = (4, 6, 8)  # powers of eps in the commutator; equations at odd powers follow from lower ones
+ORDERS = (4, 6, 8)  # powers of eps in the commutator; equations at an odd power follow from those at lower powers
 MAX_MESSAGES = 6  # messages on equations that were not solved
-# By default all quadratic g are tried first. The limit of work for this does not depend on the effort, so that all
-# commands choose the same shape; usually a few hundredths of it suffice.
+# By default the shape "quadratic" is tried first. The work limit of this attempt does not depend on the effort, so that
+# all commands choose the same shape; usually a few hundredths of the limit suffice.
 QUICK_DIMENSION, QUICK_UNITS = 3, 1e6
-MAX_SPACE = 24  # dimension l: the cubic equations have up to C(l + 2, 3) + l terms
+MAX_SPACE = 24  # dimension l of the space of candidates: the cubic equations have up to C(l + 2, 3) + l terms
 
 
 @dataclass(frozen=True)
 class CommutingField(ResultPart):
-    """A system g whose Kahan map commutes with that of f, the verdict, and the matrix B with g = B f if required.
+    """A `system` g whose Kahan map commutes with that of f; `finding` has the verdict on this.
 
-    `trivial` is "0", "f" or "-f" if g is one of these, else empty.
+    `B` is the matrix with g = B f (None for the shape "quadratic"). `trivial` is "0", "f" or "-f" for these g, else "".
     """
 
     system: QuadraticSystem
@@ -89,7 +89,7 @@ class CommutingField(ResultPart):
 
 @dataclass(frozen=True)
 class CommutingFamily(ResultPart):
-    """A linear family of solutions g: `base` + sum t_i `directions[i]`, for all values of the parameters t."""
+    """A linear family: g = `base` + sum t_i `directions[i]` is a solution for all values of the parameters t_i."""
 
     base: CommutingField
     directions: tuple[CommutingField, ...]
@@ -97,7 +97,7 @@ class CommutingFamily(ResultPart):
 
     @property
     def text(self) -> str:
-        """The base and the directions."""
+        """The formula of g with the parameters t1, t2, ..."""
         terms = [self.base, *self.directions]
         texts = [f"{f't{k}*' if k else ''}({', '.join(g.rhs)})" for k, g in enumerate(terms)]
         return " + ".join(texts)
@@ -116,9 +116,9 @@ class CommutingFamily(ResultPart):
 class CommutingSystems(PrintableResult):
     """The quadratic g whose Kahan maps commute with that of f; if `complete`, there are no others of this shape.
 
-    `dimension` is the dimension of the space of all g with [f, g] = 0; `irrational` describes solutions that are not
-    rational; `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True for
-    f = 0, and then no g is listed; `undecided` has a message on each open question.
+    `basis` and `dimension` describe the space of all g of this shape with [f, g] = 0. `irrational` describes solutions
+    that are not rational; `discarded` counts solutions of the equations whose maps do not commute. `every_g_commutes`
+    is True if f = 0 and the shape is "quadratic"; then only g = 0 is listed. `undecided` lists the open questions.
     """
 
     _parts, _noun = "nontrivial", ("commuting system", "commuting systems")
@@ -144,7 +144,7 @@ class CommutingSystems(PrintableResult):
 
     @property
     def kind_text(self) -> str:
-        """A phrase for the fields g among which the search ran."""
+        """A phrase for the set of fields g that was searched."""
         field_text = f" over the number field of a {self.root}" if self.root else ""
         if self.shape == "linear":
             return f"fields g = B f (B a constant {'matrix' if field_text else 'rational matrix'}{field_text})"
@@ -195,7 +195,7 @@ def commuting_systems(
     Args:
         system: f, a quadratic system over Q.
         shape: "linear" for g = B f with a constant matrix B; "quadratic" for any g of degree at most 2; None for
-            "quadratic" if the dimension is at most 3 and a short search finds all g, else "linear" with a `note`.
+            "quadratic" if the dimension is at most 3 and a short search finds all g, otherwise for "linear".
         seed: the random seed.
         error_bits: a supported solution is wrong with a probability below 2^-error_bits.
         effort: each increase by 1 doubles the work limit.
@@ -237,7 +237,7 @@ def commuting_systems(
 
 @dataclass
 class _Search:
-    """A search for g in a `space` with [f, g] = 0; `points` and `families` are the solutions of equations so far."""
+    """A search in the `space` of g with [f, g] = 0; `points` and linear `families` are the solutions so far."""
 
     f: QuadraticSystem
     settings: Settings
@@ -271,7 +271,7 @@ class _Search:
             result.dimension = len(result.basis) if len(result.basis) == self.space.dimension else None
             dimension = self.space.dimension
             all_fields = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
-            # If f is affine, the space may be large, and often all its g commute: this is proved without equations.
+            # For affine f the space may be large, but the lemma of affine maps often proves that each g is a solution.
             if (
                 result.dimension is not None
                 and f.degree <= 1
@@ -312,7 +312,7 @@ class _Search:
         self.on_result(replace(result, **copied_lists, undecided=[*result.undecided, UNFINISHED]))
 
     def _solve(self, region: SolutionComponent, order_index: int) -> None:
-        """Solve the equations of order `ORDERS[order_index]` on a region of the space."""
+        """Solve the equations up to eps^ORDERS[order_index] on a region: a set of solutions of a lower order."""
         order, result = ORDERS[order_index], self.result
         self.settings.progress(f"equations at eps^{order}, {len(region.free)} unknowns")
         result.order = max(result.order, order)
@@ -320,8 +320,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, region.values, order, rng, self.budget)
         equations = [*region.equations, *(normal_form(p, region.equations) for p in equations)]
         gens = region.values[0].context().gens()
-        # New coordinates in which each equation has few unknowns. They are used at the first order only: regions of
-        # later orders have further equations, which would have to be transformed as well.
+        # T gives coordinates in which each equation has few unknowns. They are used at the first order only: regions
+        # of later orders have equations of their own, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and order_index == 0:
             zero = gens[0].context().constant(0)
@@ -372,11 +372,11 @@ class _Search:
         if finding.verdict is Certainty.UNDECIDED:
             self.result.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
             return
-        # A family of a higher order, which is found later, may contain earlier families.
+        # A family that solves the equations of a higher order is added later, and may contain earlier families.
         kept_indices = [k for k, known_family in enumerate(self.families) if not family.contains(known_family)]
         self.families = [*(self.families[k] for k in kept_indices), family]
         self.result.families = [self.result.families[k] for k in kept_indices]
-        # Reduce the directions, and take as the base the member that is zero at their pivots.
+        # Reduce the directions to echelon form, and take as the base the member with the entry 0 at each pivot.
         direction_matrix, _ = fmpq_mat([family.direction(i) for i in family.free]).rref()
         base = list(family.point)
         for row in direction_matrix.tolist():
@@ -407,8 +407,8 @@ def find_commuting(
     """Find all quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.
 
     `system` is f or its Kahan map, possibly with an algebraic number; the other arguments are those of
-    `commuting_systems`. Over a number field only g = B f are searched unless the shape is "quadratic"; the right-hand
-    sides of g then contain the root, and B is not returned.
+    `commuting_systems`. Over a number field the default shape is "linear" (g = B f); the right-hand sides of g contain
+    the algebraic number, and B is not returned.
     Raises InputError for maps that are no Kahan maps, and in the cases in which `commuting_systems` raises it.
 
     >>> from kahanmaps.documents.inline import System
@@ -431,14 +431,14 @@ def find_commuting(
     gens = ring((*f.variables, GENERATOR)).gens()
     over_t = QuadraticSystem(tuple(p.compose(*gens, ctx=gens[0].context()) for p in f.rhs), (GENERATOR,))
     m, times_t = map_.root.degree, map_.root.number_field.generator.matrix
-    C = fmpq_mat(f.dim * m, f.dim * m)  # the matrix of x -> t x over Q
+    C = fmpq_mat(f.dim * m, f.dim * m)  # the matrix, over Q, of multiplication by the algebraic number t
     for k, i, j in itertools.product(range(f.dim), range(m), range(m)):
         C[k * m + i, k * m + j] = times_t[i, j]
     *x, a = ring((*f.variables, *f.symbols)).gens()
     rational_point = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
 
     def descend(G: QuadraticSystem) -> QuadraticSystem:
-        """Return the system over the number field that a system over Q represents, from its values at points of Q^n."""
+        """Return the system over the number field that G represents, from the values of G at points of Q^n."""
         coordinates = [p.compose(*rational_point, ctx=a.context()) for p in G.rhs]
         rhs = (sum((coordinates[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
         return QuadraticSystem(tuple(rhs), f.symbols)

@@ -2,11 +2,11 @@
 
 The lemmas are the splitting lemma of checks/theorems.py and the following two; all hypotheses are verified exactly.
 
-affine       One of the fields, with linear part B, is affine. Its Kahan map is affine, x -> P x + q, and commutes with
-             the map of the other field g for every eps if P g(x) = g(P x + q). Times det(I - eps B)^2 this is an
-             identity of degree at most 2n in eps, so it is tested at 2n + 1 values of eps. It is linear in g.
+affine       One of the fields is affine, with linear part B. Its Kahan map x -> P x + q commutes with the map of the
+             other field g if P g(x) = g(P x + q). This equation is linear in g. Multiplied by det(I - eps B)^2 it has
+             degree at most 2n in eps, so it holds for every eps if it holds at 2n + 1 values of eps.
 dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M with M = [[b, 2c], [-2a, -b]]. Since M is
-             linear in the field, proportional fields have commuting maps.
+             linear in the field, the matrices of proportional fields commute.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ _FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
 def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
     """Certify that the Kahan maps of f and g commute at equal eps, for every eps.
 
-    Uses `settings.seed` and `settings.error_bits`. The finding is proved, refuted with a witness, or supported with a
-    bound on the probability of error. Source: schwartz-1980.
+    `settings` has the random seed and `error_bits`. The finding is proved, refuted with a witness, or supported with
+    the probability of error below 2^-error_bits. Source: schwartz-1980.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2 + x"])
     >>> str(certify_field(f, f.scaled(-1), Settings()).verdict), str(certify_field(f, f.scaled(2), Settings()).verdict)
@@ -56,7 +56,7 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
 
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
-    """Certify that the Kahan maps of f and of every member of a linear family commute, for every eps."""
+    """Certify that the Kahan maps of f and of every g of a linear family in the space commute, for every eps."""
     count_work(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.direction(i)) for i in family.free)]
     proof = proof_by_affine_lemma(f, members) or _proof_in_dimension_one(f, f)
@@ -65,7 +65,7 @@ def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionCo
 
 
 def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
-    """Return evidence by the lemma of affine maps if f or the only g is affine and the lemma applies; else None."""
+    """Return evidence by the lemma of affine maps for f and all g in `fields`; None if the lemma does not apply."""
     if f.degree <= 1:
         name, pairs = "f", [(f, g) for g in fields]
     elif len(fields) == 1 and fields[0].degree <= 1:
@@ -98,7 +98,7 @@ def _proof_in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence 
 
 
 def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent) -> Identity:
-    """State commutativity as an identity in x, the free parameters and eps."""
+    """Return the identity Phi_f o Phi_g = Phi_g o Phi_f in x, eps and the free parameters of the family of g."""
     n, free_indices = f.dim, family.free
     zero = family.values[0].context().constant(0)
     coefficients = combination(space.fields, family.values, zero)

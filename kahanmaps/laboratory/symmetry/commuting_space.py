@@ -1,13 +1,13 @@
-"""The quadratic fields g whose flow commutes with that of f: [f, g] = f' g - g' f = 0, exact linear algebra over Q.
+"""The space of quadratic g with [f, g] = f' g - g' f = 0, by exact linear algebra over Q, and equations on this space.
 
-If the Kahan maps of f and g commute for every eps, the bracket vanishes, since it is the first term of the commutator
-in eps. So the space of these g contains every system whose Kahan map commutes with that of f.
+If the Kahan maps Phi_f and Phi_g of f and g commute for every eps, the bracket [f, g] vanishes, since it is the first
+term in eps of their commutator. So the space contains every g whose Kahan map commutes with that of f.
 
-Further equations for a g = b_1 g_1 + ... + b_l g_l of this space follow. At a fixed rational point x both maps are
-power series in eps whose coefficients are polynomials in b, and so is the difference Phi_f(Phi_g(x)) -
-Phi_g(Phi_f(x)): each of its coefficients must vanish. The first coefficient, at eps^2, is the bracket. The Kahan map is
-the flow over the time h = 2 eps of the field f + h^2 f_2 + ..., f_2 = f'f'f/12 - f''(f, f)/6. So, if the bracket
-vanishes, the next equations, at eps^4, are cubic in b: [f_2, g] + [f, g_2] = 0.
+Let g = b_1 g_1 + ... + b_l g_l for a basis g_1, ..., g_l of the space. At a fixed rational point x the commutator
+Phi_f(Phi_g(x)) - Phi_g(Phi_f(x)) is a power series in eps whose coefficients are polynomials in b. All of them must
+vanish. The first one, at eps^2, is a multiple of the bracket. The Kahan map is the flow over the time h = 2 eps of the
+field f + h^2 F + ... with F = f'f'f/12 - f''(f, f)/6. Let G be the same expression in g. If the bracket vanishes, the
+next equations, at eps^4, are cubic in b: [F, g] + [f, G] = 0.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
 MAX_DIMENSION = 100  # of a space whose basis is stored and verified
-MAX_UNKNOWNS = 900  # a square matrix of this size takes seconds
+MAX_UNKNOWNS = 900  # the null space of a square matrix of this size takes seconds
 
 # A vector of power series in eps: series[k][i] is the coefficient of eps^k in coordinate i.
 Series = list[list[Any]]
 
 
 def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
-    """Return for each component the coefficients of x_j x_k (j <= k), of x_j, and the constant, in this order.
+    """Return, for each component of the system, the coefficients of x_j x_k (j <= k), those of x_j, and the constant.
 
     >>> coefficients_of(QuadraticSystem.from_text(["x", "y"], ["x*y", "x - 2"]))
     [[0, 1, 0, 0, 0, 0], [0, 0, 0, 1, 0, -2]]
@@ -46,7 +46,7 @@ def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
 
 
 def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> QuadraticSystem:
-    """Return the system with these coefficients; this is the inverse of `coefficients_of`.
+    """Return the system whose components have the coefficients `rows`: the inverse of `coefficients_of`.
 
     >>> print(system_of(["x"], [[fmpq(1), fmpq(0), fmpq(-3)]]))
     x' = x^2 - 3
@@ -79,11 +79,11 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Return polynomials in b that vanish if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
+    """Return polynomials that vanish if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
 
-    `weights` are polynomials in b. The result, exact and linearly independent, consists of coefficients of eps^2, ...,
-    eps^order of the commutator at small random integer points. Points are added until two successive ones give no new
-    equation or the `budget` is spent. Source: kahan-1993.
+    `weights` are polynomials in unknowns b. The returned polynomials in b are an exact basis of the span of the
+    coefficients of eps^2, ..., eps^order of the commutator at small random integer points. Points are added until two
+    successive points give no new equation or the `budget` is spent. Source: kahan-1993.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -107,7 +107,7 @@ def commutator_equations(
 
 
 class _SeriesMap:
-    """The Kahan map of a field given by its coefficients (numbers, or polynomials in b), on power series in eps."""
+    """The Kahan map of a field, for power series in eps; `rows` has its coefficients (numbers or polynomials in b)."""
 
     def __init__(self, rows: Sequence[Sequence[Any]], n: int) -> None:
         # With 1 as an additional coordinate all terms are quadratic.
@@ -141,9 +141,9 @@ class _SeriesMap:
 
 @dataclass(frozen=True)
 class CommutingSpace:
-    """A basis of all g with [f, g] = 0, f itself first; `matrices` are the B with g = B f (shape linear), else empty.
+    """A basis of all g with [f, g] = 0, f first; `matrices` has the B with g = B f, () for the shape "quadratic".
 
-    If the components of f are linearly dependent, B is not unique, and `matrices` has one of them. If `dimension`
+    If the components of f are linearly dependent, B is not unique, and `matrices` has one B for each g. If `dimension`
     exceeds the number of fields, the space is too large: `dimension` is then an upper bound, and f is the only field.
     """
 
@@ -161,9 +161,9 @@ def unknowns(system: QuadraticSystem, shape: str) -> int:
 def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
     """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"); exact.
 
-    f is not 0. With a matrix C such that C f' = f' C, only the g with C g' = g' C are computed.
+    f must not be 0. With a matrix C such that C f' = f' C, only the g with C g' = g' C are computed.
 
-    The conditions are taken at random integer points, and the result is verified as an identity of polynomials.
+    [f, g] = 0 is solved at random integer points, and verified as an identity of polynomials for each solution g.
     Source: petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "2*y^2"])
@@ -182,7 +182,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
         while len(rows) < row_count + 2 * n:
             point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
             value, jacobian = over_Q.value(point), over_Q.jacobian(point)
-            # For each scalar function phi that is multiplied by an unknown: phi(x) and its derivative along f.
+            # g is a combination of fields phi e_k. For each function phi: its value and its derivative along f.
             if shape == "linear":
                 derivatives = (sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0)) for j in columns)
                 scalars = [*zip((value[j] for j in columns), derivatives, strict=True)]
@@ -251,7 +251,7 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
 
 
 def _independent_components(f: QuadraticSystem) -> list[int]:
-    """Return the indices of the first components of f that span all components."""
+    """Return the indices of a basis of the span of the components of f: each one extends the basis of earlier ones."""
     reduced_matrix, rank = fmpq_mat(coefficients_of(f)).transpose().rref()
     return [next(j for j in range(f.dim) if reduced_matrix[i, j] != 0) for i in range(rank)]
 

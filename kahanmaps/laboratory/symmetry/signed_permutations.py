@@ -1,12 +1,12 @@
-"""Search for generalized permutation matrices S, with one entry in each row and column, as linear parts of symmetries.
+"""Search for linear parts S of symmetries that have exactly one nonzero entry in each row and each column.
 
-With (S x)_{p(i)} = s_i x_i the condition f(S x) = sign S f(x) is a set of equations between single coefficients. Take
-scaled variables y_i = e_i x_i, e_i > 0, for which the logarithms of the coefficients have the least sum of squares. In
-these the s_i are 1 or -1: S maps the scaling to one with the same property, and there is only one such scaling, up to
-scalings that do not change f. So the search is for signed permutations that preserve the scaled coefficients, whose
-logarithms are rational combinations of logarithms of coprime integers. An S that is not rational in x is dropped.
+Let (S x)_{p(i)} = s_i x_i with a permutation p. Each equation from f(S x) = sign S f(x), sign = 1 or -1, relates only
+two coefficients of f. Take variables y_i = e_i x_i, e_i > 0, for which the logarithms of the absolute values of the
+coefficients have the least sum of squares. S maps such scales e to scales with the same property, and these are unique
+up to scalings that do not change f. So in the variables y each s_i is 1 or -1: S is a signed permutation. Logarithms of
+coefficients in y are rational combinations of logarithms of coprime integers. An S that is not rational is dropped.
 
-The search is a backtracking over images of the variables, and drops a choice at the first equation that fails.
+The search is a backtracking over images of the variables; it drops a partial permutation if one equation fails.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ MAX_FOUND = 1_000  # in dimension 6 there are 720 permutations
 def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[list[fmpq_mat], bool]:
     """Search for S with f_2(S x) = sign S f_2(x), where f_2 are the quadratic terms, or for affine f the linear terms.
 
-    Exact. If infinitely many S differ by scalings that do not change f_2, only the signed permutations for one scaling
-    of the variables are returned: for the given variables, if there are any. Returns the matrices, and whether the
-    list is complete: the search stops after 1000 matrices, and when the `budget` is spent.
+    Exact. If scalings of the variables do not change f_2, there are infinitely many S. Then only the signed
+    permutations of one choice of scaled variables are returned; those of the given variables are among them. Returns
+    the matrices and whether the list is complete: the search stops after 1000 matrices or when the `budget` is spent.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "4*y^2 + 1"])
     >>> [S.tolist() for S in signed_permutations(f, 1, Budget())[0]]
@@ -41,10 +41,10 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     n, size = f.dim, 2 if f.degree <= 1 else 3
     forms = [f.B] if size == 2 else f.Q
     entries = (((i, j, k)[-size:], form[j, k]) for i, form in enumerate(forms) for j in range(n) for k in range(n))
-    # The keys are the component of f, then the variables of the monomial.
+    # A key holds the index of the component of f, then the indices of the variables of the monomial.
     coefficients = {index: value for index, value in entries if value != 0}
-    # The scales e_i are products of powers of coprime integers b, with the exponents `scales`. In y_i = e_i x_i the
-    # coefficient has the logarithm log |c| + row . log e, with e the shortest least-squares solution.
+    # e_i is the product of the coprime integers of `base` with exponents `scales[i]`. In y_i = e_i x_i a coefficient c
+    # gets the logarithm log |c| + row . log e, where row is a row of M; log e is the shortest least-squares solution.
     base = _coprime_base(integer for c in coefficients.values() for integer in (abs(c.p), c.q))
     logarithms = [[fmpq(_exponent(c.p, b) - _exponent(c.q, b)) for b in base] for c in coefficients.values()]
     scales = [[fmpq(0)] * len(base) for _ in range(n)]
@@ -80,7 +80,7 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
 
 
 def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
-    """Return pairwise coprime integers > 1, no perfect powers, such that all given ones are products of powers."""
+    """Return coprime integers > 1, none a perfect power, such that the given integers are products of their powers."""
     remaining_integers, base = list(integers), list[fmpz]()
     while remaining_integers:
         number = remaining_integers.pop()
@@ -100,7 +100,7 @@ def _coprime_base(integers: Iterable[fmpz]) -> list[fmpz]:
 
 
 def _exponent(number: fmpz, b: fmpz) -> int:
-    """Return the exponent of b in a number."""
+    """Return the largest k such that b^k divides the number."""
     count = 0
     while number % b == 0:
         number, count = number // b, count + 1
@@ -110,9 +110,9 @@ def _exponent(number: fmpz, b: fmpz) -> int:
 def _search_signed_permutations(
     numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
-    """Yield the signed permutations that preserve a table of numbers, as images and signs; None at the work limit."""
+    """Yield lists of (image, sign) that map the table of `numbers` to `sign` times itself; None at the work limit."""
     size = len(next(iter(numbers), (0, 0)))
-    # For each variable the equations that contain it and no later variable. Those that fail most often come first.
+    # For each variable the equations with it and no later variable, as indices; those with a coefficient come first.
     equations = [
         sorted(
             (index for index in product(range(last + 1), repeat=size) if max(index) == last and index[1] <= index[-1]),

@@ -1,10 +1,10 @@
 """Linear and affine symmetries of a Kahan map, and its reversing symmetries.
 
-Kahan's method is equivariant under affine changes of variables. So an affine T(x) = S x + r with f(T(x)) = S f(x) is a
-symmetry, T Phi T^{-1} = Phi, and a T with f(T(x)) = -S f(x) is a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for
-every eps. Conversely, the term of first order in eps of these relations gives the equations for f. The equations are
-identities of polynomials of degree 2, verified exactly for each coefficient: every reported symmetry is proved.
-`searched` lists the searches that were completed.
+Let Phi be the Kahan map of x' = f(x), and T(x) = S x + r. Kahan's method is equivariant under affine changes of
+variables. So T is a symmetry (T Phi T^{-1} = Phi for every eps) if f(T(x)) = S f(x), and a reversing symmetry
+(T Phi T^{-1} = Phi^{-1} for every eps) if f(T(x)) = -S f(x). Conversely, the terms of first order in eps of these
+relations give the equations for f. Both sides of these equations are polynomials in x, whose coefficients are compared
+exactly: every reported symmetry is proved.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutation
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
-MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
+MAX_LINEAR = 16  # dimension n up to which infinitesimal symmetries are computed, with n^2 + n + 1 unknowns
 MAX_LISTED = 200  # symmetries of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
 SIGNED, SCALED = "signed permutations", "signed permutations of scaled variables"
@@ -39,7 +39,7 @@ MATRICES = "rational matrices"
 
 @dataclass(frozen=True)
 class Symmetry(ResultPart):
-    """An affine T(x) = S x + r with T Phi T^{-1} = Phi or, if `reversing`, T Phi T^{-1} = Phi^{-1}, for every eps."""
+    """An affine T(x) = S x + r: T Phi T^{-1} is Phi or, if `reversing`, Phi^{-1} for the Kahan map Phi at every eps."""
 
     variables: tuple[str, ...]
     S: fmpq_mat
@@ -58,7 +58,7 @@ class Symmetry(ResultPart):
 
     @property
     def is_trivial(self) -> bool:
-        """Whether S is I or -I and r = 0."""
+        """Whether r = 0 and S is I or -I."""
         return not any(e != 0 for e in self.r) and self.S in (QQ.identity(len(self.r)), -QQ.identity(len(self.r)))
 
     def to_json(self) -> dict[str, Any]:
@@ -68,9 +68,9 @@ class Symmetry(ResultPart):
 
 @dataclass(frozen=True)
 class Infinitesimal(ResultPart):
-    """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
+    """An affine vector field S x + s with f'(x)(S x + s) - S f(x) = weight f(x); the weight is 0 or 1.
 
-    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps); for weight 0 each T_t is a symmetry.
+    If T_t is its flow, T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps). So with weight 0 each T_t is a symmetry.
     """
 
     variables: tuple[str, ...]
@@ -97,11 +97,11 @@ class Infinitesimal(ResultPart):
 class Symmetries(PrintableResult):
     """The result of `linear_symmetries`: the symmetries of a Kahan map, and the searches that were completed.
 
-    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` is a field of weight 1 or None;
-    `signed` are all signed permutations (with a translation if needed) of the variables or of scaled variables (see
-    signed_permutations.py); `others` are further linear symmetries. `generators` generate the group of `signed` or,
-    without infinitesimal symmetries, of `signed` and `others`; `group_of` says which. `order` is the number of
-    its linear parts (None: unknown).
+    `infinitesimal` is a basis of the fields of weight 0, linear fields first; `scaling` is a field of weight 1 or None.
+    `signed` are the T(x) = S x + r whose S is a signed permutation of the variables or of scaled variables
+    (signed_permutations.py); `others` are further linear T. `generators` generate the group of `signed` or, without
+    infinitesimal symmetries, of `signed` and `others`; `group_of` names the kind of its matrices S. The number of these
+    is `order` (None: unknown). `searched` lists the completed searches, and `undecided` the open questions.
     """
 
     _parts, _noun = "generators", ("generator", "generators")
@@ -124,10 +124,10 @@ class Symmetries(PrintableResult):
 
     @property
     def reversing_order(self) -> int:
-        """The number of elements of the group that take the map to its inverse."""
+        """The number of linear parts of reversing symmetries in the group that `generators` generate."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
-        # f is not 0, so no element is both symmetry and reversing: the group or half of it commutes with the map
+        # f is not 0, so no element is both a symmetry and reversing: half of the elements are reversing, or none
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
 
     @property
@@ -139,16 +139,16 @@ class Symmetries(PrintableResult):
 
     @property
     def symmetries(self) -> list[Symmetry]:
-        """The known symmetries of finite order that commute with the map."""
+        """The known symmetries of finite order that are not reversing."""
         return [t for t in (*self.signed, *self.others) if not t.reversing]
 
     @property
     def reversing(self) -> list[Symmetry]:
-        """The known symmetries of finite order that take the map to its inverse."""
+        """The known reversing symmetries of finite order."""
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each known finite symmetry, for example for `pandas.DataFrame(symmetries.rows())`."""
+        """Return a row for each known symmetry of finite order, e.g. for `pandas.DataFrame(symmetries.rows())`."""
         return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
 
     def to_json(self) -> dict[str, Any]:
@@ -184,13 +184,13 @@ def linear_symmetries(
 
     The search covers the Lie algebra of affine symmetries, an affine field X with [X, f] = f (a scaling), and signed
     permutations of the variables or of scaled variables, with a translation if needed (dimension at most 12). In
-    dimension at most 3 it covers all rational matrices, unless the Lie algebra contains a linear field x' = S x.
+    dimension at most 3 it covers all rational matrices, unless the Lie algebra contains a linear field.
 
     Args:
         system: a quadratic system over Q.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message at each stage.
-        on_result: called once, with the result object, to which the later stages add symmetries.
+        on_result: called once, before the first stage; all stages add symmetries to the object that it receives.
 
     Returns:
         A `Symmetries`, exact and proved. Source: cmoq-2013.
@@ -227,7 +227,7 @@ def _add_lie_algebra(symmetries: Symmetries) -> None:
         columns.append([p.derivative(i) * gens[j] - (f.rhs[j] if k == i else 0) for k, p in enumerate(f.rhs)])
     columns += [[p.derivative(i) for p in f.rhs] for i in range(n)]
     columns.append([-p for p in f.rhs])
-    # One row for each component and each monomial.
+    # One equation for each component of f and each monomial.
     rows: dict[tuple[int, tuple[int, ...]], list[fmpq]] = {}
     for column_index, column in enumerate(columns):
         for k, p in enumerate(column):
@@ -235,7 +235,7 @@ def _add_lie_algebra(symmetries: Symmetries) -> None:
                 rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[column_index] = value
     equations = list(rows.values()) or [[fmpq(0)] * len(columns)]
     count_work(200 + len(equations) * len(columns) * (3 + len(columns) / 50))
-    # In echelon form from the right, with s last, the linear fields come first and span all linear fields.
+    # The basis is in echelon form from the right, and s comes last: so a basis of the linear fields comes first.
     basis = nullspace(QQ, fmpq_mat([row[:-1] for row in equations]))
 
     def build_infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
@@ -276,14 +276,14 @@ def _add_signed_permutations(symmetries: Symmetries, budget: Budget) -> None:
         )
         return
     symmetries.searched.append("signed permutations, with a translation: all")
-    symmetries.order = len({_matrix_key(t.S) for t in symmetries.signed})  # for f = 0 all are symmetry and reversing
+    symmetries.order = len({_matrix_key(t.S) for t in symmetries.signed})  # for f = 0 each S occurs twice
     if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
         symmetries.group_of = SCALED
     symmetries.generators = _find_generators(symmetries.signed)
 
 
 def _find_generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
-    """Return a minimal set of elements whose linear parts generate all linear parts, high orders first."""
+    """Return a minimal list of elements, of high order first, whose linear parts generate those of all elements."""
 
     def order(matrix: fmpq_mat) -> int:
         power, count = matrix, 1
@@ -305,7 +305,7 @@ def _find_generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
 
 
 def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
-    """Return the finite group that the matrices generate."""
+    """Return the keys (`_matrix_key`) of all elements of the finite group that the n x n matrices generate."""
     new_elements = [QQ.identity(n)]
     group = {_matrix_key(new_elements[0])}
     while new_elements:
@@ -320,7 +320,7 @@ def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]
 
 
 def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
-    """Add all rational S with f(S x) = S f(x) or f(S x) = -S f(x), from the polynomial equations of S."""
+    """Add all invertible rational S with f(S x) = S f(x) or f(S x) = -S f(x), solutions of polynomial equations."""
     f = symmetries.system
     n = f.dim
     if any(x.is_linear for x in symmetries.infinitesimal):
@@ -340,7 +340,7 @@ def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
         equations = matrix_equations(f, matrix, sign)
         solutions = solve_system(equations, gens, budget)
         for component in solutions.components:
-            # All S of a family are singular, since a family of invertible S would give infinitesimal symmetries.
+            # In a family of solutions all S are singular: a family of invertible S would give infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
             if not component.free and S.det() != 0 and _matrix_key(S) not in known_matrices:
                 symmetries.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
@@ -352,7 +352,7 @@ def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
             )
     if is_complete:
         symmetries.searched.append("rational matrices S, without a translation: all")
-    # Without infinitesimal symmetries the affine group is finite, and so are the groups that its elements generate.
+    # Without infinitesimal symmetries the group of all affine T is finite, and so are all its subgroups.
     if is_complete and symmetries.others and symmetries.order is not None and not symmetries.infinitesimal:
         symmetries.generators = _find_generators([*symmetries.signed, *symmetries.others])
         symmetries.order, symmetries.group_of = len(_generate_group([t.S for t in symmetries.generators], n)), MATRICES
@@ -368,7 +368,7 @@ def _affine_text(variables: Sequence[str], S: fmpq_mat, r: Sequence[fmpq]) -> li
 
 
 def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: int) -> bool:
-    """Return whether f(S x + r) = sign S f(x) for all x: sign 1 for a symmetry, -1 for a reversing symmetry. Exact.
+    """Return whether S is invertible and f(S x + r) = sign S f(x) for all x; exact. The sign -1 means reversing.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["y", "-x^2"])
     >>> is_symmetry(f, fmpq_mat([[1, 0], [0, -1]]), [fmpq(0)] * 2, -1)
@@ -378,7 +378,7 @@ def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: i
 
 
 def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> tuple[fmpq, ...] | None:
-    """Return an r with f(S x + r) = sign S f(x), 0 if possible; None if no rational r was found.
+    """Return an r with f(S x + r) = sign S f(x) for all x, 0 if possible; None if no rational r was found.
 
     Source: cmoq-2013.
 
@@ -391,7 +391,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     zero = (fmpq(0),) * n
     if is_symmetry(f, S, zero, sign):
         return zero
-    # With B = f'(0), f''(S x, r) + B S x = sign S B x is linear in r: one equation for each entry of a matrix.
+    # The terms linear in x, f''(S x, r) + B S x = sign S B x with B = f'(0), give n^2 linear equations for r.
     defects = (S * f.B * fmpq(sign) - f.B * S).entries()
     derivatives = [(form * S * fmpq(2)).transpose() for form in f.Q]
     rows = [[*(derivatives[i][j, k] for k in range(n)), -defects[i * n + j]] for i in range(n) for j in range(n)]
@@ -418,8 +418,8 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
     """Return polynomials in the entries of S that vanish if S is invertible and f(S x) = sign S f(x) for all x.
 
-    `S` holds the generators of a ring, row by row. The equations include the invariance of the divergence of f, which
-    is linear in S and follows from the other equations if S is invertible.
+    `S` holds the generators of a ring, row by row. The coefficients of div f(S x) - sign div f(x) are included: they
+    are linear in S, and vanish if S is invertible and the other polynomials vanish.
 
     >>> s = ring(["s"]).gens()[0]
     >>> matrix_equations(QuadraticSystem.from_text(["x"], ["x^2"]), [[s]], 1)

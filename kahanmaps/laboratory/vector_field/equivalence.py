@@ -1,10 +1,10 @@
-"""Search for a system of the catalogue that a vector field is affinely equivalent to: g(P x + q) = c P f(x).
+"""Search the catalogue for a system g that is affinely equivalent to a given system f: g(P x + q) = c P f(x).
 
-With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
-variables: the map of f at eps is the map of g at eps/c, in the variables y. In the plane all P are tried. In other
-dimensions P is a permutation of the variables, scaled up to dimension 5, after a change to a frame that f determines
-(invariant hyperplanes, lines of fixed points). Parameters of g are unknowns too. Every equivalence is verified exactly;
-if none is found, one may still exist.
+P is an invertible matrix, q a vector, c a number. With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's
+method is equivariant under affine changes of variables: the map of f at eps is the map of g at eps/c, in the variables
+y. In dimension 2 all P are tried. In other dimensions P = c T F. Here F is I or a basis from invariant hyperplanes or
+lines of fixed points of f, and T is a permutation matrix, in dimension at most 5 also a product of one with a diagonal
+matrix. Parameters of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still exist.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fix
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
-MAX_DIMENSION = 6  # 720 permutations
-MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher dimensions Groebner bases may take a minute
-MAX_ORDERS = 24  # permutations that are tried; the monomials may allow all 720
-MAX_FRAMES = 6  # from invariant hyperplanes, and as many from lines of fixed points
+MAX_DIMENSION = 6  # there are 6! = 720 permutations of the variables
+MAX_SCALED = 5  # the largest dimension for scaled permutations; in higher dimensions a Groebner basis may take a minute
+MAX_ORDERS = 24  # permutations that are tried for each pair of F and g; the monomials may allow all 720
+MAX_FRAMES = 6  # matrices F from invariant hyperplanes, and as many from lines of fixed points
 _MAX_DEPTH = 4  # the number of unknowns that are set to numbers if there are infinitely many solutions
 
 Monomials = frozenset[tuple[int, ...]]
@@ -44,7 +44,7 @@ Monomials = frozenset[tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Equivalence(ResultPart):
-    """An affine equivalence y = P x + q, eps -> eps/c with a system of the catalogue at given parameters."""
+    """An equivalence g(P x + q) = c P f(x) of f with the system g called `name` in the catalogue, at `parameters`."""
 
     name: str
     parameters: dict[str, fmpq]
@@ -56,12 +56,12 @@ class Equivalence(ResultPart):
 
     @property
     def system(self) -> QuadraticSystem:
-        """The system g/c in the variables of f, g from the catalogue; its map at eps is the map of g at eps/c."""
+        """The system y' = g(y)/c, with the variable names of f; its map at eps is the map of g at eps/c."""
         return load(self.name, self.parameters).system.renamed(self.variables).scaled(1 / self.c)
 
     @property
     def text(self) -> str:
-        """The system and the change of variables."""
+        """A phrase with the name and the parameters of g, the change of variables and the change of eps."""
         values = ", ".join(f"{name} = {format_number(value)}" for name, value in self.parameters.items())
         images = linear_combinations(self.P, ring(self.variables).gens())
         point = ", ".join(format_polynomial(image + q) for image, q in zip(images, self.q, strict=True))
@@ -83,11 +83,11 @@ class Equivalence(ResultPart):
 def equivalent_system(
     system: SystemLike, fixed: FixedPointSearch | None = None, effort: int | Budget = 1
 ) -> Equivalence | None:
-    """Search for a system of the catalogue that is affinely equivalent to the given one; None if none was found.
+    """Search the catalogue for a system that is affinely equivalent to `system`; return None if none was found.
 
     Args:
         system: a quadratic system; for a system that is itself in the catalogue, None is returned.
-        fixed: the fixed points of the system, if they are known; lines of fixed points give frames.
+        fixed: the fixed points of `system`, if they are known; lines of fixed points give candidates for P.
         effort: each increase by 1 doubles the work limit.
 
     Returns:
@@ -105,7 +105,7 @@ def equivalent_system(
         values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
         if load(file.name, values).system.rhs == file.system.rhs:
             return None
-    # The candidates: systems of the catalogue, frames, and permutations of the variables, None if P is any matrix.
+    # A candidate is a system g, a matrix F, and a permutation for T; None instead of the permutation: T is any matrix.
     catalogue, candidates = _load_catalogue(f.dim), list[tuple[_CatalogueSystem, fmpq_mat, tuple[int, ...] | None]]()
     budget = budget_for("equivalent systems", effort)
     for frame in _candidate_frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
@@ -113,7 +113,7 @@ def equivalent_system(
         for g in catalogue:
             if sorted(map(len, monomials)) != sorted(map(len, g.monomials)):
                 continue
-            # The permutations that map the monomials of each right-hand side to monomials of g.
+            # The permutations that turn the quadratic monomials of each right-hand side of f into those of g.
             permutations = list[tuple[int, ...]]()
             for order in itertools.permutations(range(f.dim)):
                 inverse = sorted(range(f.dim), key=order.__getitem__)
@@ -125,7 +125,7 @@ def equivalent_system(
             candidates += ((g, frame, order) for order in permutations)
     if f.dim == 2:
         candidates += ((g, QQ.identity(2), None) for g in catalogue)
-    for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # the fast searches first
+    for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # without scaling the search is faster
         for g, frame, permutation in candidates:
             if budget.is_spent:
                 return None
@@ -146,9 +146,9 @@ class _CatalogueSystem:
 
 @lru_cache(maxsize=MAX_DIMENSION)
 def _load_catalogue(dim: int) -> tuple[_CatalogueSystem, ...]:
-    """Return the systems of one dimension, ordered by their number of parameters.
+    """Return the quadratic systems of the catalogue in one dimension, ordered by their number of parameters.
 
-    Systems with more than dim + 2 parameters are left out: nearly every system is equivalent to a member of these.
+    A system with more than dim + 2 parameters is left out: nearly every vector field is equivalent to a member of it.
     """
     systems, titles_by_name = [], titles()
     for name in names():
@@ -168,7 +168,7 @@ def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
 
 
 def _candidate_frames(f: QuadraticSystem, search: FixedPointSearch) -> Iterator[fmpq_mat]:
-    """Yield matrices F such that f in the coordinates F x may look like a system of the catalogue; the first is I."""
+    """Yield matrices F, beginning with I; in coordinates F x, f may have the monomials of a system of the catalogue."""
     n = f.dim
 
     def linear_coefficients(p: fmpq_mpoly) -> list[fmpq]:
@@ -199,19 +199,19 @@ def _solve_for_equivalence(
 ) -> Equivalence | None:
     """Solve g(P x + q) = c P f(x) for P = c T F, where F is the frame.
 
-    T is a permutation, scaled if `is_scaled`, or any matrix if `order` is None. For this P the equations for the
-    quadratic terms do not contain c and q, and are solved first.
+    T is the permutation matrix of `order`, scaled if `is_scaled`; if `order` is None, T is any matrix. For this P the
+    equations from the quadratic terms in x contain neither c nor q. They are solved first.
     """
     n = f.dim
     count_work(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
-    # If there are infinitely many solutions, unknowns are set to their defaults in this order.
+    # The order of the unknowns: if there are infinitely many solutions, earlier unknowns are set to defaults first.
     entry_names = [f"t{i}{j}" for i, j in entries]
     unknowns = ring(["c", *(f"q{i}" for i in range(n)), *entry_names, *(f"a{k}" for k in g.defaults)])
     defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
     defaults += g.defaults.values()
     highest_equations, lower_equations = _equivalence_equations(f, g, frame, entries, unknowns)
-    # First without scaling and translation: the equations for the parameters are then usually linear.
+    # In the first attempt c, q and T have their default values: the equations for the parameters are usually linear.
     default_equations = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     fixed_shift, fixed_scale = default_equations[: n + 1], default_equations[n + 1 :][: len(entries)]
     shift = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
@@ -240,9 +240,9 @@ def _equivalence_equations(
     entries: Sequence[tuple[int, int]],
     unknowns: fmpq_mpoly_ctx,
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
-    """Return the coefficients of g(P x + q) - c P f(x): a list for degree 2 in x, and a list for lower degrees.
+    """Return the coefficients of g(P x + q) - c P f(x) as two lists: for degree 2 in x, and for lower degrees in x.
 
-    The equations for the divergences are added: they follow from the others, and have lower degree in the unknowns.
+    The coefficients of div g(P x + q) - c div f(x) are added: they vanish for each solution, and their degree is lower.
     """
     n = f.dim
     joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
@@ -252,7 +252,7 @@ def _equivalence_equations(
         T[i][j] = t
     P0 = [[sum((T[i][k] * frame[k, j] for k in range(n)), zero) for j in range(n)] for i in range(n)]
     images = [sum((P0[i][j] * c * x[j] for j in range(n)), q[i]) for i in range(n)]
-    images += joint.gens()[2 * n + 1 + len(entries) :]  # the parameters
+    images += joint.gens()[2 * n + 1 + len(entries) :]  # the parameters of g
     f_at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
     sides = [sum((P0[i][j] * f_at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
     differences = [p.compose(*images, ctx=joint) - side for p, side in zip(g.system.rhs, sides, strict=True)]
@@ -260,11 +260,11 @@ def _equivalence_equations(
     highest_equations: list[fmpq_mpoly] = []
     lower_equations: list[fmpq_mpoly] = []
     for k, difference in enumerate(differences):
-        terms_by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # in x
+        terms_by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # keys: monomials in x
         for monomial, value in difference.terms():
             exponents = tuple(int(e) for e in monomial)
             terms_by_monomial.setdefault(exponents[:n], {})[exponents[n:]] = value
-        for x_exponents, terms in terms_by_monomial.items():  # c^degree divides the coefficient
+        for x_exponents, terms in terms_by_monomial.items():  # the coefficient is divisible by c^degree
             degree = sum(x_exponents)
             equation = unknowns.from_dict(terms) / unknowns.gen(0) ** degree
             (highest_equations if degree == (2 if k < n else 1) else lower_equations).append(equation)
@@ -278,7 +278,7 @@ def _rational_solutions(
     budget: Budget,
     depth: int = 0,
 ) -> Iterator[list[fmpq]]:
-    """Yield rational solutions, one from each family; a solution is the `values` at a zero of the equations."""
+    """Yield the `values` at rational zeros of the equations; of each family of zeros only one is used."""
     context = values[0].context()
     solutions = solve_system([p for p in equations if not p.is_zero()], values, budget)
     for component in solutions.components:

@@ -1,9 +1,9 @@
-"""The equilibria of a vector field, which are the fixed points of its Kahan map, and the eigenvalues there.
+"""The equilibria of a vector field f as fixed points of its Kahan map Phi, and the eigenvalues of f' at them.
 
-Since Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x), the map has the derivative (I - eps f')^{-1} (I + eps f') at a zero
-of f, and an eigenvalue lambda of f' gives the multiplier (1 + eps lambda)/(1 - eps lambda). An equilibrium at which
-det(I - eps f'(x)) = 0 is no fixed point: the equation of the map does not determine its image. Everything is exact.
-Points that are not rational, and sets of positive dimension, are given by equations. Source: cmoq-2013.
+Since Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x), at a zero of f the map Phi has the derivative
+(I - eps f')^{-1} (I + eps f'). So an eigenvalue lambda of f' gives the multiplier (1 + eps lambda)/(1 - eps lambda). If
+det(I - eps f'(x)) = 0 at an equilibrium x, it is no fixed point: the equation of the map does not determine Phi(x). All
+is exact. Points that are not rational, and nonlinear sets of points, are given by equations. Source: cmoq-2013.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 6  # in higher dimensions Groebner bases of quadrics may take long, and they cannot be interrupted
-_UNITS = 1e6  # for one Groebner basis at a given eps
+_UNITS = 1e6  # the work limit of the Groebner basis that `are_fixed_by_map` computes
 _NAMES_BY_DIMENSION = {1: "line", 2: "plane"}
 
 
 @dataclass(frozen=True)
 class FixedPoints(ResultPart):
-    """A set of fixed points: `coordinates` are functions of some variables, and these variables satisfy `equations`.
+    """A set of fixed points: `coordinates` are affine functions of the free variables, which satisfy `equations` = 0.
 
     `dimension` is the dimension of the set, `count` the number of its points over the complex numbers (None: infinitely
-    many); `eigenvalues` is the characteristic polynomial of f' there; its coefficients may contain these variables.
+    many). `eigenvalues` is the characteristic polynomial of f' on the set; its coefficients may contain free variables.
     """
 
     coordinates: tuple[fmpq_mpoly, ...]
@@ -60,7 +60,7 @@ class FixedPoints(ResultPart):
             return f"{kind_text} of fixed points {point_text}" if self.dimension else f"fixed point {point_text}"
         count_text = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
         count_text = count_text or counted(self.count or 0, "fixed point")
-        if len(self.equations) > len(self.coordinates):  # the basis is not shorter than the equations f = 0
+        if len(self.equations) > len(self.coordinates):  # more equations than f = 0 has components
             return f"{count_text} {point_text} with f = 0{'' if self.count is None else ', not rational'}"
         return f"{count_text} {point_text} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
 
@@ -75,7 +75,7 @@ class FixedPoints(ResultPart):
         return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
 
     def are_fixed_by_map(self, eps: fmpq | None) -> bool | None:
-        """Whether det(I - eps f') is not 0: True (at all points), False (at no point) or None (mixed or unknown).
+        """Whether det(I - eps f') is not 0: True (at all points), False (at no point) or None (at some, or unknown).
 
         Args:
             eps: an exact number, or None for all but finitely many eps.
@@ -88,7 +88,7 @@ class FixedPoints(ResultPart):
         ('line of fixed points (0, y)', None)
         """
         if eps is None:
-            # At one point, or on conjugate points, det(I - eps f') = 0 only for a few eps.
+            # At one point, or at conjugate points, det(I - eps f') = 0 only for finitely many eps.
             have_same_eigenvalues = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
             return True if have_same_eigenvalues else None
         context = self.coordinates[0].context()
@@ -107,14 +107,14 @@ class FixedPoints(ResultPart):
 
 @dataclass(frozen=True)
 class FixedPointSearch(ResultPart):
-    """All fixed points, rational ones first; `undecided` says why some may be missing, and is empty if none is."""
+    """All fixed points, rational ones first; `undecided` says why some may be missing (empty: none are missing)."""
 
     found: tuple[FixedPoints, ...]
     undecided: str
 
     @property
     def text(self) -> str:
-        """A line for each point or set of points, and what is undecided."""
+        """A line for each point or set of points, and a last line for `undecided` if it is not empty."""
         texts = [points.text for points in self.found] or ["no fixed point"] * (not self.undecided)
         return "\n".join([*texts, *([f"undecided: {self.undecided}"] if self.undecided else [])])
 
@@ -166,10 +166,10 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
 
 
 def _points_of(system: QuadraticSystem, component: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
-    """Return the fixed points on one component, whose equations have this Groebner basis."""
+    """Return the fixed points on a component of the solutions; `basis` is a Groebner basis of its equations."""
     leading_monomials = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     free_variables = sorted({*component.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
-    # The dimension is the largest number of variables such that no leading monomial contains only these.
+    # The dimension is the largest size of a set of variables such that no leading monomial has only these variables.
     dimensions = [
         len(subset)
         for size in range(len(free_variables) + 1)

@@ -1,14 +1,14 @@
 """Backward error analysis: the vector field whose flow is the Kahan map, as a series in eps, exactly over Q.
 
-The map x + 2 eps (I - eps f')^{-1} f = x + sum_n 2 eps^n f'^{n-1} f is the flow at time 2 eps of the formal vector
-field F = f + eps^2 F_2 + eps^4 F_4 + ..., with the derivation D = sum_k eps^k F_k . grad:
+The map x + 2 eps (I - eps f')^{-1} f = x + sum_n 2 eps^n f'^{n-1} f is the flow at time 2 eps of a formal vector field
+F = f + eps^2 F_2 + eps^4 F_4 + .... Let D = sum_k eps^k F_k . grad, and let [eps^m] be the coefficient of eps^m. Then
 
-    sum_{j=1}^n 2^j/j! [eps^{n-j}] D^j x = 2 f'^{n-1} f,
+    sum_{j=1}^n 2^j/j! [eps^{n-j}] D^j x = 2 f'^{n-1} f.
 
-which gives F_{n-1} from F_0 = f, ..., F_{n-2}; Kahan's method is symmetric, so F_k = 0 for odd k. In elementary
-differentials F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map, as a series in eps, is an integral of F. An integral
-I = I_0 of the flow of f survives to eps^k if it has a continuation I + eps^2 I_2 + ... to this order: the linear
-equations f . grad I_2j = -sum_{i>0} F_2i . grad I_2(j-i) are solved in polynomials. Sources: hairer-lubich-wanner-2006,
+This equation determines F_{n-1} from F_0 = f, ..., F_{n-2}. Kahan's method is symmetric, so F_k = 0 for odd k. The
+first correction is F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map that is a series in eps is an integral of F. An
+integral I_0 of f survives to eps^k if there are polynomials I_2, ..., I_k such that I_0 + ... + eps^k I_k is an
+integral of F up to eps^k: f . grad I_2j = -sum_{i=1}^j F_2i . grad I_2(j-i). Sources: hairer-lubich-wanner-2006,
 chapter IX; cmoq-2013, where Kahan's method is a Runge-Kutta method.
 """
 
@@ -38,7 +38,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 LARGEST_ORDER = 12
 _MAX_UNKNOWNS = 1000  # the number of coefficients of all corrections of an integral
 _EFFORT = -2  # of the search for integrals of the flow
-_SHOWN_TERMS = 60  # of a polynomial in a line
+_SHOWN_TERMS = 60  # the largest number of terms with which a polynomial is printed
 
 Field = tuple[fmpq_mpoly, ...]
 
@@ -47,9 +47,9 @@ Field = tuple[fmpq_mpoly, ...]
 class SurvivingIntegral:
     """An integral I of the flow of f, and its continuation I + eps^2 I_2 + ... as an integral of the modified field.
 
-    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives" (up to the requested order), "lost" (no
-    polynomial correction of degree at most `degree` exists at eps^(order + 2), for any earlier corrections) or "not
-    examined" (the linear equations for the next correction are too large). All corrections are exact.
+    `corrections` are I_2, I_4, ..., I_order, exact polynomials. `verdict` is "survives" (up to the requested order),
+    "lost" (whatever the earlier corrections are, eps^(order + 2) has no correction of degree at most `degree`) or "not
+    examined" (the linear equations for the next correction are too large).
     """
 
     integral: fmpq_mpoly
@@ -71,11 +71,11 @@ class SurvivingIntegral:
 
 @dataclass(frozen=True, eq=False)
 class ModifiedField(ResultPart):
-    """The result of `modified`: series in eps up to `order`, exact.
+    """The result of `modified`: exact series in eps up to eps^order.
 
     `fields[k]` is the coefficient of eps^k of the modified vector field, 0 for odd k. `hamiltonian[k]` is the
-    coefficient of eps^k of the modified Hamiltonian, which the map and the modified field conserve (empty without a
-    Hamiltonian). `integrals` are the known polynomial integrals of the flow.
+    coefficient of eps^k of the modified Hamiltonian. The map and the modified field conserve this function. If the
+    system declares no Hamiltonian, the tuple is empty. `integrals` are the known polynomial integrals of the flow.
     """
 
     file: SystemFile = field(repr=False)
@@ -96,7 +96,7 @@ class ModifiedField(ResultPart):
         }
 
     def lines(self) -> list[str]:
-        """Return the series and sentences as lines of cells separated by tabs; for long polynomials only their size."""
+        """Return a tab-separated line for each component and integral; long polynomials are replaced by their sizes."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):
@@ -109,7 +109,7 @@ class ModifiedField(ResultPart):
 
     @property
     def text(self) -> str:
-        """The title and the lines."""
+        """A title, followed by the result of `lines`."""
         title = f"# {self.file.name}: the Kahan map is the flow of f + eps^2 f_2 + eps^4 f_4 + ... at time 2 eps"
         return "\n".join([title, *self.lines()])
 
@@ -123,7 +123,7 @@ def _short_text(polynomial: fmpq_mpoly) -> str:
 
 
 def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], None] = lambda _: None) -> ModifiedField:
-    """Compute the modified vector field of Kahan's method up to eps^order, and which integrals of the flow survive.
+    """Compute the modified vector field of Kahan's method up to eps^order, and test which integrals of f survive.
 
     Args:
         system: a quadratic system over Q.
@@ -134,7 +134,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         A `ModifiedField`, exact.
 
     Raises:
-        InputError: for an order that is odd or out of range, and for systems that are not quadratic.
+        InputError: for an order that is odd or out of range, and for systems that are not quadratic over Q.
 
     >>> result = modified("weierstrass", 2)
     >>> result.fields[2], result.hamiltonian[2]
@@ -149,7 +149,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         raise InputError(f"found the algebraic number {file.map.root}, expected a system over the rational numbers")
     fields = modified_fields(file.system, order, progress)
     series = () if file.hamiltonian is None else modified_hamiltonian(file.hamiltonian, order)
-    # Independent polynomial integrals of the flow: H, limits of declared integrals, and results of a search.
+    # Candidates for integrals of the flow: H, the limits eps -> 0 of declared integrals, and the results of a search.
     context, candidates = ring(file.variables), []
     if file.hamiltonian is not None:
         candidates.append(file.hamiltonian.H)
@@ -160,7 +160,7 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))
     integrals, gradients = list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # gradients dependent here by chance lose an integral
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # gradients dependent here by chance hide an integral
     for candidate in candidates:
         integral = primitive_part(candidate - candidate[(0,) * file.dim])[1]
         gradient_at_point = [evaluate(p, QQ, point) for p in gradient(integral)]
@@ -182,7 +182,7 @@ def modified_fields(
     context = ring(system.variables)
     f = tuple(p.project_to_context(context) for p in system.rhs)
     power, fields = f, [f]
-    # powers[j][p] is the coefficient of eps^p of D^j x, for j > 0.
+    # powers[j][p] is the coefficient of eps^p of D^j x with D = sum_k eps^k F_k . grad, for j > 0.
     powers: list[list[Field]] = [[], [f]]
     for n in range(2, order + 2):
         power = _derivative(power, f)  # f'^{n-1} f
@@ -190,7 +190,7 @@ def modified_fields(
         remainder = [2 * p for p in power]
         powers.append([])
         for j in range(2, n + 1):
-            order_left = n - j  # sum over k of F_k . grad [eps^{n-j-k}] D^{j-1} x
+            order_left = n - j  # [eps^{n-j}] D^j x = sum over k of F_k . grad [eps^{n-j-k}] D^{j-1} x
             terms = [_derivative(fields[k], powers[j - 1][order_left - k]) for k in range(order_left + 1)]
             coefficient = tuple(sum(summands, context.constant(0)) for summands in zip(*terms, strict=True))
             powers[j].append(coefficient)
@@ -201,13 +201,13 @@ def modified_fields(
 
 
 def modified_hamiltonian(hamiltonian: CubicHamiltonian, order: int) -> tuple[fmpq_mpoly, ...]:
-    """Return the coefficients of eps^0, ..., eps^order of H + (2 eps/3) grad H^T (I - eps f')^{-1} f.
+    """Return the coefficients of eps^0, ..., eps^order of the modified H + (2 eps/3) grad H^T (I - eps f')^{-1} f.
 
     >>> from kahanmaps.documents.catalog import load
     >>> modified_hamiltonian(load("harmonic").hamiltonian, 2)
     (1/2*x^2 + 1/2*y^2, 0, -2/3*x^2 - 2/3*y^2)
     """
-    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # `vector` is f'^k f
+    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # `vector` is f'^k f for k = 0, 1, ...
     for _ in range(order):
         series.append(fmpq(2, 3) * _derivative(vector, [hamiltonian.H])[0])
         vector = _derivative(vector, hamiltonian.system.rhs)
@@ -222,16 +222,16 @@ def _derivative(vector: Field, functions: Sequence[fmpq_mpoly]) -> Field:
 
 
 def _continue(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
-    """Return how far an integral of the flow can be continued by polynomials.
+    """Continue an integral I of the flow by polynomials I_2, I_4, ... as far as possible, at most up to eps^order.
 
-    All corrections up to an order are unknowns of one linear system: corrections are determined only up to integrals of
-    the flow, and the next correction may exist for some choices only.
+    All corrections up to an order are unknowns of one linear system. Each of them is determined only up to integrals
+    of the flow, and the next one may exist for some choices only. `fields` are F_0 = f, F_1, ..., F_order.
     """
     names = fields[0][0].context().names()
     context, integral_degree = ring(names), degree(integral)
     even_fields = [tuple(p.project_to_context(context) for p in components) for components in fields[::2]]
     integral = integral.project_to_context(context)
-    # For homogeneous f and I each correction is homogeneous, since eps x is the only quantity of degree 0.
+    # If f and I are homogeneous, so are all corrections: x -> s x, eps -> eps/s only multiplies f and I by numbers.
     is_graded = all(is_homogeneous(p, 2) for p in even_fields[0]) and is_homogeneous(integral, integral_degree)
     columns: list[tuple[int, fmpq_mpoly]] = []
     corrections: tuple[fmpq_mpoly, ...] = ()
@@ -254,7 +254,7 @@ def _continue(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> Surv
         solution = [context.constant(0)] * m
         for r in range(pivots):
             pivot = next(c for c in range(len(columns) + 1) if reduced_matrix[r, c] != 0)
-            if pivot == len(columns):  # 0 = 1
+            if pivot == len(columns):  # the row is the equation 0 = 1
                 return SurvivingIntegral(integral, corrections, 2 * m - 2, "lost", max_degree)
             order_index, monomial = columns[pivot]
             solution[order_index - 1] -= reduced_matrix[r, len(columns)] * monomial

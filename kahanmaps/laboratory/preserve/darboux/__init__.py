@@ -1,1 +1,1 @@
-"""Darboux polynomials, their cofactors and the spaces that they make."""
+"""Darboux polynomials, their cofactors, and spaces of Darboux polynomials with the same cofactor."""

@@ -1,9 +1,9 @@
 """Affine integrals and invariant hyperplanes, exactly over Q, of the flow of a quadratic system.
 
-The Kahan map has these integrals too. It sends each invariant hyperplane of the flow into itself, if at the given eps
-it is defined at a generic point of the hyperplane (`under_map`). If v . f = 0, the map conserves v . x. If
-l = v . x + w satisfies l' = l L along the flow (an affine Darboux function: the hyperplane l = 0 is invariant, and L is
-the affine cofactor), the defining equation of the map gives
+The Kahan map has these integrals too: if v . f = 0, it conserves v . x. It maps an invariant hyperplane of the flow to
+itself if, at the given eps, the map is defined at a generic point of the hyperplane (`under_map`). Let l = v . x + w be
+an affine Darboux function: l' = l L along the flow with an affine cofactor L, so the hyperplane l = 0 is invariant. The
+defining equation of the map then gives
 
     l(x~) (1 - eps L(x)) = l(x) (1 + eps L(x~)),
 
@@ -11,8 +11,8 @@ since v . (x~ - x)/(2 eps) is the polar form (l(x) L(x~) + l(x~) L(x))/2 of l L.
 
 Invariant hyperplanes are found by an extactic determinant (pereira-2001): on l = 0 the Taylor coefficients x_1, x_2,
 ... of the solution through x are all orthogonal to v, so that l divides the polynomial det(x_1, ..., x_n). (The affine
-integrals are eliminated first, since they make this determinant vanish.) The zeros of l on a random line are rational
-zeros of the determinant; at each of these the candidate v is the vector that is orthogonal to all x_k.
+integrals are eliminated first, since they make this determinant vanish.) The zero of l on a random line is a rational
+zero of the determinant. At each rational zero the candidate v is the vector that is orthogonal to all x_k.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from kahanmaps.maps.kahan import KahanFamily, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
 
-# The determinant has degree m (m + 3)/2 along a line for m variables. For m = 12 this is 90, and takes a few seconds.
+# For m variables the determinant has degree m (m + 3)/2 on a line. For m = 12, degree 90, it takes a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
 _LINE = 10**6  # bound of the modulus of the random integers that define a line
 _BUDGET = 20_000_000  # products of terms, for a determinant on a hyperplane
@@ -58,7 +58,7 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Exact affine Darboux functions. `complete`: whether they are all over Q; if this is unknown, `reason` says why.
+    """Exact affine Darboux functions over Q. `complete`: whether these are all; if this is unknown, `reason` says why.
 
     Constants and the affine integrals (cofactor 0) are left out. A `complete` list is wrong only if the random line of
     the search is parallel to an invariant hyperplane. As the direction of the line has random integers up to 10^6, this
@@ -148,9 +148,9 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         seed: the random seed of the line on which candidates are computed; the functions are exact for every seed.
 
     Returns:
-        An `AffineDarbouxList`. It is not complete, and has only the l among the factors of the right-hand sides, in two
-        cases: the extactic determinant vanishes identically (there may be infinitely many l, as for x' = x, y' = y), or
-        more than 12 variables remain after the affine integrals are eliminated. Source: pereira-2001.
+        An `AffineDarbouxList`. It has only the l among the factors of the right-hand sides, and is not complete, if the
+        extactic determinant vanishes identically (there may be infinitely many l, as for x' = x, y' = y), if more than
+        12 variables remain without the affine integrals, or if coefficients are very long. Source: pereira-2001.
 
     >>> result = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
     >>> [(str(d.function), str(d.cofactor)) for d in result.functions], result.complete
@@ -186,8 +186,8 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
         normals = nullspace(QQ, _taylor_rows(over_Q, x, quotient.free))
         if len(normals) > 1:
-            # The Taylor coefficients do not determine the normal. It is a combination of these vectors that is a left
-            # eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
+            # The Taylor coefficients do not determine the normal v of l = 0. It is a combination of these vectors, and
+            # a left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
             basis = fmpq_mat([list(v) for v in normals])
             action = quotient.rows(over_Q.jacobian(x)) * quotient.section
             normals = []
@@ -278,7 +278,7 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     Returns:
         "invariant" if det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the restriction of the map to
         the hyperplane is birational then. "undefined" if det(I - eps f') is 0 there; "contracted" if det(I + eps f') is
-        0 there, so that the image of l = 0 has a lower dimension; "undecided" if they are too long to expand.
+        0 there, so that the image of l = 0 has a lower dimension; "undecided" if a determinant is too long to expand.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
     >>> x, y = system.rhs[0].context().gens()

@@ -1,15 +1,15 @@
 """Candidates for the cofactors of discrete Darboux polynomials, and the search for polynomials with these cofactors.
 
-A discrete Darboux polynomial P of a map Phi satisfies P o Phi = C P with a rational function C, the cofactor. The
-Jacobi determinant of Phi vanishes or has poles on the zeros and poles of C, which lie on hypersurfaces that Phi
-contracts. For Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and the candidates are the products of
+A discrete Darboux polynomial P of a map Phi satisfies P o Phi = C P with a rational function C, the cofactor. All zeros
+and poles of C lie on hypersurfaces that Phi contracts; there det dPhi vanishes or has a pole. For Kahan maps
+det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)) with x~ = Phi(x), and the candidates for C are the products of
 
     D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
     l(x~)/l(x)                  for the affine l with l' = l L along the flow, which are discrete Darboux polynomials.
 
-The cofactor of a polynomial that is even in eps satisfies C(x, eps) C(x~, -eps) = 1, and so do these products. For
-other maps the candidates are the products of the irreducible factors of det dPhi(x) and of 1/det M(x), times a number
-that depends on the scaling of the variables; this number solves an eigenvalue problem. Source: celledoni-2019.
+The cofactor of a P that is even in eps satisfies C(x, eps) C(x~, -eps) = 1, and so do these products. Other maps are
+given by equations M(x) x~ = r(x). The candidates are then the products of the irreducible factors of det dPhi(x) and of
+1/det M(x), times a number that is the eigenvalue of a matrix. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8  # points beyond the number of unknowns
-_DETERMINANT_BUDGET = 20_000_000  # products of terms
-_DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
+_DETERMINANT_BUDGET = 20_000_000  # products of terms in the expansion of a determinant
+_DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators up to degree 6 are allowed
 _MAX_WORK = 4_000_000  # entries of matrices in one search, about two seconds
 _MAX_DIMENSION = 16  # in higher dimension even a sparse determinant takes too long to expand
 
@@ -71,7 +71,7 @@ class Cofactor:
     kind: str = "reversed"
 
     def fraction(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
-        """Return numerator and denominator of the cofactor at a point, for these values of the symbols."""
+        """Return numerator and denominator of the cofactor at a point x, for `values` of the symbols."""
         if self.polynomial is None:
             return jacobian_determinant_fraction(map_, x, image)
         field, eps = map_.field, map_.eps
@@ -102,7 +102,7 @@ DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
 def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
-    """Return det M for the matrix M of the map (I - eps f' for Kahan maps); None if it is too large to expand."""
+    """Return det M for the map M(x) x~ = r(x) (Kahan maps: M = I - eps f'); None if it is too large to expand."""
     if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
         return None
     field = FunctionField(map_.names, _DETERMINANT_BUDGET)
@@ -118,7 +118,7 @@ def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
 def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     """Return cofactors from the irreducible factors over Q of det dPhi(x) and 1/det M(x).
 
-    M is the matrix of the map. Returns det dPhi alone if the determinants are too large to expand.
+    M is the matrix in M(x) x~ = r(x). Returns det dPhi alone if one of the determinants is too large to expand.
     """
     n, D = map_.dim, determinant_polynomial(map_)
     field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
@@ -143,7 +143,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
 
 
 def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
-    """Return cofactors from the irreducible factors over Q of det(I - eps f'(x)); only det dPhi if it is too large."""
+    """Return cofactors from the irreducible factors over Q of D = det(I - eps f'); only det dPhi if D is too large."""
     n = map_.dim
     D = determinant_polynomial(map_)
     if D is None:
@@ -153,7 +153,7 @@ def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a function of eps
-        # At eps = 0 the determinant is 1, and every factor is a number: divided by it, the factor is 1 at eps = 0.
+        # At eps = 0 the determinant is 1, so every factor is a number there. The factor is divided by this number.
         constant = substitute(factor, {"eps": fmpq(0)})
         cofactors.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(cofactors, key=lambda cofactor: (cofactor.weight, cofactor.name)))
@@ -205,7 +205,7 @@ class Sample:
     map: ModularMap
     pairs: list[tuple[Point, Point]]
     cofactors: Sequence[Cofactor]
-    fractions: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: for each cofactor its values
+    fractions: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: values of the k-th cofactor
 
     @property
     def up_to_numbers(self) -> bool:
@@ -236,9 +236,9 @@ class Sample:
 def cofactor_space(
     sample: Sample, product: CofactorProduct, degree: int, model: DarbouxSpace | None = None
 ) -> DarbouxSpace:
-    """Return the space of all P of degree at most `degree` with P(x~) = C(x) P(x), C the `product`.
+    """Return the space of all P of degree at most `degree` with P(x~) = C(x) P(x), where C is the `product`.
 
-    Its basis may be empty. `model` is the space modulo another prime: only the monomials of its elements are then used.
+    The basis may be empty. If `model`, the space modulo another prime, is given, P has only monomials of its elements.
     The sample must have at least `points_needed` points.
     """
     indices = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.indices
@@ -251,10 +251,10 @@ def cofactor_space(
 def cofactor_spaces(
     sample: Sample, product: CofactorProduct, degree: int, models: Sequence[DarbouxSpace] = ()
 ) -> list[tuple[int, DarbouxSpace]]:
-    """Return the numbers c, each with the space of all P with P(x~) = c C(x) P(x), where C is the `product`.
+    """Return all pairs of a number c and the space of the P with P(x~) = c C(x) P(x), where C is the `product`.
 
-    If there are `models`, only the monomials of their elements are used. Numbers c outside GF(p) are left out. If the
-    cofactors of the sample are known exactly, only c = 1 is tried.
+    If there are `models`, only the monomials of their elements are used. Eigenvalues c in extensions of GF(p) are left
+    out. If the cofactors of the sample are known exactly, only c = 1 is tried.
     """
     prime, term_count = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
     indices = sorted({k for model in models for k in model.indices}) if models else range(term_count)
@@ -262,9 +262,9 @@ def cofactor_spaces(
         union = DarbouxSpace(sample.map.dim, degree, [v for model in models for v in model.basis]) if models else None
         space = cofactor_space(sample, product, degree, union)
         return [(1, space)] if space.basis else []
-    # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must
-    # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
-    # usually suffice.
+    # On as many points as unknowns, P(x~) = C(x) (M P)(x) for all P defines a matrix M; an eigenvector P is sought. The
+    # same equations at the other points are K P = 0. M P, M^2 P, ... must satisfy them too; a few of the equations
+    # K M^j P = 0 usually suffice.
     size = len(indices)
     values, image_values = _evaluate_monomials(sample, product, degree, indices)
     count_work(size**3 / 500)
@@ -300,7 +300,7 @@ def cofactor_spaces(
 def _evaluate_monomials(
     sample: Sample, product: CofactorProduct, degree: int, indices: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
-    """Return C m(x) and m(x~) for the monomials m, times the denominator of C = `product`: a row for each point."""
+    """Return d C m(x) and d m(x~) for the monomials m, a row for each point; C is `product`, d the denominator of C."""
     values, image_values, point_count = [], [], len(indices) + _SPARE
     count_work(point_count * len(indices) / 8)
     for (x, image), fraction in zip(sample.pairs[:point_count], sample.values(product, point_count), strict=True):
@@ -321,7 +321,7 @@ def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
 
 
 def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofactor]:
-    """Return the cofactors g(x~)/g(x), for integrals whose denominators are products of these polynomials g.
+    """Return the cofactors g(x~)/g(x) of `polynomials` g, for integrals whose denominators are products of the g.
 
     If there are too many products of the g, only the first polynomials are used.
     """
@@ -350,9 +350,9 @@ class SearchStep:
 class SpaceSearch:
     """The result of a search on one map: a list of spaces for each step.
 
-    The products in the steps are products of the `cofactors`, for which polynomials up to `cofactor_degree` were tried;
-    `searched` are the degrees of relations along orbits whose span was searched. `cut` says which cofactors were left
-    out because the budget was spent.
+    The steps of kind "cofactor" refer to products of the `cofactors`; for these, polynomials up to `cofactor_degree`
+    were tried. `searched` lists the degrees in which the span of the relations along orbits was searched. `cut` says
+    which cofactors were left out because the budget was spent.
     """
 
     steps: list[SearchStep] = field(default_factory=list)
@@ -392,7 +392,7 @@ def search_cofactors(
     max_degree: int,
     budget: Budget,
 ) -> SpaceSearch:
-    """Search by increasing degree for spaces with a common cofactor whose ratios are new integrals.
+    """Search by increasing degree for spaces with a common cofactor in which ratios P/Q are new integrals.
 
     The search ends when `required` independent integrals are known, when it takes too much work, or when the `budget`
     is spent. A space is added only if it gives an integral independent of the integrals of the `known_spaces` and of
@@ -402,9 +402,9 @@ def search_cofactors(
     latter have the form g(x~)/g(x) with known polynomials g, so they lead to integrals P/Q with a product Q of the g.
     If the `cofactors` are known only up to a numerical factor, their products times any number come last.
 
-    Two observations save work. If P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its
-    coordinates in a basis of these relations are unknown. If P/Q = d on a second orbit, then P - d Q is a relation
-    along that one, so (d - c) Q is a sum of relations along the two orbits. This excludes most products Q of the g.
+    Two observations save work. If P/Q = c on an orbit, then P - c Q vanishes along this orbit, so only the coordinates
+    of P - c Q in a basis of the relations of the orbit are unknown. If P/Q = d on a second orbit, then P - d Q vanishes
+    there, so (d - c) Q is a sum of relations of the two orbits. This excludes most products Q of the g.
     """
     prime, dim, all_cofactors, work = map_.prime, map_.dim, [*cofactors, *denominator_cofactors], 0
     result = SpaceSearch(cofactors=all_cofactors)
@@ -452,7 +452,7 @@ def search_cofactors(
             if work > _MAX_WORK or budget.is_spent:
                 return replace(result, cut=message) if budget.is_spent else result
             count_work(point_count * len(relations) / 3)
-            # P(x~) = a P(x)/b at each point, with the cofactor a/b there.
+            # The equations are b P(x~) = a P(x), where a/b is the value of the cofactor at the point x.
             fractions = sample.values(product, point_count)
             equations = [
                 [b * v - a * u for u, v in zip(row, image_row, strict=True)]
@@ -473,8 +473,8 @@ def search_cofactors(
                 spaces.append(space)
                 result.add(SearchStep("cofactor", degree, product, product.origin(all_cofactors)), [space])
         result = replace(result, cofactor_degree=degree)
-    # Factors of determinants are cofactors up to numbers. The preceding loop tried only the number 1, which often
-    # suffices, and takes a third of the work.
+    # The factors of determinants are cofactors only up to a number. The first loop tried the number 1: this often
+    # suffices, and takes a third of the work of the next loop.
     if all(cofactor.kind == "reversed" for cofactor in cofactors):
         return result
     sample = Sample.of(map_, all_cofactors, points_needed(dim, max_degree))

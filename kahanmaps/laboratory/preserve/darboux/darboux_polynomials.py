@@ -1,7 +1,7 @@
 """The search for discrete Darboux polynomials of a map: P of bounded degree with P(x~) = C(x) P(x), for many C.
 
-C runs through products of the cofactors of cofactors.py, times any number if these are known only up to a number. A
-space is listed unless products of elements of other spaces span it. Source: celledoni-2019.
+C runs through products of the cofactors of cofactors.py, times any number if the cofactors are known up to a number.
+The P with one C are listed unless products of polynomials with other C span their space. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ ScaledProduct = tuple[CofactorProduct, int]  # a product of cofactors and its nu
 
 @dataclass(frozen=True)
 class DarbouxPolynomials(LatexDisplay, ResultPart):
-    """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
+    """A basis of all P up to a degree with P(x~) = C(x) P(x), with one verdict for all P: proved or supported.
 
-    For a flow `cofactor` is K in P' = K P. The verdict on the identity for all P is proved (expanded) or supported.
+    `cofactor` is C as text, where C[g] stands for g(x~, -eps)/g(x, eps). For a flow it is K in P' = K P.
     """
 
     cofactor: str
@@ -73,7 +73,7 @@ class DarbouxPolynomials(LatexDisplay, ResultPart):
 
 @dataclass(frozen=True)
 class DarbouxSearch(Search):
-    """The result of `darboux_polynomials`: spaces in the order of the weights of their cofactors."""
+    """The result of `darboux_polynomials`: spaces up to `degree`; `cofactors` are the names of the known factors."""
 
     _parts, _noun = "spaces", ("cofactor", "cofactors")
 
@@ -109,9 +109,9 @@ def darboux_polynomials(
     progress: Callable[[str], None] = lambda _: None,
     on_result: Callable[[DarbouxSearch], None] = lambda _: None,
 ) -> DarbouxSearch:
-    """Search for the discrete Darboux polynomials of degree at most `max_degree` whose cofactors are products.
+    """Search for discrete Darboux polynomials of degree at most `max_degree` whose cofactors have known factors.
 
-    The cofactors are the products of the factors in cofactors.py; for maps other than Kahan maps, these products times
+    A cofactor is a product of the factors in cofactors.py. For maps other than Kahan maps it is such a product times
     any number, which may depend on the symbols and eps.
 
     Args:
@@ -147,7 +147,7 @@ def darboux_polynomials(
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     budget, cofactors = budget_for("Darboux polynomials", effort), laboratory.cofactors()
     spaces = list[DarbouxPolynomials]()
-    # With a defect the image may lie on a hypersurface, and all multiples of its equation have the cofactor 0.
+    # If the map has a defect, its image may lie on a hypersurface g = 0, and all multiples of g have the cofactor 0.
     reason = laboratory.defect
     if flow:
         assert laboratory.field is not None
@@ -184,8 +184,8 @@ def darboux_polynomials(
             basis = [vector for vector in space.basis if any(vector[1:])]  # without constants, which have C = 1
             if basis:
                 spaces_by_C[C] = DarbouxSpace(space.dim, space.degree, basis)
-        # Different products of cofactors may be the same function, and have equal spaces. If products of elements span
-        # one of these spaces, all of them are left out.
+        # Different products of cofactors may be the same function, and have equal spaces. If this space is spanned by
+        # products of elements of other spaces, it is left out for all of these products of cofactors.
         seen_spaces = [space for C, space in spaces_by_C.items() if _is_spanned_by_products(spaces_by_C, C, map_.prime)]
         for C, space in spaces_by_C.items():
             if space not in seen_spaces:
@@ -203,7 +203,7 @@ def darboux_polynomials(
 
 
 def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
-    """Return whether products P Q from other spaces whose cofactors have the product `C` span the space of `C`."""
+    """Return whether the products P Q of elements of other spaces, with cofactors of product C, span the space of C."""
     space, (product, c) = spaces[C], C
     other_spaces = {(key[0].powers, key[1]): other_space for key, other_space in spaces.items() if key != C}
     rows = []
@@ -225,11 +225,11 @@ def _find_formulas(
 ) -> DarbouxPolynomials | str:
     """Return formulas for the first of the spaces, or the reason why there are none.
 
-    The cofactors of the spaces differ by numerical factors.
+    Their cofactors are the `product` times different numbers.
     """
     text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
-    # Interpolating all spaces together distinguishes spaces with the same zero pattern. If that fails, try the first
-    # space alone: the other spaces may be conjugate over an extension of Q and have no formula.
+    # Interpolating all spaces together distinguishes spaces with the same zero pattern. If the interpolation fails, try
+    # the first space alone: the other spaces may be conjugate over an extension of Q and have no formula.
     for group in [spaces, spaces[:1]][len(spaces) == 1 :]:
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
         search = SpaceSearch([step], [list(group)], cofactors)

@@ -3,26 +3,26 @@
 If P o Phi = C P and Q o Phi = C Q with the same rational function C, then P/Q is an integral, and P - c Q vanishes
 along the orbits on which P/Q = c. The search reverses this:
 
-1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials, which contains P and Q.
+1. The relations of degree d along all orbits (hirota_kimura.py) span a space W of polynomials. P and Q belong to W.
 2. Let w_a be a basis of W. The antisymmetric matrices A with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x
-   form a linear space. It contains all antisymmetric matrices on U for every space U with a common cofactor.
+   form a linear space. For every subspace U of W with a common cofactor it contains all antisymmetric matrices on U.
 3. The matrices E with E A = A E^T for all these A are scalars on each U, so each U is an eigenspace of a random E. If
    the sum of the spaces U is not direct, the search looks for matrices A of rank 2, whose 4 x 4 Pfaffians vanish.
 
-Multiples of known spaces of lower degree form a subspace W_T, which is split off first. A matrix A that comes from
-multiples has entries on W_T only. Let V be a complement of W_T. The entries of A with one index in V and the other in
-W_T give the elements of W_T that are added to elements of V to obtain Darboux polynomials.
+The multiples of known spaces of lower degree span a subspace W_T of W. Let V be a complement of W_T. The spaces U are
+determined modulo W_T first, from the entries of A with both indices in V. The entries of A with one index in V and the
+other in W_T then give the elements of W_T that must be added to elements of V to obtain Darboux polynomials.
 
 Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discrete Darboux polynomials.
 
 The same search works for functions of a point and its k-th iterate instead of polynomials of degree 2
 (`TwoPointBasis`). With X = (1, x) and Y = (1, y), where y is the k-th iterate of x, the monomial X_i X_j stands for the
-polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. Along an orbit these functions satisfy linear
-relations as monomials do, and the same null spaces give the combinations with a common cofactor.
+polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. These functions satisfy linear relations along
+orbits, as monomials do, and the same null spaces give their combinations with a common cofactor.
 
 If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
 be integrals, but the ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are integrals (F~ is F one step
-later). Indeed, the values of F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
+later). Indeed, the vectors F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span
 
 _SPARE = 8  # points beyond the number of unknowns
 _MAX_MATRICES = 12  # antisymmetric matrices A that are used
-# Bounds of the number s of rows of A: its s (s - 1)/2 unknown entries take 0.2 seconds for s = 30, 10 for s = 60.
+# Bounds of the number s of rows of A: to solve for its s (s - 1)/2 entries takes 0.2 seconds for s = 30, 10 for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
 TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
 
@@ -77,7 +77,7 @@ class DarbouxSpace:
     def spanned_by(
         cls, dim: int, degree: int, vectors: Vectors, prime: int, indices: Sequence[int] | None = None
     ) -> DarbouxSpace:
-        """Return the span of vectors modulo a prime; their entries belong to all monomials or to `indices`."""
+        """Return the span of vectors of coefficients modulo a prime: of all monomials, or of those with `indices`."""
         if indices is not None:
             full_rows = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
             for row, vector in zip(full_rows, vectors, strict=True):
@@ -88,12 +88,12 @@ class DarbouxSpace:
         basis = [vector[::-1] for vector in reversed(descending_rows)]
         if len(basis) != 2:
             return cls(dim, degree, basis)
-        # The two sparsest elements of the pencil are among those that lack a monomial of the pencil.
+        # The two sparsest combinations of P and Q are among those in which a monomial of P or Q does not occur.
         P, Q = basis
         degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
         count_work(len(P) + 2 * len(degrees))
         support = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
-        zero_sets: dict[int | None, set[int]] = {}  # for the parameter of each such element the monomials that it lacks
+        zero_sets: dict[int | None, set[int]] = {}  # by the number P_k/Q_k: the absent monomials k
         for k in support:
             zero_sets.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
         supports = [([k for k in support if k not in zeros], min(zeros)) for zeros in zero_sets.values()]
@@ -121,7 +121,7 @@ class DarbouxSpace:
         return tuple(tuple(bool(entry) for entry in vector) for vector in self.basis)
 
     def multiples(self, degree: int, prime: int) -> Vectors:
-        """Return a basis of the products of the elements with monomials, up to a degree."""
+        """Return a basis of the span of the products of elements and monomials, up to a degree."""
         factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
         rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
         return echelon([row for row in rows if row is not None], prime)
@@ -132,8 +132,8 @@ def darboux_spaces(
 ) -> list[DarbouxSpace] | None:
     """Find the spaces of degree `degree` that are not multiples of the spaces `known_spaces` of lower degree.
 
-    Returns None, without a search, if the relations span more than `max_span` dimensions. There may be relations that
-    no space explains: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
+    Returns None if the search would be too large: relations and multiples span more than `max_span` dimensions. There
+    may be relations outside all spaces. Their coefficients are integrals other than P/Q with P and Q of this degree.
     """
     prime = map_.prime
     span = span_of_relations(map_, degree, 2 * LARGEST_SPAN)
@@ -176,7 +176,7 @@ def darboux_spaces(
 
 
 def _evaluate_at_random_points(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
-    """Return the values of the polynomials at random points and at the images of these, one row for each point."""
+    """Return the values of a basis of polynomials at random points and at their images, one row for each point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
     values, image_values = (
@@ -193,14 +193,14 @@ def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
 
 
 def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
-    """Compute the spaces with a common cofactor from the matrices A on complement + multiples.
+    """Compute the spaces with a common cofactor from `solutions`, the matrices A on complement + multiples.
 
-    The projections of the spaces to the complement are eigenspaces of a random E with E B = B E^T for the block B, on
-    the complement, of every A.
+    Let B be the block of A on the complement. The projections of the spaces to the complement are eigenspaces of a
+    random E such that E B = B E^T for every A.
     """
     k, size, rng = len(complement), len(complement) + len(multiples), random.Random(prime)
-    # The columns of the blocks on the complement span the projections of the spaces. With an echelon basis b_i of this
-    # span a block is sum A'_ij b_i b_j^T, where A' consists of the entries of the block at the pivots.
+    # The columns of the blocks B span the sum of these projections. With an echelon basis b_i of the sum, each block is
+    # sum A'_ij b_i b_j^T, where A' has the entries of B at the pivots.
     count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
     n, pivot_columns = len(coordinates), pivots(coordinates)
@@ -244,10 +244,10 @@ def _separate_spaces(solutions: list[nmod_mat], complement: Vectors, multiples: 
 
 
 def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
-    """Return the row space of the only combination sum c_s A_s of rank 2 of few matrices A_s; [] if it is not unique.
+    """Return the row space of the combination sum c_s A_s of rank 2 of few matrices A_s; [] if c is not determined.
 
-    The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
-    symmetric matrices that all these forms annihilate are the multiples of c c^T.
+    The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. They annihilate the symmetric matrix c c^T of a common
+    zero c. If all symmetric matrices that they annihilate are multiples of one matrix, it gives c up to a factor.
     """
     count = len(solutions)
     if not 1 <= count <= _MAX_MATRICES:
@@ -271,7 +271,7 @@ def _rank_two_spaces(solutions: list[nmod_mat], complement: Vectors, prime: int)
                 + B[0, 3] * A[1, 2]
             )
 
-        # entry (s, t) of c c^T is c_s c_t; its coefficient is the polar form, and half of it on the diagonal
+        # The coefficient of c_s c_t in the Pfaffian is its polar form at (A_s, A_t), or half of this if s = t.
         one_half = (prime + 1) // 2
         rows.append([pfaffian(forms[s], forms[t]) * (one_half if s == t else 1) % prime for s, t in pairs])
     zeros = null_space(rows, len(pairs), prime)
@@ -324,12 +324,12 @@ def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: in
 
 
 def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
-    """Return the number of functionally independent integrals among the ratios of the spaces, at a random point."""
+    """Return the number of independent integrals among ratios of two elements of a space, at a random point."""
     return rank(gradients_of_ratios(map_.random_point(), spaces, map_.prime), map_.prime)
 
 
 def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) -> Vectors:
-    """Return multiples of the gradients of the ratios of the spaces at a point."""
+    """Return multiples of the gradients, at a point x, of the ratios of elements of each space to its first element."""
     rows = []
     for space in spaces:
         values = [gradient_values(vector, x, space.degree, prime) for vector in space.basis]
@@ -343,7 +343,7 @@ class TwoPointBasis(NamedTuple):
     """A basis of bilinear forms in (1, x) and (1, y), where y is the k-th iterate of x.
 
     `shift` is k; `sign` is 1 for symmetric forms and -1 for Wronskians. `rank` is 1 or 2: the dimension of the span of
-    the values that the functions of a space have along an orbit.
+    the vectors (F_1, ..., F_s) along an orbit, where F_1, ..., F_s is a basis of a space of such forms.
     """
 
     shift: int
@@ -385,7 +385,7 @@ class TwoPointMap(ModularMap):
     """A map modulo a prime that gives monomials of degree at most 2 the values of a `TwoPointBasis`."""
 
     def __init__(self, base: ModularMap, two_point_basis: TwoPointBasis) -> None:
-        # The map and random generator are those of `base`; only the values of monomials differ.
+        # The map and the random generator are those of `base`; only the values of monomials differ.
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.two_point_basis = base.rng, base.map, two_point_basis
 
@@ -401,7 +401,7 @@ class TwoPointMap(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return the values of the basis along an orbit, its first point, and its period (None if it is too long)."""
+        """Return the values of the basis along an orbit, the first point, and the period (None: orbit not closed)."""
         points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         is_closed = len(points) < count + shift
         shifted_points = points[shift % len(points) :] + (points[: shift % len(points)] if is_closed else [])
@@ -440,7 +440,7 @@ def two_point_spaces(map_: ModularMap, basis: TwoPointBasis) -> list[DarbouxSpac
 def bases_with_spaces(
     map_: ModularMap, bases: Sequence[TwoPointBasis] = TWO_POINT_BASES
 ) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
-    """Return the bases that have spaces, with their spaces: those of rank 1 or, if there are none, those of rank 2."""
+    """Return pairs (basis, its spaces) for each basis with spaces of rank 1 or, if there are none, of rank 2."""
     pairs = []
     for basis in bases:
         for candidate in (basis, basis._replace(rank=2)):

@@ -1,1 +1,1 @@
-"""The flow as the limit eps -> 0 of the map: its invariants, and the invariants of the map that tend to them."""
+"""The flow as the limit eps -> 0 of the map: invariants of the flow, and invariants of the map that tend to them."""

@@ -1,24 +1,24 @@
 """The search for Darboux polynomials of a flow: P with f . grad P = K P, so that P = 0 is an invariant hypersurface.
 
-The cofactor K is not given. Expand the monomials up to a degree along a solution, and write their Taylor coefficients
-into a matrix, one order in each row. If the solution starts on P = 0, every row is orthogonal to the coefficients of P:
-the matrix has a smaller rank there than at random points, and P divides its minors, the extactic determinants
-(pereira-2001). The minors are interpolated on a random line modulo a prime. On the line a P of degree d has d zeros,
+The cofactor K is not given. Expand the monomials up to a degree along the solution from a point x, and write their
+Taylor coefficients into a matrix, one order in each row. If P(x) = 0, every row is orthogonal to the coefficients of P.
+So the matrix has a smaller rank there than at random points, and P divides its minors, the extactic determinants
+(pereira-2001). The minors are interpolated on a random line modulo a prime p. On the line a P of degree d has d zeros,
 with conjugate zeros in one irreducible factor, and P vanishes along the solutions from all these zeros. So, for each
 choice of factors of the minors whose degrees add up to d, the search computes the space of polynomials that vanish
-along the solutions from the zeros of the factors; P lies in one of these spaces. Several lines give smaller spaces, by
-intersection. If all spaces are 0, there is no P. If a space has dimension 1, its element P is lifted to Q, and an exact
-division shows whether P divides f . grad P.
+along the solutions from the zeros of the factors. P lies in one of these spaces. Intersections of the spaces of several
+lines are smaller. If all spaces are 0, there is no P. If a space has dimension 1, its element P is lifted to Q, and an
+exact division shows whether P divides f . grad P.
 
 Lifting uses Newton's iteration: P and K modulo p solve f . grad P = K P, usually as a simple solution, so that they are
 determined modulo powers of p. If the coefficients modulo a power are residues of simple rational numbers, P is lifted.
 If they are residues of algebraic numbers, P is one of several conjugate polynomials, whose product has a higher degree.
-All other P are combined with polynomials modulo the next prime. A degree is settled once every polynomial modulo some
-prime is lifted or irrational.
+Any other P is combined, by the Chinese remainder theorem, with the polynomials modulo the next prime. A degree is
+settled once every polynomial modulo some prime is lifted or irrational.
 
-Weights w of the variables form a grading if all terms x^a of all x_i' have the same w . a - w_i. Then the cofactor K of
-a P is homogeneous, and it is the cofactor of every homogeneous part of P. The quotients of these parts are integrals,
-so a P that belongs to no integral is homogeneous in every grading. Hence each search uses the monomials of one weight.
+Weights w of the variables form a grading if w . a - w_i is the same for all terms x^a of x_i' and all i. Then the
+cofactor K of a P is homogeneous, and it is the cofactor of every homogeneous part of P. Quotients of these parts are
+integrals. So a P that belongs to no integral is homogeneous in every grading: each search uses monomials of one weight.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ _MAX_MONOMIALS = 56  # bound of the number of monomials for a requested degree; 
 _MAX_LISTED = 20_000  # monomials up to a degree, before they are grouped by weight
 _SPARE = 8  # orders of a series beyond the number of monomials
 _MAX_CHOICES = 400  # choices of zeros on a line, and pairs of choices on two lines
-_PRIMES = 12  # the first one usually suffices
+_PRIMES = 12  # the largest number of primes; the first one usually suffices
 _PRECISION = 24  # exponent of a prime power, which has 1,464 bits
 _MAX_CONJUGATES = 8  # the largest degree of coefficients that are recognized as algebraic
-_LINES = 4  # modulo each prime
+_LINES = 4  # the largest number of lines modulo each prime
 
 Vectors = list[list[int]]
 
@@ -107,8 +107,8 @@ def flow_polynomials(
     budget = budget or Budget()
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known_polynomials: dict[str, fmpq_mpoly] = {}
-    # Factors of the right-hand sides come first: the search does not find a common factor of all, whose zeros are fixed
-    # points; and if there are infinitely many P, as for x' = x, y' = y, formulas need these factors.
+    # Factors of the right-hand sides come first: the search does not find a common factor of all of them, whose zeros
+    # are fixed points; and it leaves out the members of pencils, such as all linear P for x' = x, y' = y.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known_polynomials.setdefault(str(P), P)
@@ -144,9 +144,9 @@ def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
 
 
 def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
-    """Return the possible supports of an irreducible polynomial of a degree, as lists of indices of monomials.
+    """Return the possible supports of an irreducible polynomial of a degree, as tuples of indices of monomials.
 
-    The monomials of a support have one weight in each grading, no common variable, and one of them has this degree.
+    The monomials of a support have the same weight in each grading and no common variable; one has this degree.
     """
     exponents, by_weight = exponents_up_to(n, degree), dict[tuple[int, ...], list[int]]()
     for k, exponent in enumerate(exponents):
@@ -161,7 +161,7 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
 
 @dataclass
 class _Search:
-    """The search for polynomials of one degree with given monomials; the keys of `known_polynomials` are texts."""
+    """The search for Darboux polynomials of one degree with the monomials of `support` (indices)."""
 
     field: PolynomialField
     degree: int
@@ -176,8 +176,8 @@ class _Search:
     def run(self, primes: list[int], budget: Budget) -> str:
         """Add the polynomials to the known ones; return why there may be further polynomials, or "" if there are none.
 
-        The next search begins with the prime that settles this one: modulo this prime no conjugate polynomials exist
-        whose products would reappear in a higher degree.
+        The prime that settles this search becomes the first of `primes`, for the next search: modulo this prime no
+        conjugate polynomials exist whose products would reappear in a higher degree.
         """
         reason = "lines modulo primes leave others possible"
         combinations: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
@@ -191,7 +191,7 @@ class _Search:
             vectors, is_complete = self._search_modulo(flow, budget)
             unlifted = list[list[int]]()
             for vector in vectors:
-                if not self._try_lift(vector, prime):  # rational or conjugate, decided modulo a power
+                if not self._try_lift(vector, prime):  # a power of the prime decides: rational or conjugate
                     residues, modulus = self._lift_to_power(vector, prime), prime**_PRECISION
                     is_known = residues and self._try_lift(residues, modulus)
                     if not is_known and not any(_is_irrational(c, modulus) for c in residues):
@@ -215,7 +215,7 @@ class _Search:
         return reason
 
     def _search_modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
-        """Return coefficients of monic polynomials modulo the prime of a flow, and whether there are no others."""
+        """Return coefficients of monic Darboux polynomials modulo the prime of a flow, and whether these are all."""
         spaces_so_far: list[Vectors] = []
         for k in range(_LINES):
             spaces = _Line(flow, self.degree, self.support, self.known_polynomials.values()).spaces()
@@ -244,8 +244,8 @@ class _Search:
         if darboux_cofactor(self.field, P) is None:
             return False
         # Test that P is special: along the solution from a zero of P, modulo a new prime, more polynomials vanish than
-        # along a generic solution. If not, P may be an arbitrary member of a pencil, since every residue of its
-        # parameter lifts: for example a product of conjugate lines of two special members, x^2 + y^2 - 1 + 2 i y.
+        # along a generic solution. If not, P may be any member P_1 - c P_2 of a pencil: every residue c lifts to Q. An
+        # example is a product of conjugate lines, one from each of two special members: x^2 + y^2 - 1 + 2 i y.
         is_special = None
         while is_special is None:
             with suppress(BadPrime):
@@ -258,7 +258,7 @@ class _Search:
         return is_special
 
     def _lift_to_power(self, vector: Sequence[int], p: int) -> list[int]:
-        """Lift the coefficients of P from p to a power of p; return [] if P, K is no simple solution of P' = K P."""
+        """Lift the coefficients of P modulo p to a power of p; return [] if P' = K P has no simple solution (P, K)."""
         field, context = self.field, self.field.rhs[0].context()
         denominator = lcm(*(int(common_denominator(f)) for f in field.rhs))
         f = [component * denominator for component in field.rhs]
@@ -279,7 +279,7 @@ class _Search:
             is_unique = pivots(solution) == list(range(len(columns)))
             return [row[-1] for row in solution] if is_unique else None
 
-        # P is determined up to a factor. One coefficient stays fixed, so that the linear systems have one solution.
+        # P is determined up to a number. One coefficient of P stays fixed: then the linear systems have one solution.
         fixed_index = next(k for k, c in enumerate(vector) if c)
         P, P_coefficients = combine_polynomials(vector, terms), list(vector)
         K_coefficients = solve([P * k for k in cofactor], flow_derivative(P))
@@ -343,7 +343,7 @@ class _Line:
 
     def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], factors: Iterable[fmpq_mpoly]) -> None:
         self.flow, self.degree, self.support, self.known_polynomials = flow, degree, support, factors
-        self.count = len(support)  # monomials
+        self.count = len(support)  # the number of monomials
         self.start, self.slope = flow.random_point(), flow.random_point()
         self._generic_dimensions: dict[int, int] = {}
 
@@ -355,7 +355,7 @@ class _Line:
         """Return, for each special factor of a polynomial in t, its degree and its space.
 
         The space consists of the polynomials that vanish along the solutions from the zeros of the factor. A factor is
-        special if this space is larger than for equally many random points, where products of integrals I - c vanish.
+        special if this space is larger than that of equally many random points (which has products of integrals I - c).
         """
         points = []
         count_work(max(0, int(polynomial.degree())) ** 2)
@@ -374,15 +374,15 @@ class _Line:
         return self._generic_dimensions[count]
 
     def spaces(self) -> list[Vectors] | None:
-        """Return the space of vanishing polynomials for each choice of zeros of total degree `degree`.
+        """Return, for each choice of special factors of total degree `self.degree`, the intersection of their spaces.
 
         Returns None if there are too many choices.
         """
-        # The common factor, on the line, of the minors of the matrix of Taylor coefficients. The minors have as many
-        # rows as the rank at random points; the first rows are independent there. Replacing the last row by the next
-        # one gives the derivative of a minor along the flow; the common factor of minor and derivative contains all
-        # invariant factors, and multiple factors. Columns are combined at random. If there are more columns than the
-        # rank, the two minors use different combinations, and share the factor common to all minors.
+        # Compute the common factor, on the line, of the minors of the matrix of Taylor coefficients. The minors have as
+        # many rows as the rank at random points; the first rows are independent there. A minor with the next row in
+        # place of the last one is its derivative along the flow. The common factor of a minor and its derivative
+        # contains all invariant factors, and multiple factors. Columns are combined at random. If there are more
+        # columns than the rank, the two minors use different combinations, and share the factor common to all minors.
         p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
         matrices = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
         if size < self.count:

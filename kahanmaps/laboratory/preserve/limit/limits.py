@@ -1,11 +1,11 @@
 """Limits of integrals of a map as eps -> 0: the integrals of its flow that the map conserves, deforms or loses.
 
-An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...), and its leading term I_0 is
-an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals by a relation
-R(I_0, J_0, ...) = 0, R a polynomial, then R(I, J, ...) is an integral of the map that tends to 0 with eps. Divided by a
-power of eps it replaces I. (If I_0 is constant, R contains only I.) If all integrals of the map are functions of
-integrals with independent leading terms I_0, then an integral of the flow that is not a function of these I_0 is not a
-limit of integrals of the map.
+An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...). Its leading term I_0 is an
+integral of the flow: f . grad I_0 = 0. Let I, J, ... be integrals with v = 0 whose leading terms satisfy a polynomial
+relation R(I_0, J_0, ...) = 0. Then the integral R(I, J, ...) of the map tends to 0 with eps. Divided by a power of eps
+it replaces I. (If I_0 is constant, R contains only I.) If all integrals of the map are functions of integrals with
+independent leading terms, then an integral of the flow that is not a function of these leading terms is not a limit of
+integrals of the map.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _BUDGET = 2_000_000  # products of terms, for the arithmetic with integrals
 _MAX_ROUNDS = 5  # combinations of an integral with other integrals
 _MAX_UNKNOWNS = 60  # coefficients of a relation between leading terms
 _SHOWN_TERMS, _SHOWN_TERMS_SECOND = 100, 12  # monomials of an integral of the flow, and of the second term of a series
-_DENSITY_DEGREE = 4  # of the densities of the flow that are searched for
+_DENSITY_DEGREE = 4  # the largest degree of the densities of the flow that are searched for
 _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dimension; 3 in higher dimension
 
 
@@ -58,8 +58,8 @@ class Limit:
 
     `combination` is a function of eps and of the names of integrals of the map; `second` is None if the series has no
     further term. f . grad leading = 0 is proved; `conserved` is the verdict on `leading` being an integral of the map.
-    If a point of the phase space consists of several successive points, `on_solutions` is True, and `leading` is the
-    leading term at points of one solution, without further terms.
+    A phase point of a polarized map consists of several successive points. Then `on_solutions` is True, and `leading`
+    is the leading term for points of one solution of the differential equation; further terms are not computed.
     """
 
     name: str
@@ -93,14 +93,14 @@ class Limit:
 
 @dataclass(frozen=True)
 class FlowAndMap:
-    """A comparison of the integrals of a flow and of its Kahan map.
+    """A comparison of the integrals of a flow with those of its Kahan map, or of a polarized map.
 
     The known integrals of the flow are `limits`, to which integrals of the map tend, and `other_integrals`; together
     they are independent. The map has `count` integrals; for `without_limit` of them no limit is known. `search` is the
     search for integrals of the flow, or None if there are already as many limits as possible. `density` is a density of
-    the flow; `density_search` is the search for it, or None if it is the limit of a density of the map. `polynomials`
-    are the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to `polynomials_degree`
-    there are no others (measured; 0: no search). `polynomials_reason` says why the next degree is open.
+    the flow; `density_search` is the search for densities, or None if `density` is the limit of a density of the map.
+    `polynomials` are the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to
+    `polynomials_degree` there are no others (measured; 0: no search). `polynomials_reason`: why higher ones are open.
     """
 
     limits: tuple[Limit, ...]
@@ -117,7 +117,7 @@ class FlowAndMap:
 
     @property
     def reason(self) -> str:
-        """The reason why no density of the flow is known."""
+        """The reason why no density of the flow is known; empty if one is known."""
         return "" if self.density_search is None else self.density_search.reason
 
     @property
@@ -212,17 +212,17 @@ def flow_and_map(
     """Compare the integrals of a Kahan map, or of a polarized map, with the integrals of its differential equation.
 
     Args:
-        search: the integrals of the map, for every eps.
-        densities: the densities of the map, if known. A limit of one of them that is a density of the flow replaces a
-            density that the search finds.
-        flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
-            integrals of the map are already the largest possible number.
+        search: the result of `find_integrals` for the map, with eps as a symbol.
+        densities: the densities of the map, if known. If the flow preserves the limit of one of them, this limit
+            replaces the density of the flow that the search finds.
+        flow: the result of `find_integrals` for the flow. By default integrals of the flow are searched for up to a low
+            degree, unless the integrals of the map have n - 1 independent limits in dimension n.
         known: the number of integrals that the map is known to have, if `search` shows fewer.
         effort: the work of the search: each step above 1 doubles it, each step below halves it.
         progress: called with a sentence at each stage of the search.
 
     Returns:
-        The comparison, exact except for statements marked as measured. None for all other maps, and for a single eps.
+        The comparison, exact except for statements marked as measured. None for other maps, and if eps is a number.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -285,7 +285,7 @@ def with_limit(comparison: FlowAndMap, densities: DensitySearch | None) -> FlowA
 
 
 def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
-    """Compute the independent integrals of the flow to which integrals of the map tend."""
+    """Compute independent integrals of the flow to which combinations of the integrals of a Kahan map tend."""
     n, symbols = search.file.dim, search.symbols
     field = FunctionField(laboratory.map.names, _BUDGET)
     labels = [integral.name + "(x)" * (integral.name in symbols) for integral in search.integrals]
@@ -293,7 +293,7 @@ def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit,
     map_laboratory = Laboratory(search.file, symbols, None, search.seed)
     independent = IndependentGradients(laboratory.maps[0])
     limits: list[Limit] = []
-    # The combinations of integrals that have limits, as functions of x and as formulas in the names of the integrals.
+    # The combinations of integrals that tend to the limits so far: pairs (function of x, formula in their names).
     combinations: list[tuple[Function, Function]] = []
     for integral, formula in zip(search.integrals, formal_field.variables, strict=False):
         I = Function(field, integral.function.numerator, integral.function.denominator)
@@ -331,10 +331,10 @@ def _find_limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit,
 def _find_limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
     """Compute the integrals of the flow to which integrals of a polarized map tend.
 
-    A point of such a map consists of several successive points x, x_1, ... of a method of order 2.
+    A point of such a map consists of several successive points x, x_1, ... of an orbit of a method of order 2.
 
     Along a smooth solution x_k = x + h_k f + h_k^2/2 f'f + O(eps^3) with h_k = 2 k eps. So the terms of numerator and
-    denominator up to eps^2 are known, and a limit is known if the leading terms are among these.
+    denominator of an integral up to eps^2 are known. The limit is known if these contain both leading terms.
     """
     field, n = laboratory.field, laboratory.map.dim
     assert field is not None
@@ -436,13 +436,13 @@ def _find_relation(functions: Sequence[RationalFunction], n: int, symbol_count: 
 def _collect_polynomials(
     laboratory: Laboratory, candidates: Sequence[fmpq_mpoly], functions: Sequence[RationalFunction]
 ) -> tuple[fmpq_mpoly, ...]:
-    """Collect Darboux polynomials of the flow, neither affine nor integrals, from `candidates` and from factors."""
+    """Collect Darboux polynomials of the flow, not affine and no integrals: `candidates` and factors of `functions`."""
     assert laboratory.field is not None
     n = laboratory.map.dim
     polynomials = {str(P): P for P in candidates if degree_in(P, n) > 1}
     for function in functions:
         for polynomial, other in permutations((function.numerator, function.denominator)):
-            # An irreducible P of the same degree as Q is no more special than any other member P - c Q of the pencil.
+            # If P is irreducible and has the degree of Q, it is no more special than any P - c Q of the pencil.
             factors = irreducible_factors(polynomial)
             is_generic = [k for _, k in factors] == [1] and degree_in(polynomial, n) == degree_in(other, n)
             for factor, _ in [] if is_generic else factors:

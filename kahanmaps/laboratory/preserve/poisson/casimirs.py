@@ -1,8 +1,8 @@
 """Candidates for Casimirs of a tensor P among functions of known integrals: products of powers, polynomials, quotients.
 
-C is a Casimir if P grad C = 0. For C = prod I_i^k_i this says sum k_i P grad I_i / I_i = 0; for a polynomial in the I_i
-it is a linear relation among multiples of the P grad I_i. At random points modulo a prime these are linear equations
-for the exponents k, or for coefficients that may contain eps and the symbols. The candidates are not verified here.
+C is a Casimir if P grad C = 0. For C = prod I_i^k_i this says sum k_i P grad I_i / I_i = 0. For a polynomial C in the
+I_i it is a linear relation among multiples of the P grad I_i. At random points modulo a prime these are linear
+equations for the k_i or the coefficients of C, which may contain eps and the symbols. No candidate is verified here.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 
 _DEGREE = 2  # of polynomials in the integrals
-_MAX_TERMS = 40  # of these polynomials
+_MAX_TERMS = 40  # monomials of a polynomial in the integrals
 _MAX_EXPONENT = 12  # in a product of powers
 _BUDGET = 200_000  # products of terms, to expand a candidate
 _SPARE = 4  # points beyond the number of unknowns
@@ -36,7 +36,7 @@ _SPARE = 4  # points beyond the number of unknowns
 def casimir_candidates(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[tuple[str, RationalFunction]]:
-    """Yield functions of the integrals that may be Casimirs, each as text in their names and as an expanded function.
+    """Yield possible Casimirs, each as a text in the names of the integrals and as an expanded function.
 
     Args:
         laboratory: the reductions of the map modulo primes.
@@ -74,11 +74,11 @@ def casimir_candidates(
 def _find_products(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
 ) -> Iterator[RationalFunction]:
-    """Yield the products of powers of at least two integrals that are Casimirs."""
+    """Yield the Casimirs that are products of powers of at least two integrals."""
     p, rows = map_.prime, list[list[int]]()
     for _ in range(_SPARE + len(integrals)):
         values, fields = _evaluate_fields(map_, tensor, integrals)
-        # I_1^a I_2^b ... is a Casimir if and only if the logarithmic fields satisfy a P grad I_1/I_1 + ... = 0.
+        # I_1^a I_2^b ... is a Casimir if and only if a P grad I_1/I_1 + b P grad I_2/I_2 + ... = 0.
         columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, fields, strict=True)]
         rows += [list(row) for row in zip(*columns, strict=True)]
     for vector in null_space(rows, len(integrals), p):
@@ -101,7 +101,7 @@ def _find_products(
 def _find_polynomials(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """Yield a basis of the polynomials of degree at most 2 in the integrals that are Casimirs."""
+    """Yield a basis of the Casimirs that are polynomials of degree at most 2 in the integrals."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MAX_TERMS else 1
     powers = exponents_up_to(len(integrals), degree)[1:]
 
@@ -125,10 +125,10 @@ def _find_polynomials(
 def _find_fractions(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """Yield quotients of affine functions of the integrals that are Casimirs.
+    """Yield Casimirs that are quotients of affine functions of the integrals.
 
     With J = (1, I_1, ...) the quotient (u.J)/(v.J) is a Casimir if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
-    w = u ^ v. These equations are linear in w, and any two independent rows of w span the same plane as u and v.
+    w_ab = u_a v_b - u_b v_a. This is linear in w, and any two independent rows of w span the same plane as u and v.
     """
     count = len(integrals)
     if comb(count + 2, 2) > _MAX_TERMS:
@@ -162,10 +162,10 @@ def _find_linear_relations(
     columns: Callable[[list[int], list[list[int]], int], list[list[int]]],
     budget: Budget,
 ) -> Sequence[fmpq_mpoly]:
-    """Interpolate the linear relations among columns, as polynomials in the integrals with the monomials `powers`.
+    """Interpolate a basis of the linear relations sum c_m column_m = 0, as polynomials sum c_m m in the integrals.
 
-    `columns` computes one column for each monomial, from the result of `_evaluate_fields` at a point and the prime.
-    Coefficients of the relations may contain eps and the symbols.
+    m runs through the monomials with exponents in `powers`, and the c_m may contain eps and the symbols. `columns`
+    computes one column for each m from the result of `_evaluate_fields` and the prime.
     """
     count, degree = len(integrals), max(map(sum, powers))
     all_exponents = exponents_up_to(count, degree)
@@ -190,7 +190,7 @@ def _find_linear_relations(
 def _evaluate_fields(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral]
 ) -> tuple[list[int], list[list[int]]]:
-    """Return the values of the integrals at a random point, and the tensor times their gradients.
+    """Return the values of the integrals I at a random point, and the vectors P grad I there, where P is the tensor.
 
     Raises NoPoint if a value is 0 or undefined.
     """

@@ -1,9 +1,9 @@
 """Hamiltonian structures f = J grad H of a quadratic system with a constant skew matrix J: exactly, over Q.
 
-With K = J^{-1} the condition is that K f is a gradient: K f'(x) is symmetric for all x, which gives linear equations
-for K. If J is degenerate, the vectors v of its kernel give affine integrals v . x. If the kernel consists of all affine
-integrals, the equations are linear as well: in coordinates (y, z) = T x, where z are the integrals, they say
-f_y = K^{-1} grad_y H with z as parameters.
+With K = J^{-1} the condition is that K f is a gradient. This means that K f'(x) is symmetric for all x: linear
+equations for K. If J is degenerate, each v in the kernel gives an affine integral v . x. If all affine integrals arise
+in this way, the equations are linear as well: take linear coordinates (y, z) of x, where z are these integrals, and let
+y' = f_y. The condition is that K f_y = grad_y H with an invertible skew matrix K; z are parameters.
 
 By cmoq-2013 the Kahan map of such a system conserves the modified Hamiltonian
 H + (2 eps/3) grad H^T (I - eps f')^{-1} f and has the invariant measure dx/det(I - eps f'), for every eps.
@@ -52,10 +52,10 @@ _MAX_GRID = 2000  # points at which a Pfaffian must vanish to be identically 0
 class ConstantStructures(PrintableResult):
     """The result of `constant_structures`; every form, function and matrix is exact.
 
-    forms: a basis of the skew K for which K f is a gradient (invertible or not), with coprime integer entries.
+    forms: a basis of the skew K (invertible or not) for which K f is a gradient, with coprime integer entries.
     functions: for each form K the H of degree at most 3 with grad H = K f and H(0) = 0; the flow conserves H.
     hamiltonian: H and J with f = J grad H, or None; the gradients of `casimirs` span the kernel of J.
-    reason: why `hamiltonian` is None, else empty; `proved` says whether it is proved that there is none.
+    reason: why `hamiltonian` is None, else empty; `proved` says whether it is proved that no such J exists.
     """
 
     system: QuadraticSystem
@@ -85,7 +85,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
 
     Returns:
         A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J with few nonzero entries,
-        then a J whose kernel is the space of all affine integrals. Proper subspaces are not tried as kernels.
+        then a J whose kernel is the space of all v with v . f = 0. Its proper subspaces are not tried as kernels.
 
     Raises:
         InputError: for a dimension above 30.
@@ -121,7 +121,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
     elif (n - len(integrals)) % 2:
         reason += f", and the {counted(len(integrals), 'affine integral')} would give J a kernel of dimension "
         reason += f"{len(integrals)}, impossible for a skew {n} x {n} matrix"
-        # With one integral the kernel is its span or 0; more integrals have proper subspaces, which are not tried.
+        # With one affine integral v . x the kernel is 0 or the span of v. Several v have other subspaces, not tried.
         proved = proved and len(integrals) == 1
     else:
         quotient = quotient_by(integrals, n)
@@ -132,18 +132,18 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
             casimirs = linear_combinations(rows, ring(system.variables).gens())
             return ConstantStructures(system, forms, functions, H, casimirs, "", True)
         reason += ", and none has the affine integrals as its kernel"
-        # With two integrals and even n the kernel is their span or 0; with three it may be a plane, not tried.
+        # With two affine integrals and even n the kernel is 0 or their span; with three it may be a plane, not tried.
         proved = proved and is_decided and len(integrals) <= 2
     return ConstantStructures(system, forms, functions, None, (), reason, proved)
 
 
 def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
-    """Return a basis of the skew K for which K f_y is a gradient in the coordinates y of the quotient, y' = f_y."""
+    """Return a basis of the skew K for which K f_y is a gradient in y, the coordinates of the quotient; y' = f_y."""
     m, n = len(quotient.free), system.dim
     count_work(n**4 + 5 * n**3)
     over_Q = system.over(QQ)
     unit_vectors = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
-    # K f'(x) must be symmetric, first at a random point, which leaves few K, then at the origin and in each direction.
+    # Impose that K f'(x) is symmetric: first at a random point, which leaves few K, then at 0 and in each direction.
     jacobians = [over_Q.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), over_Q.B]
     jacobians += [over_Q.hessian_times(unit) for unit in unit_vectors]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
@@ -166,7 +166,7 @@ def _skew_matrix(m: int, entries: Mapping[tuple[int, int], int | fmpz]) -> fmpq_
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
-    """Write the system as J grad H with J = S K^{-1} S^T, S = dx/dy, scaled to coprime integers, the first positive."""
+    """Write f = J grad H with J = c S K^{-1} S^T and S = dx/dy; c makes the entries of J coprime integers."""
     J = quotient.section * K.inv() * quotient.section.transpose()
     entries = tuple(J.entries())
     factor = next(
@@ -232,7 +232,7 @@ def _find_invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> t
 class InheritedIntegrals:
     """The result of `inherited_integrals`.
 
-    `quotient` holds the affine integrals; `forms` are the K of the modified Hamiltonians, in the coordinates y.
+    `quotient` holds the affine integrals; `forms` are the K with K f_y = grad_y H, one for each modified Hamiltonian.
     """
 
     system: QuadraticSystem
@@ -247,10 +247,10 @@ class InheritedIntegrals:
         return " and ".join([*phrases, counted(modified_count, "modified Hamiltonian")] if modified_count else phrases)
 
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
-        """Return covectors with the same span as the gradients of all inherited integrals at a point.
+        """Return row vectors with the same span as the gradients of all inherited integrals at a point x.
 
-        `map_` is the map of the system modulo a prime that divides none of its denominators. At an indeterminacy point
-        of the map only the affine integrals are included.
+        `map_` is the map of the system modulo a prime that divides no denominator of the system. At an indeterminacy
+        point of the map only the affine integrals are included.
         """
         assert isinstance(map_.map, KahanMap)
         field, n, free = GF(map_.prime), map_.dim, self.quotient.free
@@ -281,7 +281,7 @@ class InheritedIntegrals:
         return rows
 
     def count(self, map_: ModularMap) -> int:
-        """Return the rank of the gradients of the integrals at a random point, a lower bound of their number."""
+        """Return the rank of the gradients at a random point: a lower bound of the number of independent integrals."""
         return rank(self.gradients(map_, map_.random_point()), map_.prime)
 
     def hamiltonian(self, k: int) -> fmpq_mpoly:

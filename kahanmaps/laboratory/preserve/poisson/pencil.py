@@ -1,12 +1,12 @@
 """The invariant curves P = c Q of a planar map with the integral P/Q: the genus and the base points of this pencil.
 
-The computation runs modulo a prime, with a residue for eps, in random projective coordinates. Take the curve of the
+The computation runs modulo a prime p, with a residue for eps, in random projective coordinates. Take the curve of the
 pencil through a random point, and its component C through this point: C is irreducible over GF(p) and smooth at the
 point, hence irreducible over the algebraic closure. If curves of the pencil have several components, the pencil of
 these components replaces the given one. Two generic curves of degree d of the pencil meet only in the base points, and
-are smooth outside of these, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives the intersection number
-at each base point. If this number may exceed the square of the multiplicity m, the base point is blown up, and so are
-the base points infinitely near to it, until the curves are separated. Then (hartshorne-1977, V.3)
+are smooth outside of these, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives their intersection
+number at each base point. If it may exceed the squared multiplicity of the curves there, the point is blown up, and so
+are base points infinitely near to it, until the curves are separated. All multiplicities m_i satisfy (ibid., V.3)
 
     sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
 
@@ -35,18 +35,18 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.singular.jets import modulo
 
-MAX_DEGREE = 12  # of numerator and denominator of the integral
-_TRIES = 3  # primes, until the results for two of them agree
+MAX_DEGREE = 12  # of the numerator and the denominator of the integral
+_TRIES = 3  # primes that are tried until the results for two of them agree
 _BITS = 31  # of primes; python-flint does not sort factors with larger coefficients
-# The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the
-# curves: diller-favre-2001.
+# How the degrees grow, by the genus of the curves, if a planar map of infinite order preserves each curve of a pencil:
+# diller-favre-2001.
 GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
 _Series = dict[tuple[int, int], Any]  # a truncated power series in x, y at a point: coefficients by exponents
 
 
 @dataclass(frozen=True)
 class BasePoints:
-    """The number of base points of one multiplicity, and how many of them are infinitely near points."""
+    """The number of base points with one multiplicity, and how many of them are infinitely near to another one."""
 
     multiplicity: int
     count: int
@@ -87,9 +87,9 @@ class Pencil:
         )
 
     def motion(self, growth: Growth) -> str:
-        """Return a sentence on the restriction of the map to these curves, given the growth of its degrees.
+        """Return a sentence on the restriction of the map to the curves I = c, given the growth of the map's degrees.
 
-        Empty if nothing can be concluded. An automorphism of a curve of genus 1 is a translation or has finite order.
+        It is "" if nothing follows. An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
             return "the map has finite order, since such a curve has only finitely many automorphisms"
@@ -160,7 +160,7 @@ def _require(condition: bool) -> None:
 
 
 class _ModularPlane:
-    """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, is near)."""
+    """The plane modulo a prime; `points` counts base points by pairs (multiplicity, whether infinitely near)."""
 
     def __init__(self, field: PrimeField, rng: random.Random, budget: Budget) -> None:
         self.field, self.prime, self._rng, self._budget = field, field.prime, rng, budget
@@ -168,13 +168,13 @@ class _ModularPlane:
         self.points: Counter[tuple[int, bool]] = Counter()
 
     def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
-        """Compute the pencil of the components. Raises BadPrime, _NotGeneric."""
+        """Compute the `Pencil` modulo the prime, for the residue `eps`. Raises BadPrime, _NotGeneric."""
         # Homogenize P and Q to the same degree and substitute random affine forms for x, y and z.
         x, y = self.ring.gens()
         forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
         at_eps = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
         degree, zero = int(max(f.total_degree() for f in at_eps)), self.ring.constant(0)
-        count_work(500 + 60 * degree**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
+        count_work(500 + 60 * degree**3)  # for factorizations, resultants and base points
         X, Y, Z = (
             [form**k for k in range(degree + 1)]
             for form in (x * self._draw_residue() + y * self._draw_residue() + self._draw_residue() for _ in "xyz")
@@ -212,7 +212,7 @@ class _ModularPlane:
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
         for factor, intersection in nmod_poly(eliminant, self.prime).factor()[1]:
-            if intersection < 4:  # less than 2^2: a simple point, followed by simple points infinitely near to it
+            if intersection < 4:  # below 2^2, so m = 1: a simple point and simple points infinitely near to it
                 self._add_simple(int(factor.degree()), int(intersection), is_near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
@@ -229,7 +229,7 @@ class _ModularPlane:
             b = -gcd[k - 1] / K(k)
             _require(gcd == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
             max_intersection = int(intersection)
-            f, g = (  # F(x + a, y + b) without terms of degree above the bound
+            f, g = (  # F(x + a, y + b) without terms of degree above `max_intersection`
                 _collect_terms(
                     ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
                     for (i, j), c in ((exponents, K(int(c))) for exponents, c in F.terms())
@@ -245,10 +245,10 @@ class _ModularPlane:
         self.points[1, True] += conjugate_count * (chain_length - 1)
 
     def _resolve(self, K: Any, f: _Series, g: _Series, max_intersection: int, *, is_exact: bool, is_near: bool) -> None:
-        """Count the origin and the points infinitely near to it, as far as they are common points of two curves over K.
+        """Count the origin and points infinitely near to it that the curves f = 0 and g = 0 over K have in common.
 
-        The intersection number is at most `max_intersection`, and equal to it if `is_exact`; it bounds the degrees of
-        the terms that matter.
+        The intersection number at the origin is at most `max_intersection`, and equal to it if `is_exact`. Terms of f
+        and g of a degree above `max_intersection` do not matter.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())

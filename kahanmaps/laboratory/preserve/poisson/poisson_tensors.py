@@ -1,9 +1,9 @@
 """The search for Poisson tensors that a map preserves: skew P(x), polynomial in x, with dPhi P(x) dPhi^T = P(x~).
 
-At a random point modulo a prime this law gives n (n - 1)/2 linear equations for the coefficients of P, so that all P up
-to a degree form one null space. A tensor is represented by the bivector sum P_ij d_i d_j, a polynomial in x and in new
-variables d_i, so that its coefficients are interpolated, as functions of eps and the symbols, like the coefficients of
-any polynomial. With a common denominator psi the unknown is B = psi P: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
+At a random point modulo a prime this equation gives n (n - 1)/2 linear equations for the coefficients of P, so all P up
+to a degree form one null space. A tensor is represented by the bivector sum P_ij d_i d_j, a polynomial in x and new
+variables d_i. So its coefficients are interpolated, as functions of eps and the symbols, like those of any polynomial.
+With a common denominator psi the unknown is B = psi P, with the equation psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
 
 The Jacobi identity is not linear in P. If several tensors satisfy it, one identity for their sum, in which each tensor
 is multiplied by a symbol, decides whether all combinations are Poisson tensors.
@@ -57,9 +57,9 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 2000  # coefficients of all entries of a tensor
-_MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
+_MAX_LOG_CANONICAL_DIM = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
 _SPARE_POINTS = 8  # points beyond those that determine the unknowns
-_SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
+_SHOWN_CHARACTERS = 2000  # the largest length of the brackets of one tensor that are printed
 _MAX_INTEGRALS = 12  # the largest number of integrals for which all subsets are tested for involution
 _MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
 
@@ -68,11 +68,11 @@ Exponents = tuple[int, ...]
 
 @dataclass(frozen=True)
 class FoundTensor(LatexDisplay, ResultPart):
-    """A tensor that the map preserves, with the verdicts on its invariance and on the Jacobi identity (`jacobi`).
+    """A tensor that the map preserves: `verdict` on the invariance, `jacobi` on the Jacobi identity.
 
     `rank` is the rank at random points. `casimirs` has the names of the known integrals that are Casimirs, and formulas
     such as I1/I2 for further Casimirs among functions of the integrals. `in_involution` has the names of a largest set
-    of integrals in involution; `involution` is the verdict on their brackets, None without such integrals.
+    of integrals in involution; `involution` is the verdict that their brackets vanish (None without such integrals).
     """
 
     name: str
@@ -106,7 +106,7 @@ class FoundTensor(LatexDisplay, ResultPart):
 
     @property
     def statement(self) -> str:
-        """A phrase with the rank, the verdict on the Jacobi identity, the Casimirs and the integrals in involution."""
+        """A phrase on the rank, the Jacobi identity, the Casimirs and the integrals in involution."""
         phrases = [f"rank {self.rank}"]
         if self.jacobi.holds:
             phrases.append(f"a Poisson tensor ({self.jacobi})")
@@ -144,7 +144,7 @@ class PoissonSearch(Search):
     """The result of `find_poisson`: tensors up to `degree`, and the reason if there are none.
 
     All tensors up to the degree are combinations of the listed ones and of products of polynomial integrals with
-    tensors of lower degree. `pencil`: whether all combinations of listed tensors are Poisson; None: not tested.
+    tensors of lower degree. `pencil` says whether all combinations of listed tensors are Poisson (None: not tested).
     """
 
     _parts, _noun = "tensors", ("tensor", "tensors")
@@ -201,7 +201,7 @@ def find_poisson(
     progress: Callable[[str], None] = lambda _: None,
     on_result: Callable[[PoissonSearch], None] = lambda _: None,
 ) -> PoissonSearch:
-    """Search for the tensors P with polynomial entries up to a degree that a map preserves.
+    """Search for the skew tensors P that a map preserves; their entries are polynomials up to a degree.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
@@ -210,7 +210,7 @@ def find_poisson(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         denominator: a function of the variables and eps by which the entries are divided. None: entries are
-            polynomials; without such a tensor the factors of a density are tried, if this is little work.
+            polynomials; if there is no such P, the factors of a known density are tried, if this is little work.
         integrals: the integrals whose brackets are computed; None: if there is a tensor, integrals are searched for.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
@@ -218,8 +218,8 @@ def find_poisson(
         on_result: called with the tensors so far after each new tensor, for searches that may be interrupted.
 
     Returns:
-        A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
-        other tensors are left out. That there are no others up to the degree is measured.
+        A `PoissonSearch`; formulas are exact, proved or supported. Combinations of listed tensors with polynomial
+        integrals as coefficients are left out. That there are no further tensors up to the degree is measured.
 
     Raises:
         InputError: for unknown symbols, eps = 0, a negative degree, or a denominator that vanishes at this eps.
@@ -265,7 +265,7 @@ def find_poisson(
             limit_text = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             candidate_tensors, _ = _find_tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
         if not candidate_tensors and denominator is None:
-            # Try the product of the factors of a known density as denominator; its degree is added to that of entries.
+            # Try the product of the factors of a known density as denominator; its degree is added to the numerators'.
             density = None
             with suppress(NoPoint):
                 density = products_of(
@@ -316,7 +316,7 @@ def find_poisson(
 
 
 def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], budget: Budget) -> PoissonSearch:
-    """Add to each tensor its Casimirs and a set of integrals in involution, from the known integrals."""
+    """Add to each tensor of `result` the Casimirs and a set of integrals in involution, from the known `integrals`."""
     tensors = result.tensors
     if tensors and integrals:
         laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
@@ -334,7 +334,7 @@ def _find_tensors(
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[MatrixPoissonTensor], str]:
-    """Compute formulas for a basis of the tensors with this denominator, with the given `monomials` of the bivector.
+    """Compute formulas for a basis of the tensors with this denominator; `monomials` restricts those of the bivector.
 
     Returns the tensors and an empty text, or no tensors and the reason.
     """
@@ -377,7 +377,7 @@ def _find_tensors(
         if rank(rows, map_.prime) == spanned_rank:
             continue
         spanned_rank += 1
-        entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}  # of sum P_ij d_i d_j
+        entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}  # of P_ij, by the pair (i, j)
         for monomial, coefficient in bivector.terms():
             pair = tuple(k for k in range(n) if monomial[n + k])
             entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
@@ -400,7 +400,7 @@ def tensor_space(
     denominator: RationalFunction | None = None,
     support: frozenset[Exponents] | None = None,
 ) -> DarbouxSpace:
-    """Compute all bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
+    """Compute all bivectors sum P_ij d_i d_j, P_ij of degree at most `degree`, that a map modulo a prime preserves.
 
     Bivectors are polynomials in x and d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
     """
@@ -450,7 +450,7 @@ def _evaluate(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -
 def _add_brackets(
     laboratory: Laboratory, found_tensor: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> FoundTensor:
-    """Add to the tensor its Casimirs, and a largest set of integrals in involution."""
+    """Add to a tensor the names of its Casimirs and of a largest set of integrals in involution."""
     tensor, map_ = found_tensor.tensor, laboratory.maps[0]
     field, casimir_gradients = GF(map_.prime), IndependentGradients(map_)
     P = _evaluate(tensor, map_, casimir_gradients.point)
@@ -471,7 +471,7 @@ def _add_brackets(
             row = casimir_gradients.gradient(function)
             if len(casimir_gradients.rows) < max_casimirs and casimir_gradients.adds(row):
                 add_casimir(name, function, row)
-    # The first largest set of integrals whose brackets with each other vanish at the point.
+    # The first of the largest sets of integrals whose brackets with each other vanish at the random point.
     hamiltonian_fields = [(P * field.column(row)).entries() for row in rows]
     is_zero = [
         [sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in hamiltonian_fields] for row in rows
@@ -489,7 +489,7 @@ def _add_brackets(
 
 
 def _certify(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
-    """Certify an identity, without an expansion if the budget is spent."""
+    """Certify an identity; if the budget is spent, do not expand it."""
     return certified(identity, laboratory.seed, expands=not budget.is_spent)
 
 
