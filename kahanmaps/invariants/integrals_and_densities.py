@@ -72,8 +72,7 @@ class PhaseFunction(ABC):
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    `root`, if given, is the value of the variable before eps. `map_` is the map x -> x~; a function that contains x~
-    needs it.
+    `root`, if given, is the value of the variable before eps. If the function contains x~, `map_` is the map x -> x~.
     """
 
     def __init__(
@@ -116,7 +115,10 @@ class ClaimedFunction(PhaseFunction):
 
 
 def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
-    """Return an orbit of `length` steps with x in the middle, or at the beginning if the inverse map is not known."""
+    """Return an orbit of `length` steps with x in the middle, or at the beginning if the inverse map is not known.
+
+    With x in the middle, the coordinates of the points are rational functions of x of lower degree.
+    """
     points, steps_back = [x], 0
     try:
         inverse = map_at_eps.inverse

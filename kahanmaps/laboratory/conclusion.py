@@ -241,7 +241,10 @@ def _capitalize(sentence: str) -> str:
 
 
 def orbits_lie_on_curves(result: AnalysisResult) -> bool:
-    """Return whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically."""
+    """Return whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
+
+    The map acts on the level curves of these integrals, and an automorphism of infinite order implies genus 0 or 1.
+    """
     return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
