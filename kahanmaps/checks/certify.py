@@ -56,7 +56,8 @@ def certify(
     Returns:
         The finding: proved by the theorem or by expansion, otherwise supported, refuted (with a witness) or undecided.
 
-    Raises: Contradiction: if a proved claim fails at a point: then kahanmaps contains an error.
+    Raises:
+        Contradiction: if a proved claim fails at a point; then kahanmaps contains an error.
     """
     decision = decide(identity, settings.seed, settings.error_bits if proof is None else 1)
     also: list[Evidence] = []
@@ -106,8 +107,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     if budget is None:
         if identity.dim > MAX_DIMENSION:
             return None
-        # The time of a product grows with the length of its factors; above 10,000 bits, which exceed caches, it grows
-        # faster.
+        # Products of long numbers take longer, in particular above 10,000 bits, where numbers exceed the caches.
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
         if identity.scales_with_eps:

@@ -146,7 +146,7 @@ class Identity:
             yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence except the bounds; `undefined` points had no values of the two sides."""
+        """Return the data of the evidence except bounds; at `undefined` points the sides were not defined."""
         return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
 
 

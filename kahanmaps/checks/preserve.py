@@ -67,13 +67,13 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
 def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return the image x~ of the point x, after a test that x and x~ satisfy the equation of the Kahan map.
 
-    The formula for dPhi follows from the equation. Without the test a wrong x~ would not be noticed: for phi = det(I -
-    eps f') with Hamiltonian f, and for Pi of the family, the identities hold at arbitrary points x and x~.
+    The formula for dPhi follows from the equation. Without the test a wrong x~ would not be noticed: the identities for
+    phi = det(I - eps f') with Hamiltonian f, and for Pi of the family, hold at arbitrary points x and x~.
     """
     image = map_at_eps.step(point)
     field = map_at_eps.field
     if not isinstance(map_at_eps, KahanMap) or (field is not QQ and not field.characteristic):
-        return image  # over function fields expansion takes long; the test over GF(p) suffices
+        return image  # over other fields it takes long; tests over Q and GF(p) suffice
     factor = field.convert(2) * map_at_eps.eps
     polarized_values = map_at_eps.local.polarised(point, image)
     for x, x_tilde, polarized_value in zip(point, image, polarized_values, strict=True):

@@ -39,9 +39,9 @@ class Settings:
 
     `eps` is half the time step; None means every eps. Claims are also tested along `steps` steps of an exact orbit from
     the initial point `start` (None: a random point). The orbit ends at a coordinate with more than `max_digits` digits
-    (None: a default that depends on the dimension). `eps` and the coordinates may be any exact numbers: 1, Fraction(1,
-    10), "1/10"; coordinates may also be elements of one number field. `orbit_is_requested` means that the user gave
-    `start` or `steps`; the report then says whether the orbit was completed.
+    (None: a default that depends on the dimension). `eps` and the coordinates may be any exact numbers: 1,
+    Fraction(1, 10), "1/10"; coordinates may also be elements of one number field. `orbit_is_requested` means that the
+    user gave `start` or `steps`; the report then says whether the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -228,7 +228,7 @@ def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
 
 
 def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
-    """Map names of claims to functions; claims without a name are called I1, I2, ..., except for names in use."""
+    """Map names of claims to functions; claims without a name are called I1, I2, ... (names in use are skipped)."""
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):

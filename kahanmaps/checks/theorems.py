@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """Return the rational associated systems, f_0 first. If chi has over 8 factors, at most one sign is negative."""
+    """Return the rational associated systems, f_0 first; for over 8 factors of chi, those with at most one sign -1."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())

@@ -5,7 +5,7 @@ of the largest of these integers, floor(log2 max(|p_1|, ..., |p_k|, |q|)) + 1: w
 projective height.
 
 Over a number field Q[t]/g of degree r, the height is here that of the rational point of all coefficients of the
-coordinates (polynomials in t). Up to a constant, it lies between the projective height and r times that, so the kind of
+coordinates (polynomials in t). Up to a constant, it lies between 1 and r times the projective height, so the kind of
 growth is the same. (Denominators are ideals, and the least positive integer in an ideal is at most its norm.)
 
 Theory. One step is a rational map of some degree e, so h(Phi(x)) <= e h(x) + O(1): growth is at most exponential. If an

@@ -5,9 +5,9 @@ For f = J grad H, with a cubic H and any constant skew J, the Kahan map Phi_f co
     H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
 
 where x~ = Phi_f(x). For homogeneous H and J = [[0, I], [-I, 0]] the modified H is -1/6 of H~ = eps^{-1} x^T J x~ in
-petrera-suris-2016. The map preserves the volume form dx/phi, i.e. phi(x~) = phi(x) det dPhi(x), for phi = det(I - eps
-f'(x)); the denominator phi is called the density here. Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ
-integral), (tH), (eq: CMOQ measure).
+petrera-suris-2016. The map preserves the volume form dx/phi, i.e. phi(x~) = phi(x) det dPhi(x), for
+phi = det(I - eps f'(x)); the denominator phi is called the density here. Sources: cmoq-2013; petrera-suris-2016, eqs.
+(eq: CMOQ integral), (tH), (eq: CMOQ measure).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class PhaseFunction(ABC):
 
     name: str
     formula: str
-    condition: str = ""  # on symbols and eps: it is defined (and a density not 0); a text of `where`
+    condition: str = ""  # the condition on symbols and eps for the claim, as text of `where`
     scales_with_eps: bool = False  # whether it is known to be a power of eps times a function of eps x
 
     @abstractmethod
@@ -244,8 +244,8 @@ class PaperIntegral(ImageFunction):
 class CommutantIntegral(ImageFunction):
     """The integral eps^{-1} x^T J C x~ with C = (A^T)^k, k = `power`, which commutes with f'(x) for every x.
 
-    For k = 0 it is H~. It is defined over Q also if chi has irrational roots. Over the splitting field of chi, the
-    functions for k < m span the same space as the functions K~_s of all associated systems; see docs/mathematics.md.
+    For k = 0 it is H~. It has rational coefficients even if chi has irrational roots. Over the splitting field of chi,
+    the functions for k < m span the same space as the K~_s of all associated systems (docs/mathematics.md).
     """
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
@@ -431,9 +431,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     """Normalize an integral I: return an integral (alpha I + beta)/gamma with a nonconstant limit as eps -> 0.
 
     If a map conserves I, it conserves (alpha I + beta)/gamma for all functions alpha, beta, gamma of eps and the
-    parameters; a search returns any one of them. Let I = const + eps^k H + ..., like the published integrals (1 - eps^2
-    x^2)/(1 - eps^2 y^2) of the Euler top. Then the errors of I are those of H times eps^k, too small to show how well H
-    is conserved. So the constant is subtracted, and the difference is divided by eps^k.
+    parameters; a search returns any one of them. Let I = const + eps^k H + ..., like the published integrals
+    (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top. Then the errors of I are those of H times eps^k, too small to show
+    how well H is conserved. So the constant is subtracted, and the difference is divided by eps^k.
 
     Args:
         function: an integral I, for every eps, of a map that approximates a flow; a rational function of the variables,

@@ -28,7 +28,7 @@ ITERATE_DEGREE = 200_000  # the maximal degree of an iterate that is measured
 
 
 def tensor_degree(dim: int) -> int:
-    """Return the maximal degree of the entries of Poisson tensors that are searched for, by dimension."""
+    """Return the maximal degree of entries in searches for Poisson tensors: 3 in dimension 3, otherwise 2."""
     return 3 if dim == 3 else 2
 
 

@@ -3,9 +3,9 @@
 Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is interpolated, modulo a prime at which g splits, from its
 values at the roots of g. So residues of the c_j are known, from which the c_j are reconstructed as functions over Q.
 
-Formulas are certified as identities in x, eps and the symbols. For an integral I = P/Q the identity is P(x~) Q(x) =
-P(x) Q(x~), whose expansion is shorter than that of the quotients. Some identities are too long to expand in the given
-coordinates, but short in coordinates in which the planes of a normal form separate.
+Formulas are certified as identities in x, eps and the symbols. For an integral I = P/Q the identity is
+P(x~) Q(x) = P(x) Q(x~), whose expansion is shorter than that of the quotients. Some identities are too long to expand
+in the given coordinates, but short in coordinates in which the planes of a normal form separate.
 """
 
 from __future__ import annotations
@@ -259,7 +259,7 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Decide whether the map preserves `function` = I, or dx/phi, as the function `verdict_on`; for a flow, expand.
+        """Decide whether the map or the flow preserves an integral or a density `function`; see `verdict_on` below.
 
         The identity is not expanded if that of an earlier function with at most as many terms was too long to expand.
         """

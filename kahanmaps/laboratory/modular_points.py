@@ -113,9 +113,9 @@ class ModularMap:
     ) -> tuple[Sequence[Values], Point, int | None]:
         """Evaluate all monomials up to a degree along an orbit of `count` points.
 
-        Returns (values, first point, period); the period is None if it is not less than `count`. The values have a row
-        for each point and a column for each monomial: a polynomial vanishes along the orbit if they annihilate its
-        coefficients. A `support` (indices of monomials, closed under divisors) restricts the columns. Raises NoPoint.
+        Returns (values, first point, period); the period is None if it is not less than `count`. The matrix of values
+        has a row for each point and a column for each monomial; it annihilates polynomials that vanish along the orbit.
+        A `support` (indices of monomials, closed under divisors) restricts the columns. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
@@ -178,7 +178,7 @@ class ModularFlow(ModularMap):
         return tuple((a + sum(c * values[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """Return 1 + div f(x) and 1. For a density P of the flow, P + P' is (1 + div f) P."""
+        """Return 1 + div f(x) and 1; a density P of the flow satisfies P + f . grad P = (1 + div f) P."""
         values = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * values[k] for c, k in self._divergence), 1
 

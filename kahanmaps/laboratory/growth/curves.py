@@ -4,11 +4,11 @@ In dimension n, the curve is stored as n + 1 coprime polynomials in t. A map is 
 The equation of a factor (maps/equation.py) is an n x (n + 1) matrix of forms. Evaluated at the polynomials of a curve,
 the matrix has a kernel of dimension 1, which is the image of the curve. It is computed in one of two ways:
 
-    minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them; series  in
-    higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as many terms as
-    determine the image. The quotient of two random affine functions of x~ is a power series; its shortest recurrence
-    (massey-1969) gives the common denominator of the coordinates. All further terms of all coordinates must satisfy
-    this recurrence.
+    minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
+    series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as
+            many terms as determine the image. The quotient of two random affine functions of x~ is a power series; its
+            shortest recurrence (massey-1969) gives the common denominator of the coordinates. All further terms of all
+            coordinates must satisfy this recurrence.
 
 An explicit map is evaluated by its forms, without a kernel, in any dimension. In the plane minors are five to ten times
 as fast as series; in dimension 6 both take the same time.

@@ -6,9 +6,9 @@ degree (boucksom-favre-jonsson-2008; cantat-lamy-2013 over any algebraically clo
 
     2 cosh(n log lambda) + 2 >= (D_2n - 1) / (D_n - 1),    and    lambda <= D_n^(1/n).
 
-The first inequality is |(f^n u) . u| <= cosh(n log lambda) |u . u| for u = f^n e - e. For lambda = 1 it becomes D_2n -
-1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map f modulo a prime p at a residue eps. It holds for f as
-well: deg f_p^n <= deg f^n for every n, and so lambda(f_p) <= lambda(f). For f_p
+The first inequality is |(f^n u) . u| <= cosh(n log lambda) |u . u| for u = f^n e - e. For lambda = 1 it becomes
+D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map f modulo a prime p at a residue eps. It holds for
+f as well: deg f_p^n <= deg f^n for every n, and so lambda(f_p) <= lambda(f). For f_p
 
 * the degree of the image of one line under f_p^2n, computed exactly, is a lower bound of deg f_p^2n;
 * the degrees of the images of K tangents of a conic under f_p^n give an upper bound of D = deg f_p^n. The degree of the

@@ -233,7 +233,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth_text(self) -> str:
-        """The phrase `kind_text`, and `basis` in parentheses for a proof or a limited number of steps."""
+        """The phrase `kind_text`, with `basis` in parentheses if there is a proof or a limited number of steps."""
         is_limited = self.recurrence is not None and self.patterns is not None and self.patterns.limit
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 

@@ -56,7 +56,7 @@ class SurveyedOrbit:
     growth: HeightGrowth
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {**attributes(self, "eps", "start"), **self.growth.to_json()}
 
 
@@ -83,7 +83,7 @@ class HeightSurvey(PrintableResult):
 
     @property
     def kind(self) -> Growth:
-        """The common kind of growth of all decided orbits; UNDECIDED if they differ, or if an eps has none."""
+        """The kind of growth of the decided orbits; UNDECIDED if kinds differ, or if an eps has no decided orbit."""
         all_eps = {orbit.eps for orbit in self.orbits}
         decided_eps = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
         return self.kinds[0] if len(self.kinds) == 1 and decided_eps == all_eps else Growth.UNDECIDED
@@ -116,7 +116,7 @@ class HeightSurvey(PrintableResult):
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return attributes(self, "kind", "kinds", "text", complete="is_complete", orbits="orbits")
 
 
@@ -140,7 +140,7 @@ def height_survey(
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
         time_step, h: the time step 2 eps, instead of eps.
-        starts: the initial points, or the number of random ones; these are chosen so that their orbits are defined.
+        starts: the initial points, or the number of random points whose orbits contain no singular point.
         steps: the number of steps of each orbit.
         max_digits: an orbit ends at a coordinate with more digits; None means no limit.
         effort: each increase by 1 doubles the work limit; at this limit the survey ends with the current orbit.

@@ -48,7 +48,7 @@ class GrowthProof:
     is_identity: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return attributes(self, "reason", "period", "is_identity")
 
 

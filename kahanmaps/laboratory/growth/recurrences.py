@@ -53,7 +53,7 @@ class GrowthRate(ResultPart):
         return float(self.digits)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; coefficients are text, from x^0 up."""
+        """Return plain data; coefficients are text, in ascending order."""
         coefficients = plain(self.minimal_polynomial.coeffs())
         size = attributes(self, value="digits", enclosure="enclosure")
         return {**size, "minimal_polynomial": coefficients, "multiplicity": self.multiplicity}
@@ -77,10 +77,10 @@ def polynomial_growth(power: int) -> Growth:
 class Recurrence(ResultPart):
     """The shortest linear recurrence of a_0, a_1, ..., which holds for all `terms` given terms.
 
-    `characteristic` is monic with integer coefficients; c_0, c_1, ..., 1 in ascending order mean a_{n+order} + ... +
-    c_1 a_{n+1} + c_0 a_n = 0. If x^k divides it, the recurrence without this factor holds from n = k (`preperiod`) on.
-    `checked` terms were not needed to determine the recurrence. If it was derived from singularity patterns, the first
-    `measured` values were measured, and the recurrence gives the others; otherwise `measured` is None.
+    `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] in ascending order stand for
+    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. If x^k divides it, the recurrence without this factor holds from the
+    term k (`preperiod`) on. `checked` terms were not needed to determine the recurrence. If it was derived from other
+    results, the first `measured` values were measured, and the recurrence gives the others.
 
     >>> recurrence = find_recurrence([2 * n * n + 1 for n in range(12)])
     >>> recurrence.characteristic, recurrence.order, recurrence.checked, str(recurrence.growth)
@@ -240,7 +240,7 @@ class Recurrence(ResultPart):
         return values[n]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; coefficients are text, from x^0 up."""
+        """Return plain data; coefficients are text, in ascending order."""
         return {
             **attributes(self, "order", "preperiod", "terms", "checked"),
             "characteristic": plain(self.characteristic.coeffs()),

@@ -124,7 +124,7 @@ def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
 
 
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
-    """Return the generating function of a_first, a_(first + n), a_(first + 2 n), ..., the a_k those of `series`.
+    """Return the generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of `series`.
 
     Exact. The roots of the new denominator are n-th powers of the roots of the given denominator, so that the degree
     does not grow. Raises ArithmeticError if coefficients of the new denominator have more than 520 bits.
@@ -144,7 +144,7 @@ def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
 
 
 def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
-    """Return the recurrence of the coefficients of the power series `series`, a fraction; `measured` were measured.
+    """Return the recurrence of the power series coefficients of a fraction; `measured` are those that were measured.
 
     >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
     'a(n) = 2*a(n-1) for n >= 1, derived from the singularity patterns; 3 measured terms agree'

@@ -50,7 +50,7 @@ def height_bound(primes: Sequence[int]) -> int:
 def lift_linear(
     subspaces: Mapping[int, Sequence[Rows]], everywhere: bool = True
 ) -> dict[RationalRows, tuple[int, ...]]:
-    """Return affine subspaces over Q whose residues occur among `subspaces`; map their reduced rows to these primes.
+    """Return a dict: reduced rows of affine subspaces over Q -> the primes modulo which the subspaces occur.
 
     A subspace must occur modulo all primes (all but one up to height 12) or, if `everywhere` is False, modulo three.
 
@@ -195,9 +195,9 @@ def lift_conjugate_points(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
-    """Return for each set of conjugate points the equations (one for each parameter), and primes with all points.
+    """Return, for each set of conjugate points, equations (one for each parameter), and the primes where all occur.
 
-    The equations may have solutions that are not among the `points` modulo at most one prime.
+    Modulo at most one prime, the equations may have solutions that are not among the `points`.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
     >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))

@@ -1,4 +1,4 @@
-"""Members of a family on a component of parameter space, and the degrees of their iterates, without a sweep."""
+"""Members of a family on a component of parameter space, and a measurement of the degrees of their iterates."""
 
 from __future__ import annotations
 

@@ -36,9 +36,9 @@ _MAX_SINGLE_POINTS = 400  # if more points lie on no component, they are not rep
 class ModularComponents:
     """The components of a set of points modulo `prime`.
 
-    `linear` maps dimensions to affine subspaces: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 =
-    0. `hypersurfaces` maps an affine subspace (no rows: the full space) to its irreducible hypersurfaces. A
-    hypersurface is a list of coefficients of monomials (see `exponents_up_to`) in the free variables of the subspace.
+    `linear` maps dimensions to affine subspaces, i.e. to reduced rows (c_1, ..., c_k, c_0) of their equations
+    c_1 a_1 + ... + c_0 = 0. `hypersurfaces` maps affine subspaces (no rows: the full space) to the irreducible
+    hypersurfaces in them, lists of coefficients (in the order of `exponents_up_to`) in free variables of the subspace.
     """
 
     prime: int
@@ -54,7 +54,7 @@ def find_components(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> ModularComponents:
-    """Return the components of a set of points, which is a part of `measured` points, from `min_dimension` on.
+    """Return the components, of dimension `min_dimension` or more, of some points among `measured` points.
 
     `min_dimension` is 0 if all points of GF(p)^k were measured, and k - 1 if only points on random lines were measured.
     `check` is called repeatedly, and may raise an exception.

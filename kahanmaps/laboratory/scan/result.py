@@ -32,7 +32,7 @@ class Component:
 
     `degrees` are the degrees d_1, ..., d_N of the iterates of a member on the component; `confirmed` of `tried` random
     members have these degrees. `values` are the parameters of a rational member; None if none is known. `growth` is the
-    growth of the degrees, and `verdict` that of an analysis of the rational member; None if not determined.
+    growth of degrees, and `verdict` the verdict of an analysis of the rational member (None: unknown).
     """
 
     equations: tuple[fmpq_mpoly, ...]

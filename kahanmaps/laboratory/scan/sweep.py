@@ -98,11 +98,11 @@ def sweep(
         prime: the prime.
         eps: half the time step (exact), or None for generic eps; eps is then a random element of GF(p^2).
         terms: the number of iterates whose degrees are measured.
-        max_length: as for `Family.degrees`.
+        max_length: the largest number of coefficients of a polynomial, as in `Family.degrees`.
         on: number and dimension of the random affine subspaces whose members are measured; None for all members.
         units: the units of work that are counted for one member.
         seed: the random seed.
-        jobs: as for `Family.degrees`.
+        jobs: the number of threads, as in `Family.degrees`.
         check: called repeatedly; it may raise TimeOver.
         progress: called with the number of measured members and the number of all members.
 

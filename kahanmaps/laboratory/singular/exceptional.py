@@ -41,7 +41,7 @@ Kind = tuple[tuple[int, ...], int]  # of a component: its exponents in the forms
 
 @dataclass(frozen=True)
 class HypersurfaceComponent:
-    """A component of the zeros of forms on a surface with the coordinates t and u, given by an irreducible `equation`.
+    """A component of the zeros of forms on a surface (t, u): its equation, and the `exponents` of this in the forms.
 
     `degree` is the degree of the equation in u, `order` its order in t at u = 0 (None if it vanishes for u = 0).
     """
@@ -210,7 +210,7 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.transversal)
 
     def curve_through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return this curve, moved to a point of a component on the surface (t, u). Raises OrbitDataUnknown."""
+        """Return this curve, moved to a point of a component on a surface through `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple(
@@ -411,7 +411,7 @@ def _search_line(
 ) -> tuple[int, int, list[_Curve]]:
     """Return (degree of the image of a random line, number of zeros of the forms on the line, curves).
 
-    Zeros are counted over the algebraic closure of GF(p). Each curve is the line, through another zero in GF(p).
+    Zeros are counted over the algebraic closure of GF(p). For each zero in GF(p), a curve has it as its `point`.
     """
     equation, p = map_.equation, map_.field.characteristic
     base, direction, transversal = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))

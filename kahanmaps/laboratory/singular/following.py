@@ -88,7 +88,7 @@ class OrbitData:
         return [drops_text, f"its image lies in {_shorten(incidences) or 'no exceptional hypersurface'}"]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "degree_drops": [row[0] for row in self.rows],
             "incidences": [list(row[1:]) for row in self.rows],

@@ -3,8 +3,8 @@
 Source: grammaticos-ramani-papageorgiou-1991.
 
 If the polynomials of hypersurfaces are too large to be expanded, their zeros on a random line give points of the
-hypersurfaces. Let the equation M(x) x~ = r(x) of a map x~ = Phi(x) be linear in both points. Then det dPhi(x) is det
-M'(x~)/det M(x) up to sign, with the matrix M' of the inverse map. So away from poles and infinity the exceptional
+hypersurfaces. Let the equation M(x) x~ = r(x) of a map x~ = Phi(x) be linear in both points. Then det dPhi(x) is
+det M'(x~)/det M(x) up to sign, with the matrix M' of the inverse map. So away from poles and infinity the exceptional
 hypersurfaces are the zeros of E(X) = det M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one
 variable. Source: petrera-suris-2016, eq. (Jac).
 """
@@ -116,8 +116,8 @@ def critical_points(
         degrees[power] = degrees.get(power, 0) + int(squarefree_factor.degree())
         for s in roots_modulo(squarefree_factor):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            # The gradient of F up to a factor, where E = F^power G: at x + t v + d w, E is (t F_v + d F_w)^power G +
-            # ... (F_v, F_w are derivatives of F). A power of t that is higher than all relevant ones replaces d.
+            # The gradient of F up to a factor, where E = F^power G: at x + t v + d w the leading terms of E are
+            # (t F_v + d F_w)^power G, with derivatives F_v, F_w. A power of t above all relevant ones replaces d.
             gap_order = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             t_to_gap = nmod_poly([0] * gap_order + [1], p)

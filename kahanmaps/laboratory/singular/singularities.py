@@ -115,7 +115,7 @@ class SingularityRun(PrintableResult):
         return [attributes(hypersurface, *names) for hypersurface in self.hypersurfaces]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return all_fields(self)
 
     @property
@@ -159,7 +159,7 @@ class SingularityRun(PrintableResult):
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """The data that do not depend on a generic eps: degrees, multiplicities and outcomes of hypersurfaces."""
+        """The data that are equal at all generic eps: degrees, multiplicities and outcomes of hypersurfaces."""
         patterns = sorted(
             (h.degree, h.divides_denominator, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
@@ -382,7 +382,7 @@ class Patterns:
         return f"{sentence}; {self.limit}" if self.limit else sentence
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         data = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in coefficients] for name, coefficients in zip(names, self.series, strict=False)}
@@ -397,7 +397,7 @@ class Patterns:
 
 
 def patterns_of(runs: Sequence[SingularityRun], has_eps: bool = True) -> Patterns:
-    """Combine the patterns of `singularities` at one eps, or at two that represent every eps; they must agree."""
+    """Combine the patterns of `runs` at one eps or at two, which must agree; `has_eps`: whether the map has an eps."""
     results = set()
     for run in runs:
         if not run.is_dominant:
