@@ -140,7 +140,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """Expand an identity that `decision` calls supported; return the new decision, or `decision` without a result."""
+    """Expand an identity that `decision` calls supported; return the new decision, or `decision` if there is none."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

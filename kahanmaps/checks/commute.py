@@ -92,8 +92,8 @@ def check_commute(
         system, other: the two systems or maps; a system stands for its Kahan map. Without `other`, `system` must be a
             member of the family, and its rational associated maps are checked pairwise. A control follows, a claim that
             is false in general: the maps of J grad H_0 and J grad H_1 = J A grad H_0 commute.
-        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs from eps, which then
-            is required. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
+        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps is
+            required. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.

@@ -37,7 +37,7 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-Candidate = tuple[PhaseFunction, Evidence | None, str]  # an integral, evidence of a theorem, reference
+Candidate = tuple[PhaseFunction, Evidence | None, str]  # (integral, evidence of a theorem, reference)
 # Maximal number of proved integrals that are also tested along an orbit.
 _MAX_TRIED_INTEGRALS = 32
 _MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION = 2  # above dimension 16, where the test of an integral takes many seconds
@@ -48,7 +48,7 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
     map_, labels = as_map(system), ("I(x~)", "I(x)")
     last_value: list[Any] = []  # cache: along an orbit, I(x~) at one point is I(x) at the next
     iterate_function = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
-    if iterate_function is not None:  # I also depends on iterates; x is in the middle of its points
+    if iterate_function is not None:  # I depends on several points, with x in the middle
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:

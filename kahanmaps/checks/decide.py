@@ -64,7 +64,7 @@ class Identity:
     has_eps: bool = True  # whether the sides depend on eps
     # Whether both sides depend on eps x only, up to powers of eps. Then the identity at eps = 1 implies it at any eps.
     scales_with_eps: bool = False
-    undefined_reason: str = "a denominator seems to vanish identically"  # if no point has two sides
+    undefined_reason: str = "a denominator seems to vanish identically"  # if the sides are undefined at all points
     root: Root | None = None  # the algebraic number in the coefficients; None if they are rational
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
@@ -136,7 +136,7 @@ class Identity:
                 yield Trial(None if sides is None else field.prime)
                 continue
             decision = fails_over_Q(self, seed)
-            if decision is None:  # no rational witness was found; the witness modulo p also refutes the identity
+            if decision is None:  # without a rational witness, the witness modulo p refutes the identity
                 summary = (
                     f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
                     f"none of {_SMALL_POINT_COUNT + _HIGH_POINT_COUNT} rational points shows it"

@@ -16,7 +16,7 @@ class Growth(StrEnum):
     QUADRATIC = "quadratic"
     POLYNOMIAL = "polynomial"
     EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"  # degrees for which no recurrence was found
+    UNKNOWN = "unknown"  # degrees for which no recurrence is accepted
     UNDECIDED = "undecided"  # heights that match no rule of HeightGrowth
 
 

@@ -57,7 +57,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
-MIN_HEIGHTS = 9  # heights needed to report other kinds of growth (exponential growth soon exceeds the digit budget)
+MIN_HEIGHTS = 9  # heights needed to report any kind but exponential growth, which soon exceeds the digit budget
 _MIN_EXPONENTIAL_HEIGHTS = 6  # heights needed to report exponential growth
 _MIN_LOGARITHMIC_HEIGHTS = 32  # heights needed to report logarithmic growth
 _MAX_NOISE = 4  # in bits: smaller deviations of an increase r_j from a rule are ignored

@@ -221,7 +221,7 @@ class Laboratory:
         return ""
 
     def cofactors(self) -> list[Cofactor]:
-        """Return the cofactors for which the search for Darboux polynomials of the map looks."""
+        """Return the cofactors that the search for Darboux polynomials of the map tries."""
         if self.flow:
             return []
         if self.system is None:
@@ -370,7 +370,7 @@ class Laboratory:
 def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
     """Reconstruct functions of `names` with `reconstruct`; if `root` is given, the first of the names stands for it.
 
-    Then the black box is evaluated at all roots of the minimal polynomial modulo primes at which it splits. The
+    In this case the black box is evaluated at all roots of the minimal polynomial modulo primes at which it splits. The
     functions are polynomials in the root, of degree less than that of the field. `options` are passed to `reconstruct`.
     """
     if root is None:

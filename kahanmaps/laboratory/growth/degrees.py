@@ -61,7 +61,7 @@ _MIN_QUOTIENTS = 6  # minimal number of quotients d_n/d_{n-1} to estimate whethe
 _AGREEING_TERMS = 12  # derived degrees must agree with this many measured ones, beyond twice the longest pattern
 _LARGE_DEGREE = 2000  # above this degree, the terms measured so far suffice
 _MATRIX_TERMS = 60  # number of degrees of a monomial map that are computed
-_MAX_REPLACEMENTS = 6  # of lines in special position: about one in 2^40
+_MAX_REPLACEMENTS = 6  # maximal number of replaced lines; about one line in 2^40 is in special position
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,7 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
     """Prove that the iterate Phi^period is linear on projective space, or the identity, at one eps or over Q(eps).
 
     Exact, by composing formulas. Returns None if the iterate is not linear, or if the formulas have too many terms. If
-    it is linear, its powers up to the 12th are computed, and `period` of the proof is that of the first identity.
+    it is linear, its powers up to the 12th are computed; if one of them is the identity, the proof states this.
     """
     if map_.symbols or map_.root is not None:
         return None

@@ -29,8 +29,8 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     """Return generators of the group of all changes of parameters that were detected, as images of the parameters.
 
     Modulo each prime for which all members were tried, such a change maps every special member to a member with equal
-    degrees of iterates, or to infinity. It also maps hypersurfaces over Q to such ones with equal degrees of iterates.
-    Only changes that move a component, or preserve a component that is not affine, are reported.
+    degrees of iterates, or to infinity. It also maps hypersurfaces over Q to hypersurfaces with equal degrees of
+    iterates. Only changes that move a component, or preserve a component that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]

@@ -411,7 +411,7 @@ def _search_line(
 ) -> tuple[int, int, list[_Curve]]:
     """Return (degree of the image of a random line, number of zeros of the forms on the line, curves).
 
-    Zeros are counted over the algebraic closure of GF(p). For each zero in GF(p), a curve has it as its `point`.
+    Zeros are counted over the algebraic closure of GF(p). For each zero in GF(p) there is a curve.
     """
     equation, p = map_.equation, map_.field.characteristic
     base, direction, transversal = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))

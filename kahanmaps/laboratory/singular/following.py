@@ -180,7 +180,7 @@ NOTHING_TRACKED = TrackedFunctions()
 
 @dataclass(frozen=True)
 class StepLimits:
-    """Limits for the number of steps: `first_steps` steps of series at the beginning, and `max_steps` steps in all.
+    """Limits for the number of steps: `first_steps` steps with series at the beginning, and `max_steps` steps in all.
 
     A singularity can be confined only where the image lies in the indeterminacy locus. After the first steps only the
     orbit of a point of the image is computed, which is fast. If this point reaches the locus, series are computed

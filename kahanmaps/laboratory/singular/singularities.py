@@ -309,12 +309,12 @@ class Patterns:
 
     The degrees drop below powers of d_1 only if images of exceptional hypersurfaces lie in the indeterminacy locus. So
     a recurrence of the degrees may fail until the last pattern has settled. `lengths` are the distinct numbers of steps
-    after which patterns have settled. `searched` is the number of steps of unconfined hypersurfaces (None: all are
-    confined); `some_confined` says whether a hypersurface is confined (None: unknown). `running` is empty, or the
-    reason why patterns are not known for all steps. `series` has the coefficients of numerator and denominator of the
-    generating function of the degrees; it is empty if the patterns do not determine the degrees. `exceptional` are the
-    exceptional hypersurfaces at the eps `at`. If `word` is given, their steps are steps of the single factors of a
-    composition.
+    after which patterns have settled. `searched` is the number of steps for which all unconfined hypersurfaces were
+    followed (None: all are confined); `some_confined` says whether a hypersurface is confined (None: unknown).
+    `running` is empty, or the reason why patterns are not known for all steps. `series` has the coefficients of
+    numerator and denominator of the generating function of the degrees; it is empty if the patterns do not determine
+    the degrees. `exceptional` are the exceptional hypersurfaces at the eps `at`. If `word` is given, their steps are
+    steps of the single factors of a composition.
     """
 
     lengths: tuple[int, ...]
