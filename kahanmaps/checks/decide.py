@@ -2,7 +2,7 @@
 
 With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. Each trial draws a
 prime p from [2^62, 2^63) and a point over GF(p). The random seed is a hash of the identity, so that no identity can be
-constructed for given points (algebra/chance.py). Let P be nonzero of degree d, with a coefficient of b bits. A trial
+constructed for given points (algebra/chance.py). Let P have degree d and a nonzero coefficient of b bits. A trial
 succeeds only if p divides all coefficients of P (at most b/62 of more than 2^55 primes do) or the point is a root of P
 (probability at most d/(p - 1), and p - 1 >= 2^62). A point at which a denominator vanishes is replaced by another one;
 such points have probability below 1/2, so the sum of the two probabilities is at most doubled. Trials are

@@ -74,8 +74,8 @@ class HeightGrowth(ResultPart):
     least-squares line, since heights fluctuate. Let e_j = r_{j+1} - r_j. The first rule that holds gives the kind:
 
     * periodic: the orbit returned to its initial point;
-    * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2, and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 =
-      e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is less than 0.9 e_2^2.)
+    * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2, and e_1 + e_2 + e_3 >= 8 bits. (For C g^n,
+      e_1 e_3 = e_2^2. For powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is less than 0.9 e_2^2.)
     * quadratic: all e_j > 0, no e_j exceeds 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (For c n^2 + b n all e_j are
       equal. For n^3, e_1 : e_2 : e_3 is 1 : 2 : 3 if the intervals begin at n = 0; otherwise e_3/e_1 >= 1.8.)
     * logarithmic: at least 32 heights; the largest height in the last interval exceeds that in the first; and from the

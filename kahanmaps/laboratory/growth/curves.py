@@ -96,7 +96,7 @@ class Line:
     def step(self, guess: int) -> None:
         """Replace the curve by its image under the map; `guess` is the expected degree of the image.
 
-        Raises ZeroDivisionError if the map is undefined on the curve (with series: at t = 0), Stopped at a limit.
+        Raises Stopped at a limit, and ZeroDivisionError if the map is undefined on the curve (with series: at t = 0).
         """
         for equation in self._equations:
             degree_error = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")

@@ -272,6 +272,6 @@ def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits:
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
     shortest_row = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest_row)
-    # Random residues have a relation whose height satisfies (2 height + 1)^size = modulus, approximately.
+    # Random residues have relations with (2 height + 1)^size of about `modulus`; this one must be smaller.
     is_small = (2 * height + 1) ** size << spare_bits <= modulus
     return [int(c) for c in shortest_row] if is_small and shortest_row[-1] else None
