@@ -72,7 +72,7 @@ _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIME_DEPENDENT = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
 MAX_DEGREE = 6  # of a number field: about one prime in at most 6! = 720 splits
-_BUDGET = DEFAULT_BUDGET  # the same as for `check-integrals`, which thus proves the same identities
+_BUDGET = DEFAULT_BUDGET  # also that of `check-integrals`, except for identities with long coefficients
 _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number in the search for invariant hyperplanes over Q
 Spaces = Sequence[DarbouxSpace]
 
