@@ -59,7 +59,7 @@ class Identity:
     eps: fmpq | None
     left_label: str = "left side"
     right_label: str = "right side"
-    entries: tuple[str, ...] = ()  # names of the entries, if a witness shall show only the first differing entry
+    entries: tuple[str, ...] = ()  # names of the entries, if a witness is to show only one entry that differs
     scope: str = ""  # the scope of the identity as text, if `eps` does not describe it
     has_eps: bool = True  # whether the sides depend on eps
     # Whether both sides depend on eps x only, up to powers of eps. Then the identity at eps = 1 implies it at any eps.
