@@ -1,9 +1,9 @@
 """Certification of identities: by a theorem, by expansion, at random points, and along an exact orbit.
 
-Proof and experiment are independent: if a proved claim fails at a point, this program contains an error, and reports
-it as such. A false claim may pass at random points; the evidence contains a bound of the probability. If both sides
-can be expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) is run over the
-field of rational functions, within a budget that counts products of two terms.
+Proof and experiment are independent: if a proved claim fails at a point, this program contains an error, and reports it
+as such. A false claim may pass at random points; the evidence bounds the probability of this error. If both sides can
+be expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) then runs over the
+field of rational functions. A budget bounds the number of products of two terms in this computation.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
 from kahanmaps.checks.settings import OrbitRun, Settings, try_along_orbit
 
 METHOD = "expansion"
-# Above this dimension the budget never suffices for an expansion.
+# In higher dimensions the budget for products of two terms never suffices for an expansion.
 MAX_DIMENSION = 6
 
 
@@ -48,8 +48,8 @@ def certify(
         identity: the claim as an identity of rational functions.
         settings: the seed and the error bound for random points.
         proof: the evidence of a theorem that implies the claim; without it, the identity is expanded if possible.
-        orbit: an exact orbit along which the identity is tried as well.
-        formula, source: the formula and its reference, for the report.
+        orbit: an exact orbit; the identity is also tested at its points.
+        formula, source: the formula of the claim and its reference in the literature, both for the report.
         control: whether the claim is a control, i.e. expected to be refuted; a control is not expanded.
         certified: the arguments with which `certificate` writes a proof of the claim.
 
@@ -57,7 +57,7 @@ def certify(
         The finding: proved by the theorem or by expansion, otherwise supported, refuted (with a witness) or undecided.
 
     Raises:
-        Contradiction: if a proved claim fails at a point.
+        Contradiction: if a proved claim fails at a point; then kahanmaps contains an error.
     """
     decision = decide(identity, settings.seed, settings.error_bits if proof is None else 1)
     also: list[Evidence] = []
@@ -89,29 +89,29 @@ def certify(
 
 
 def _without_bound(evidence: Evidence) -> Evidence:
-    """Return the evidence of random points without the probability of error, for a claim that is proved."""
+    """Return the evidence of random points without the probability of error, which does not apply to a proved claim."""
     summary = evidence.summary.partition("; false with probability")[0]
     return Evidence(evidence.method, summary, {k: v for k, v in evidence.data.items() if k != "error_bound"})
 
 
 class NotEqual(ArithmeticError):
-    """The two sides were expanded and differ."""
+    """The expansions of the two sides of an identity differ."""
 
 
 def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
-    """Expand both sides over the field of rational functions; return the evidence that they are equal.
+    """Expand both sides of the identity as rational functions; return the evidence that they are equal.
 
-    `budget` bounds the number of products of two terms; the default is smaller for long coefficients. Returns None if
-    the expansion exceeds the budget. Raises NotEqual if the two sides differ.
+    `budget` bounds the number of products of two terms; its default value is smaller for identities with long
+    coefficients. Returns None if the expansion exceeds the budget. Raises NotEqual if the two sides differ.
     """
     if budget is None:
         if identity.dim > MAX_DIMENSION:
             return None
-        # Once numbers exceed the processor's caches, the time of a product grows faster than their length.
+        # Products of long numbers take longer, in particular above 10,000 bits, where numbers exceed the caches.
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
         if identity.scales_with_eps:
-            budget *= 2  # then dimension 6 is feasible: the integrals of paper_m3 take 130 million products
+            budget *= 2  # dimension 6 needs it: the integrals of paper_m3 take 130 million products
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
     modulus = None if identity.root is None else identity.root.polynomial.coeffs()
     if modulus is not None:
@@ -119,7 +119,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     field = FunctionField(names, budget, modulus=modulus)
     eps = field.variables[identity.dim] if identity.eps is None else field.convert(identity.eps)
     if identity.scales_with_eps:
-        eps = field.one  # replace eps x by x, which saves one variable
+        eps = field.one  # eps x is renamed x: one variable fewer
     try:
         sides = identity.at(field, field.variables[: identity.dim], eps)
         if sides is None:
@@ -140,7 +140,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """Expand an identity that `decision` calls supported; return the result, or `decision` if there is none."""
+    """Expand an identity that `decision` calls supported; return the new decision, or `decision` if there is none."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

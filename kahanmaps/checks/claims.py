@@ -1,8 +1,8 @@
 """The results of checks: verdicts, evidence, witnesses, findings and reports.
 
-`proved`: exact, for this system and every eps (or the given eps). `refuted`: there is a witness, a point at which the
-two sides differ. `supported`: the claim held at random points over GF(p), with a stated error bound, or along an orbit.
-`undecided`: neither proved, refuted nor supported; the reason is given. Each claim has exactly one of these verdicts.
+Each claim has one of four verdicts. `proved`: the claim holds exactly for this system, at every eps or the given eps.
+`refuted`: the claim is false; usually a witness shows a point at which its two sides differ. `supported`: the claim
+held at random points over GF(p), with a stated error bound. `undecided`: none of these; a reason is given.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
     """The certainty of a claim. `holds` is its truth value; `bool` of a certainty raises TypeError.
 
-    Checks return one of the first four members. DERIVED means that the statement follows exactly from the measured
-    singularity patterns; NOTE marks a remark, which has no certainty.
+    The verdict of a check is one of the first four members. DERIVED means that the statement follows exactly from the
+    measured singularity patterns; NOTE marks a remark, which has no certainty.
     """
 
     PROVED = "proved"
@@ -40,7 +40,7 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
 @dataclass(frozen=True)
 class Evidence(ResultPart):
-    """The reason for a verdict: the name of the method, a sentence, and plain data for scripts."""
+    """The reason for a verdict: the name of the method, a sentence (`summary`), and plain data for scripts."""
 
     method: str
     summary: str
@@ -52,7 +52,7 @@ class Evidence(ResultPart):
 
 @dataclass(frozen=True)
 class Witness(ResultPart):
-    """A point at which a claim fails: x and eps, and the two sides that should be equal, all as exact text."""
+    """A point x, with eps, at which a claim fails, and the different values of its two sides there, as exact text."""
 
     point: tuple[str, ...]
     eps: str | None  # None if the map does not depend on eps
@@ -61,11 +61,11 @@ class Witness(ResultPart):
     left_label: str
     right_label: str
     field: str = "QQ"
-    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # other vectors and numbers, by name
+    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # further data of the witness, by name
 
     @property
     def text(self) -> str:
-        """The point and the values of the two sides."""
+        """The point, eps, and the values of both sides of the claimed identity, as one line of text."""
         eps_text = "" if self.eps is None else f", eps = {self.eps}"
         sides = f"{self.left_label} = {', '.join(self.left)}, {self.right_label} = {', '.join(self.right)}"
         return f"x = ({', '.join(self.point)}){eps_text}: {sides}"
@@ -83,7 +83,7 @@ class Witness(ResultPart):
 
 @dataclass(frozen=True)
 class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
-    """A claim with its verdict. A true `control` is expected to be refuted: it shows that the check is able to fail."""
+    """A claim with its verdict. If `control`, it must be refuted, which shows that the check is able to fail."""
 
     claim: str
     verdict: Certainty
@@ -93,14 +93,14 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
     formula: str = ""
     source: str = ""
     control: bool = False
-    place: Mapping[str, Any] = field(default_factory=dict)  # where the claim is stated, as plain data
-    applies: bool = True  # False for special input, if the claim is for generic input; its verdict does not count then
-    # The arguments with which `certificate` proves this claim, or `why_not`: the reason why there is no certificate.
+    place: Mapping[str, Any] = field(default_factory=dict)  # where the paper states the claim, as plain data
+    applies: bool = True  # False if the input is too special for the claim; its verdict then does not count
+    # The arguments with which `certificate` proves this claim, or {"why_not": the reason why there is no certificate}.
     certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def holds(self) -> bool | None:
-        """Whether the claim holds; None if that is undecided."""
+        """Whether the claim holds; None if it is undecided."""
         return self.verdict.holds
 
     @property
@@ -132,7 +132,7 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
 
 @dataclass(frozen=True)
 class Report(PrintableResult):
-    """The findings of a check, with the data needed to reproduce it (`context`)."""
+    """The findings of a check; `context` contains the data needed to reproduce the check."""
 
     _parts, _noun = "findings", ("claim", "claims")
 
@@ -140,12 +140,12 @@ class Report(PrintableResult):
     findings: tuple[Finding, ...]
     context: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-    ended_early: bool = False  # whether an orbit requested by the user could not be completed
+    ended_early: bool = False  # whether an orbit that the user requested ended before its last step
     certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # as in `Finding`
 
     @property
     def verdict(self) -> Certainty:
-        """The combined verdict of all claims, without controls and claims that do not apply."""
+        """The weakest verdict of all claims; controls and claims that do not apply are ignored."""
         return combined(finding.verdict for finding in self.findings if finding.applies and not finding.control)
 
     @property

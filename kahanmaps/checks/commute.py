@@ -25,9 +25,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SOURCE = "petrera-suris-2016, Theorem 9"
 EQUAL_STEPS = fmpq(1)
-# Maximal number of pairs of maps that are also tried at random points and along an orbit; the proof covers all pairs.
+# Maximal number of pairs of maps that are also tested at random points and along an orbit; all pairs are proved.
 _MAX_TRIED_PAIRS = 30
-_MAX_TRIED_PAIRS_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one pair takes many seconds
+_MAX_TRIED_PAIRS_IN_HIGH_DIMENSION = 2  # above dimension 16, where the test of a pair takes many seconds
 
 
 def commutativity(
@@ -39,7 +39,7 @@ def commutativity(
 ) -> Identity:
     """Return Phi_f o Phi_g = Phi_g o Phi_f as an identity.
 
-    A system stands for its Kahan map. The map of f is taken at eps, the map of g at `ratio` times eps.
+    A system stands for its Kahan map. Phi_f is taken at eps, Phi_g at `ratio` times eps. `names` are those of f and g.
     """
     f_map, g_map = as_map(f), as_map(g)
 
@@ -59,7 +59,7 @@ def commutativity(
 
 
 def _require_not_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
-    """Raise InputError if the map is the identity (as for f = 0), which commutes with every map.
+    """Raise InputError if the map is the identity (e.g. for f = 0), since the identity commutes with every map.
 
     The equation x~ = x is tested at random points, with an error probability below 2^-100.
     """
@@ -86,14 +86,14 @@ def check_commute(
     time_step: Any = None,
     h: Any = None,
 ) -> Report:
-    """Check whether the maps of two systems commute, or all rational associated maps of one member of the family.
+    """Check whether the maps of two systems commute, or whether all associated maps of a member of the family commute.
 
     Args:
         system, other: the two systems or maps; a system stands for its Kahan map. Without `other`, `system` must be a
-            member of the family, and its associated maps are checked pairwise. A control follows: the maps of H_0 and
-            H_1, where grad H_1 = A grad H_0, which in general do not commute.
-        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps must also
-            be given. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
+            member of the family, and its rational associated maps are checked pairwise. A control follows, a claim that
+            is false in general: the maps of J grad H_0 and J grad H_1 = J A grad H_0 commute.
+        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps is
+            required. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.
@@ -206,7 +206,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
             f"the first {max_tried} pairs were also tried along an orbit; the hypotheses were verified for all"
         )
     if len(associates) == 1:
-        # If chi is irreducible, f_0 and -f_0 are the only rational associated systems: a map and its inverse.
+        # If chi is irreducible, f_0 and -f_0 are the only rational associated systems; their maps are inverses.
         f_0, minus_f_0 = associates[0].system, associates[0].system.scaled(-1)
         findings.append(
             certify_pair(
@@ -229,7 +229,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
         verdict = Certainty.UNDECIDED if proof is None else Certainty.PROVED
         findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
-    # The control: Phi_{H_0} and Phi_{H_1}. For m = 1 there is no H_1: the map at eps and the same map at 2 eps.
+    # The control: Phi_{H_0} and Phi_{H_1}. For m = 1 there is no H_1; the maps of f at eps and at 2 eps are compared.
     f, *other_systems = (CubicHamiltonian(H, standard_structure(member.dim)).system for H in member.chain[:2])
     g, claim, names = f.scaled(2), "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
     if member.m > 1:

@@ -37,18 +37,18 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-Candidate = tuple[PhaseFunction, Evidence | None, str]  # an integral, its proof by a theorem, and the source
-# Maximal number of proved integrals that are also tried along an orbit.
+Candidate = tuple[PhaseFunction, Evidence | None, str]  # (integral, evidence of a theorem, reference)
+# Maximal number of proved integrals that are also tested along an orbit.
 _MAX_TRIED_INTEGRALS = 32
-_MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION = 2  # above dimension 16, where trying one integral takes many seconds
+_MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION = 2  # above dimension 16, where the test of an integral takes many seconds
 
 
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
-    """Return I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
+    """Return the identity I(x~) = I(x) for an integral I and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
-    last_value: list[Any] = []  # along an orbit, I(x~) at one point is I(x) at the next point
+    last_value: list[Any] = []  # cache: along an orbit, I(x~) at one point is I(x) at the next
     iterate_function = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
-    if iterate_function is not None:  # x is the middle one of the points in the identity
+    if iterate_function is not None:  # I depends on several points, with x in the middle
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -71,7 +71,7 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
 
 
 def known_integrals(file: SystemFile) -> list[Candidate]:
-    """Return the integrals that theorems give for the system, each with its proof and source."""
+    """Return the integrals that theorems give for the system, each with the evidence of its theorem and a reference."""
     integrals: list[Candidate] = []
     member = file.member
     if member is None:
@@ -81,8 +81,8 @@ def known_integrals(file: SystemFile) -> list[Candidate]:
             if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
                 integrals.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
         return integrals
-    # The modified H, its multiple H~, K~_s for every rational associated system, and integrals from the commutant. If
-    # chi has many factors, the K~_s with several minus signs are linear combinations of the listed ones.
+    # The modified H, its multiple H~, K~_s for every listed associated system (signs s), and commutant integrals. If
+    # chi has many factors, K~_s with several minus signs are omitted: they are linear combinations of the others.
     associates = theorems.listed_associates(member)
     f_0 = associates[0]
     proof = theorems.shared_integral(member, f_0)
@@ -93,7 +93,7 @@ def known_integrals(file: SystemFile) -> list[Candidate]:
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
         integrals.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    # m - 1 integrals from the powers of A, which are rational even if chi has irrational roots and the K~_s are not.
+    # m - 1 integrals from the powers of A. They are rational also if chi has irrational roots, unlike the K~_s.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
     for k in range(1, member.m):
@@ -110,10 +110,10 @@ def functions_along(
 
     Args:
         file: the system.
-        requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
-            or "known" for all integrals that follow from theorems or are claimed by the file.
+        requested: pairs (name, text). The name may be empty. The text is an expression, the name of an integral of the
+            file, or "known" for all integrals that follow from theorems or are claimed by the file.
         in_floats: whether the orbit is in floating point.
-        taken: the names of the other columns of the table.
+        taken: the names of the other columns of the table of the orbit.
 
     Raises:
         InputError: if a name occurs twice or is in `taken`, or if a function cannot be evaluated in floats.
@@ -160,14 +160,14 @@ def check_integrals(
     time_step: Any = None,
     h: Any = None,
 ) -> Report:
-    """Check whether integrals are conserved, identically and along an exact orbit.
+    """Check whether integrals are conserved by a map, as an identity in x and along an exact orbit.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
         settings: eps, seed, error bound and orbit. If it is omitted, `extra` may be the second argument.
-        extra: the claimed integrals, rational functions of the variables and eps: one, a list, or a mapping by name, as
-            functions, text or SymPy expressions; or names of integrals of the file. By default the integrals that
-            theorems give, and those of the file.
+        extra: the claimed integrals, rational functions of the variables and eps: one, a list, or a mapping by name.
+            Each is a function, text, a SymPy expression or the name of an integral of the file. Default: the integrals
+            that theorems give and those of the file.
         known: whether these default integrals are checked in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
@@ -216,7 +216,7 @@ def check_integrals(
             reason = Evidence(
                 "constant", f"it is a constant{eps_text}: every map conserves constants, so this is no integral"
             )
-            is_claimed = isinstance(integral, ClaimedIntegral)  # integrals from theorems do not count
+            is_claimed = isinstance(integral, ClaimedIntegral)  # the verdict of an integral from a theorem is ignored
             finding = Finding(claim, Certainty.UNDECIDED, reason, **details, applies=is_claimed)
         elif proof is not None and k >= max_tried and file.dim > 16:
             finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **details)
@@ -237,13 +237,13 @@ def check_integrals(
 def _certified(
     file: SystemFile, integral: PhaseFunction, settings: Settings, claims: Mapping[str, RationalFunction]
 ) -> dict[str, Any]:
-    """Return the arguments with which `certificate` proves that an integral is conserved, or why there are none."""
+    """Return the arguments with which `certificate` proves an integral, or the reason why it cannot."""
     if isinstance(integral, ClaimedFunction):
         if integral.name in claims:
             return settings.certified(file, integrals={integral.name: claims[integral.name]})
         return settings.certified(file, claims=[integral.name])
     assert isinstance(integral, ImageFunction)
-    if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # integral of an associated system
+    if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # of an associated system
         reason = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
         return {"why_not": f"{reason}: type km.certificate(system, checker)"}
     power = integral.power if isinstance(integral, CommutantIntegral) else 0
@@ -252,7 +252,7 @@ def _certified(
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
-    """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2.
+    """Return whether an integral is constant at `settings.eps`, like the modified H of 3 q^2 + p^2 at eps = 1/2.
 
     The answer True is exact; False is also returned if the function is too long to expand.
     """
@@ -264,8 +264,8 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     if isinstance(integral, CommutantIntegral):  # leading term -2 x^T J C f; if C f = 0, then C (x~ - x) = 0
         return all(f.is_zero() for f in linear_combinations(integral.matrix, H.system.rhs))
     if H.is_homogeneous or H.dim > MAX_DIMENSION:
-        return H.H.is_zero()  # its leading term is a multiple of H
-    # Equal values at two points would be weak evidence; expansion is exact.
+        return H.H.is_zero()  # the term of lowest degree of the integral is a multiple of H
+    # Different values at two points refute constancy; equal values are weak evidence, so the integral is then expanded.
     rng = random.Random(f"constant {derive_seed(settings.seed, integral.subject, settings.eps)}")
     field = random_prime_field(rng)
     try:

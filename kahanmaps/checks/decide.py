@@ -1,15 +1,15 @@
 """The Schwartz-Zippel test of identities of rational functions at random points, with a bound on the error.
 
-With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. For each trial a prime
-p from [2^62, 2^63) and then a point over GF(p) are drawn by a hash of the identity and a seed, so that no identity can
-be constructed for given points (algebra/chance.py). If P is not zero, has degree d and a coefficient of b bits, a trial
+With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. Each trial draws a
+prime p from [2^62, 2^63) and a point over GF(p). The random seed is a hash of the identity, so that no identity can be
+constructed for given points (algebra/chance.py). Let P have degree d and a nonzero coefficient of b bits. A trial
 succeeds only if p divides all coefficients of P (at most b/62 of more than 2^55 primes do) or the point is a root of P
 (probability at most d/(p - 1), and p - 1 >= 2^62). A point at which a denominator vanishes is replaced by another one;
-such points have probability below 1/2, which is why the sum of the two probabilities is doubled. Trials are
+such points have probability below 1/2, so the sum of the two probabilities is at most doubled. Trials are
 independent, so their bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from
 N to 2N).
 
-A trial that fails refutes the identity; then a small rational point is searched for at which the two sides differ.
+A failed trial refutes the identity. Then rational points are tried, to find one at which the two sides differ.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
 # log2 of 3 N / (5 ln N), a lower bound of Rosser and Schoenfeld for the primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
-_MAX_UNDEFINED_POINTS = 200  # random points at which no sides are defined, after which the test ends
-_SMALL_POINT_COUNT = 400  # rational points of small height that are tried as witnesses
-_HIGH_POINT_COUNT = 20  # with long coordinates, tried last: a nonzero function hardly ever vanishes there
-_HIGH_BITS = 62  # of these long coordinates
+_MAX_UNDEFINED_POINTS = 200  # the test ends after more points at which the two sides are undefined
+_SMALL_POINT_COUNT = 400  # the number of rational points of small height tried as witnesses
+_HIGH_POINT_COUNT = 20  # the number of points with long coordinates, which are tried last
+_HIGH_BITS = 62  # the length of these coordinates
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
 
 
 @dataclass(frozen=True)
 class Identity:
-    """An identity of two lists of rational functions on a space of dimension `dim`.
+    """An identity: two lists of rational functions of a point of dimension `dim` are equal.
 
     `sides(field, x, eps)` returns both lists of field elements; at a point where they are not defined, it returns None
-    or raises SingularStep. `eps` is the value for which the identity is stated, None for every eps. `subject` contains
-    the data that determine the two sides; random points are drawn by a hash of these data (`derive_seed`).
+    or raises SingularStep. `eps` is the value for which the identity is stated; None means every eps. `subject`
+    contains the data that determine the two sides; random points are drawn by a hash of these data (`derive_seed`).
     """
 
     dim: int
@@ -59,13 +59,13 @@ class Identity:
     eps: fmpq | None
     left_label: str = "left side"
     right_label: str = "right side"
-    entries: tuple[str, ...] = ()  # names of the entries, if a witness shows only one entry in which the sides differ
-    scope: str = ""  # the values for which the identity is stated, as text, if `eps` does not describe them
+    entries: tuple[str, ...] = ()  # names of the entries, if a witness is to show only one entry that differs
+    scope: str = ""  # the scope of the identity as text, if `eps` does not describe it
     has_eps: bool = True  # whether the sides depend on eps
-    # Whether it is an identity in eps x, up to powers of eps: it then holds for every eps if it holds for eps = 1.
+    # Whether both sides depend on eps x only, up to powers of eps. Then the identity at eps = 1 implies it at any eps.
     scales_with_eps: bool = False
-    undefined_reason: str = "a denominator seems to vanish identically"  # the likely reason if no point has two sides
-    root: Root | None = None  # the algebraic number in the coefficients, if any
+    undefined_reason: str = "a denominator seems to vanish identically"  # if the sides are undefined at all points
+    root: Root | None = None  # the algebraic number in the coefficients; None if they are rational
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
@@ -74,19 +74,19 @@ class Identity:
 
     @cached_property
     def bound(self) -> tuple[CoefficientSize, int]:
-        """Bounds for the difference of the two sides (degree, coefficients) and for the degree of the denominators.
+        """Bounds of degree and coefficients of the difference of both sides, and of the degree of their denominators.
 
-        They are computed by evaluating the two sides with bounds instead of numbers.
+        The two sides are evaluated with bounds in place of numbers.
         """
         field, units_before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        work.count_work(7 * (work.counted() - units_before))  # work was counted for numbers; bounds take longer
-        # If the sides are not defined, there is no bound, and the identity cannot be supported.
+        work.count_work(7 * (work.counted() - units_before))  # bounds take about 8 times as long as numbers
+        # If the evaluation with bounds fails, there is no error bound, and the identity cannot be supported.
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
-        """Return both sides at a point; None if they are not defined there."""
+        """Return both sides of the identity at a point; None if they are not defined there."""
         try:
             return self.sides(field, point, eps)
         except (SingularStep, SingularMatrix):
@@ -124,19 +124,19 @@ class Identity:
             if self.root is not None:
                 try:
                     self.root.over(field)
-                except BadPrime:  # only primes modulo which g has a root are used
+                except BadPrime:  # modulo this prime the minimal polynomial has no root
                     continue
             with suppress(BadPrime):
                 point = tuple(field.random(rng) for _ in range(self.dim))
                 eps = field.zero if self.eps is None else field.convert(self.eps)
                 while self.eps is None and eps == 0:
                     eps = field.random(rng)
-                sides = None if eps == 0 else self.at(field, point, eps)  # eps = 0 if the prime divides it
+                sides = None if eps == 0 else self.at(field, point, eps)  # eps = 0 if the prime divides the given eps
             if sides is None or _sides_agree(field, sides):
                 yield Trial(None if sides is None else field.prime)
                 continue
             decision = fails_over_Q(self, seed)
-            if decision is None:  # no rational witness was found; the witness modulo p also refutes the identity
+            if decision is None:  # without a rational witness, the witness modulo p refutes the identity
                 summary = (
                     f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
                     f"none of {_SMALL_POINT_COUNT + _HIGH_POINT_COUNT} rational points shows it"
@@ -146,13 +146,13 @@ class Identity:
             yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """Return the data of the evidence, except the bounds; `undefined` is the number of points without sides."""
+        """Return the data of the evidence except bounds; at `undefined` points the sides were not defined."""
         return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A verdict (supported, refuted or undecided) with its evidence and, if refuted, a witness."""
+    """A verdict with its evidence and, if it is `refuted`, a witness."""
 
     verdict: Certainty
     evidence: Evidence
@@ -161,7 +161,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """The result at a random point: `prime` is None if no sides are defined there; a `decision` ends the test."""
+    """The result at a random point. `prime` is None if the statement is undefined there; a `decision` ends the test."""
 
     prime: int | None = None
     decision: Decision | None = None
@@ -170,8 +170,8 @@ class Trial:
 class Decidable(Protocol):
     """A statement that can be tested at random points: an identity, or a claim of the paper about its own objects.
 
-    `bound` and `conjugates` are defined as in `Identity`; the test ends without a result after `max_failures` points at
-    which the statement is not defined, or when `trials` ends.
+    `bound` and `conjugates` are defined as in `Identity`. The test ends undecided after more than `max_failures` points
+    at which the statement is not defined, or when `trials` ends.
     """
 
     @property
@@ -198,7 +198,7 @@ class Decidable(Protocol):
 
 
 def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
-    """Test a statement at random points over GF(p): supported (error below 2^-error_bits), refuted or undecided."""
+    """Test a statement at random points over GF(p); a verdict `supported` is wrong with probability < 2^-error_bits."""
     size, pole_degree = statement.bound
     log2_trial_error = log2_error(size, pole_degree, statement.conjugates)
     is_bounded = not math.isinf(size.bits)
@@ -252,21 +252,21 @@ def log2_error(size: CoefficientSize, pole_degree: int, conjugates: int = 1) -> 
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
     `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
-    at most `conjugates`, p is drawn from the primes modulo which its polynomial has a root. At least half as many such
-    primes are assumed as Chebotarev predicts; a prime divides a nonzero coefficient only if it divides its norm.
+    at most `conjugates`, p is drawn from the primes modulo which the polynomial of the field has a root. At least half
+    as many of them as Chebotarev predicts are assumed. A prime over p divides a number only if p divides its norm.
     """
     if max(size.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
-        return 0.0  # no bound: too many points may be roots, or poles
+        return 0.0  # no bound: most points may be zeros or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
     bad_prime_probability = 2 ** (math.log2(max(1.0, conjugates * size.bits / PRIME_BITS)) - primes_log2)
     min_prime = 2.0**PRIME_BITS
-    # The factor 2 accounts for the condition that no denominator vanishes at the point. It holds with probability at
-    # least 1/2: the denominators have degree below 2^60, and coefficients that fit into a computer's memory.
+    # The factor 2 accounts for the condition that no denominator vanishes at the point. The condition holds with
+    # probability at least 1/2: the degree of the denominators is below 2^60, and their coefficients fit into memory.
     return math.log2(2 * (bad_prime_probability + size.degree / min_prime))
 
 
 def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:
-    """Return random rational points of slowly growing height: first integers, then small fractions."""
+    """Return `count` random rational points of slowly growing height: first integers, then small fractions."""
     points = []
     for k in range(count):
         height = 1 + k // 10

@@ -39,7 +39,7 @@ _UNDEFINED_TENSOR = "the map seems to be defined nowhere, or the tensor or a den
 def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
     """Return the identity phi(x~) det M(x) = phi(x) det N(x, x~), which says that the measure dx/phi is invariant.
 
-    Here dPhi(x) = M^{-1} N. A system stands for its Kahan map, for which M = I - eps f'(x) and N = I + eps f'(x~).
+    Here dPhi(x) = M^{-1} N and x~ = Phi(x). A system stands for its Kahan map: M = I - eps f'(x), N = I + eps f'(x~).
     """
     map_ = as_map(system)
 
@@ -51,7 +51,7 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
             return None
         numerator, denominator = jacobian_determinant_fraction(map_at_eps, point, image)
         if field.is_zero(numerator) or field.is_zero(denominator):
-            return None  # if the map has no inverse, both sides may be 0, which says nothing about a measure
+            return None  # if the map has no inverse, both sides may be 0, and the identity is trivial
         return [image_density * denominator], [point_density * numerator]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
@@ -65,15 +65,15 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
 
 
 def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return x~, after a test that it satisfies the equation of the map.
+    """Return the image x~ of the point x, after a test that x and x~ satisfy the equation of the Kahan map.
 
-    The formula for dPhi follows from this equation. Without the test a wrong x~ would not be noticed, since for phi =
-    det(I - eps f') with Hamiltonian f, and for Pi of the family, the identities hold at arbitrary points x and x~.
+    The formula for dPhi follows from the equation. Without the test a wrong x~ would not be noticed: the identities for
+    phi = det(I - eps f') with Hamiltonian f, and for Pi of the family, hold at arbitrary points x and x~.
     """
     image = map_at_eps.step(point)
     field = map_at_eps.field
     if not isinstance(map_at_eps, KahanMap) or (field is not QQ and not field.characteristic):
-        return image  # other fields need no test: the equation was tested at points, and expanding it takes long
+        return image  # over other fields it takes long; tests over Q and GF(p) suffice
     factor = field.convert(2) * map_at_eps.eps
     polarized_values = map_at_eps.local.polarised(point, image)
     for x, x_tilde, polarized_value in zip(point, image, polarized_values, strict=True):
@@ -97,8 +97,8 @@ def check_measure(
     Args:
         system: a map, or a system, which stands for its Kahan map.
         settings: eps, seed, error bound and orbit. If it is omitted, `extra` may be the second argument.
-        extra: phi, as a function, text or SymPy expression. By default det(I - eps f') for Hamiltonian systems, and the
-            [density] of the file.
+        extra: phi, as a function, text or SymPy expression. By default, det(I - eps f') (for Hamiltonian systems) and
+            the [density] of the file (if there is one) are checked.
         known: whether these default densities are checked in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
@@ -160,7 +160,7 @@ def check_measure(
 
 
 def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
-    """Return the identity dPhi P(x) dPhi^T = P(x~) for the matrix P of `tensor`, without denominators."""
+    """Return the identity dPhi P(x) dPhi^T = P(x~) for the matrix P of `tensor`, without the denominator of dPhi."""
     n = map_.dim
 
     def sides(field: Field, point_and_values: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -182,7 +182,7 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
-    """Return the Jacobi identity of a tensor for all triples of coordinates."""
+    """Return the Jacobi identity of a tensor: the cyclic sums over all triples of coordinates vanish."""
     n = tensor.dim
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -261,7 +261,7 @@ def check_poisson(
     )
     jacobi = certify(
         f"{name} is a Poisson tensor{scope}",
-        jacobi_identity(tensor, settings.eps),  # it contains only x, so an orbit would add nothing
+        jacobi_identity(tensor, settings.eps),  # an identity in x alone, so an orbit adds no evidence
         settings,
         proof,
         formula=f"sum_l {name}_il d_l {name}_jk + cyclic = 0",

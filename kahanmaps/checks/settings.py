@@ -1,4 +1,4 @@
-"""The settings of a check, the exact orbit along which claims are tried, and the data to reproduce a report."""
+"""The settings of a check, the exact orbit along which claims are tested, and the data needed to reproduce a report."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
-MAX_STEPS = 10_000  # steps of the exact orbit, whose points are all stored
+MAX_STEPS = 10_000  # maximal length of the exact orbit, all of whose points are stored
 
 
 @dataclass(frozen=True)
 class Settings:
     """The settings of a check.
 
-    `eps` is half the time step, None for every eps. Claims are also tested along `steps` steps of an exact orbit from
-    the initial point `start` (None: a random point). The orbit ends at a number with more than `max_digits` digits
+    `eps` is half the time step; None means every eps. Claims are also tested along `steps` steps of an exact orbit from
+    the initial point `start` (None: a random point). The orbit ends at a coordinate with more than `max_digits` digits
     (None: a default that depends on the dimension). `eps` and the coordinates may be any exact numbers: 1,
-    Fraction(1, 10), "1/10"; coordinates may also be elements of one number field. `orbit_is_requested`: the user gave
-    the initial point or the number of steps, so that the report must say whether the orbit was completed.
+    Fraction(1, 10), "1/10"; coordinates may also be elements of one number field. `orbit_is_requested` means that the
+    user gave `start` or `steps`; the report then says whether the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -69,7 +69,7 @@ class Settings:
 
     @classmethod
     def of(cls, settings: Settings | None, eps: Any, time_step: Any, h: Any = None) -> Settings:
-        """Return the settings (None: the default settings), with eps replaced if eps or the time step is given."""
+        """Return the settings (None: the default settings). If eps or the time step is given, it replaces their eps."""
         settings, eps = settings or cls(), resolve_eps(eps, time_step, h)
         return settings if eps is None else replace(settings, eps=eps)
 
@@ -78,13 +78,13 @@ class Settings:
         return self.orbit_is_requested and not run.end.is_complete
 
     def certified(self, system: Any, **arguments: Any) -> dict[str, Any]:
-        """Return the arguments with which `certificate` proves a claim; at one eps, the reason why it cannot."""
+        """Return the arguments with which `certificate` proves a claim; if eps is fixed, the reason why it cannot."""
         if self.eps is not None:
             return {"why_not": f"a certificate is about a map, for every eps: found a claim for eps = {self.eps}"}
         return {"system": system, **arguments}
 
     def context(self, files: Sequence[SystemFile], **details: Any) -> dict[str, Any]:
-        """Return the data needed to reproduce the check, including the systems."""
+        """Return the data needed to reproduce the check, including the documents of its systems."""
         return {
             "version": __version__,
             "system": files[0].name,
@@ -119,9 +119,9 @@ class OrbitRun:
 
 
 def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
-    """Yield random small rational points, determined by the seed.
+    """Yield random rational points of small height; they depend on the seed only.
 
-    No coordinate is 0: many systems leave x_i = 0 invariant, and a claim that is false may hold on this subspace.
+    No coordinate is 0: many systems leave the subspace x_i = 0 invariant, and a false claim may hold on it.
 
     >>> next(random_starts(2, seed=0))
     (1, -2/3)
@@ -137,18 +137,18 @@ def run_orbit(
     claim_data: Sequence[Any] = (),
     is_integrable: bool = False,
 ) -> OrbitRun:
-    """Compute the exact orbit of the given initial point, or of random points until an orbit has no singular point.
+    """Compute the exact orbit of the given initial point; otherwise draw random points until an orbit is not singular.
 
-    A claim for every eps is tried at a random eps. Random choices depend on the system and on `claim_data`, so
-    that no claim can be constructed for an orbit known in advance.
+    A claim for every eps is tested at a random eps. Random choices depend on the system and on `claim_data`, so that no
+    claim can be constructed for an orbit known in advance. At most 20 random points are drawn.
     """
     seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, claim_data)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
     map_at_eps = as_map(system).at(eps, number_fields[0] if number_fields else QQ)
-    # Without a normal form a claim about the second iterate of a point multiplies the number of digits by dim^2, and
-    # solving for it by dim again. For members of the family the number of digits hardly grows from step to step.
+    # A claim about the second iterate of a point multiplies the number of digits by dim^2, and the solution of its
+    # linear system multiplies it by dim. For members of the family the number of digits hardly grows with the steps.
     default_max_digits = 5_000 if is_integrable else max(100, 60_000 // map_at_eps.dim**2)
     max_digits = default_max_digits if settings.max_digits is None else settings.max_digits
     random_points = random_starts(map_at_eps.dim, seed)
@@ -161,7 +161,7 @@ def run_orbit(
             settings.progress(f"orbit: step {point.step} of {settings.steps}")
             points.append(point.x)
         end = orbit.end
-        if end is None:  # the loop above ran to its end, and the orbit has ended by now
+        if end is None:  # impossible: the loop has exhausted the orbit
             raise AssertionError("an orbit ended without a status")
         attempt += 1
         if end.status != "singular" or settings.start is not None or attempt >= 20:
@@ -169,7 +169,7 @@ def run_orbit(
 
 
 def try_along_orbit(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
-    """Return the evidence of an identity at every point of an exact orbit, and a witness if it fails at one."""
+    """Test an identity at the points of an exact orbit; return the evidence, and a witness if the identity fails."""
     tried_count = undefined_count = 0
     number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
     ground_field = number_fields[0] if number_fields else identity.ground
@@ -199,13 +199,13 @@ def _orbit_data(run: OrbitRun, tried_count: int, undefined_count: int) -> Mappin
     return {"points": tried_count, "undefined_at": undefined_count, "eps": format_number(run.eps)}
 
 
-# ---- claims as the user gives them: formulas as text or SymPy expressions -----------------------------------------
+# ---- claims of the user: formulas as text or SymPy expressions ----------------------------------------------------
 
 
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
-    """Return (settings, claim), also if the claim was passed as `settings`; `eps`, if given, replaces settings.eps."""
+    """Return (settings, claim), also if the claim was passed as `settings`; a given eps or step replaces its eps."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:
@@ -214,7 +214,7 @@ def settings_and_claim(
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
-    """Convert a claim to a function of the variables of a file and eps (and of iterates, if it contains x~).
+    """Convert a claim to a function of the variables of a file, eps, and iterates of the variables if the claim has x~.
 
     A claim is a function, a result of a search, a formula in variables, parameters and eps, or the name of an integral.
     """
@@ -228,7 +228,7 @@ def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
 
 
 def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
-    """Convert claims to functions by name; claims without a name are called I1, I2, ..., unless the name is in use."""
+    """Map names of claims to functions; claims without a name are called I1, I2, ... (names in use are skipped)."""
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):

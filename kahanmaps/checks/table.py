@@ -1,7 +1,7 @@
-"""The table of all checks, each with its question, its options and its function.
+"""The table of all checks; an entry has the question, the option and the function of a check.
 
 The commands check-..., the tasks of experiments, the pages of reports and the schemas are derived from this table. The
-functions are imported only when a check is run.
+function of a check is imported only when the check runs.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class ClaimOption:
     """The command-line option for a claim; `read` converts its text to the argument `extra` of the check.
 
-    If `many`, the option may be repeated, as EXPR or NAME=EXPR, and the check takes texts by name. The word "known"
-    stands for the claims that are checked without the option.
+    If `many`, the option may be repeated, as EXPR or NAME=EXPR, and `extra` maps names to texts. The word "known"
+    stands for the claims that are checked by default.
     """
 
     flag: str
@@ -35,8 +35,8 @@ class ClaimOption:
 class Check:
     """A check. `question` is shown in lists, `headline` and `text` in the help of its command.
 
-    `function` is "module:name" of a function (file, settings, extra), for two systems (file, other, settings, eps2),
-    that returns a Report. `examples` are arguments of "kahanmaps check-NAME". `outcome` says what exit status 0 means.
+    `function` is "module:name" of a function (file, settings, extra) -> Report, for two systems (file, other, settings,
+    eps2). `examples` are arguments of "kahanmaps check-NAME". `outcome` says what exit status 0 means.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Check:
 
     @property
     def command(self) -> str:
-        """The name of the command for this check, and of its task in experiments."""
+        """The name of the command of this check, which is also the name of its task in experiments."""
         return f"check-{self.name}"
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:

@@ -1,7 +1,7 @@
-"""Proof by hypotheses: each function verifies the finitely many hypotheses of a theorem exactly.
+"""Proofs by theorems: each function verifies the finitely many hypotheses of a theorem exactly.
 
-It returns the evidence, or None if a hypothesis does not hold. The theorems are from petrera-suris-2016 and cmoq-2013.
-What goes beyond these papers (splitting without J, repeated roots, dimension 2) is proved in docs/mathematics.md.
+A function returns the evidence, or None if a hypothesis does not hold. Theorems are from petrera-suris-2016 and
+cmoq-2013, or proved in docs/mathematics.md (splitting without J, repeated roots of chi, dimension 2).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
 PROVED = Certainty.PROVED
-# Maximal number of factors of chi for which all rational associated systems are compared: 128 systems, 8128 pairs.
+# For at most so many factors of chi all rational associated systems are compared: 2^(8 - 1) = 128 systems, 8128 pairs.
 MAX_FACTORS = 8
 
 
@@ -38,7 +38,7 @@ def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence |
 
 
 def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
-    """Return the verified conditions under which `associate` is an associated system of f_0 = J grad H."""
+    """Return pairs (hypothesis, whether it holds), which together say that `associate` is associated to J grad H."""
     polynomial_at_A = evaluate_at_matrix(fmpq_poly(list(associate.coefficients)), member.A)
     return [
         (f"B_{associate.label} is a polynomial in A", bool(polynomial_at_A == associate.B)),
@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """Return the rational associated systems, f_0 first; for more than 8 factors those with at most one minus sign."""
+    """Return the rational associated systems, f_0 first; for over 8 factors of chi, those with at most one sign -1."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())
@@ -60,7 +60,7 @@ def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
 
 
 def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
-    """Return the verified conditions under which (A, H) is a member of the family."""
+    """Return pairs (hypothesis, whether it holds); together they say that (A, H) is a member of the family."""
     return [
         ("A^T J = J A", not defects(member.A)),
         ("H is a homogeneous cubic with A Hess(H) = Hess(H) A^T", belongs(member.A, member.H)),
@@ -70,9 +70,9 @@ def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
 def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
-    The space is the sum of the eigenspaces of C for 1, -1 and 0. f splits into a system on each, and there g
-    is f, -f and 0. So Phi_g is Phi_f, its inverse and the identity there. The lemma also holds for inhomogeneous f and
-    needs no Hamiltonian structure.
+    The space is the sum of the eigenspaces of C for 1, -1 and 0. f splits into a system on each of them, where g is f,
+    -f and 0. So Phi_g is Phi_f, its inverse and the identity there. The lemma also holds for inhomogeneous f and needs
+    no Hamiltonian structure.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
     >>> commuting_by_splitting(f, QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])).data["hypotheses"][1]
@@ -92,7 +92,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
 
 
 def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evidence | None:
-    """Two members with equal A and equal H, with any signs, are associated (petrera-suris-2016, Theorem 9)."""
+    """The maps of two members with equal A and H and any signs commute (petrera-suris-2016, Theorem 9)."""
     if f.A != g.A or f.variables != g.variables or f.H != g.H:
         return None
     return evidence(
@@ -102,7 +102,7 @@ def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evid
 
 
 def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
-    """Over the splitting field of chi, every choice of signs gives a B_s with B_s^2 = I (Chinese remainder theorem)."""
+    """Over the splitting field of chi all associated maps commute, since B_s^2 = I for every choice s of signs."""
     chi_at_A = QQ.identity(member.dim)
     for factor in member.factors:
         chi_at_A = chi_at_A * evaluate_at_matrix(factor.polynomial, member.A) ** factor.multiplicity
@@ -143,7 +143,7 @@ def product_density_invariant(system: QuadraticSystem, phi: RationalFunction) ->
 
 
 def shared_integral(member: FamilyMember, associate: AssociatedSystem) -> Evidence | None:
-    """The map of every associated system conserves K~ of each associated system (petrera-suris-2016, Theorem 11)."""
+    """The map of a member conserves the integral K~ of each associated system (petrera-suris-2016, Theorem 11)."""
     return evidence(
         "Theorem 11 of Petrera and Suris",
         [
@@ -169,7 +169,7 @@ def commutant_integral(hamiltonian: CubicHamiltonian, integral: CommutantIntegra
 
 
 def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember | None) -> Evidence | None:
-    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor if A is not derogatory, and in dimension 2."""
+    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor in dimension 2 and if A is nonderogatory."""
     if hamiltonian.dim == 2:
         # f' is a traceless 2 x 2 matrix: f'^2 = -det f' I, so Pi = det(I - eps f') J, and the claim is that the measure
         # is invariant.
@@ -187,7 +187,7 @@ def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember
 
 
 def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
-    """Return the constant C with g = C f if the components of f are independent; otherwise I or -I if g is f or -f."""
+    """Return a constant matrix C with g = C f; if the components of f are dependent, only C = I and -I are tried."""
     if f.dim != g.dim:
         return None
     n = f.dim

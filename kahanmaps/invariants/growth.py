@@ -6,17 +6,17 @@ from enum import StrEnum
 
 
 class Growth(StrEnum):
-    """A kind of growth, slower kinds first; finitely many heights or degrees support a kind, but do not prove it."""
+    """A kind of growth, from slow to fast. Finitely many heights or degrees support a kind, but do not prove it."""
 
-    ZERO = "zero"  # all degrees are 0 from some step on
-    PERIODIC = "periodic"  # the orbit returned to its initial point: this is exact
+    ZERO = "zero"  # the iterates have degree 0 (are constant) from some step on
+    PERIODIC = "periodic"  # proved: the orbit returned to its initial point
     BOUNDED = "bounded"
     LOGARITHMIC = "logarithmic"
     LINEAR = "linear"
     QUADRATIC = "quadratic"
     POLYNOMIAL = "polynomial"
     EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"  # degrees for which no recurrence was found
+    UNKNOWN = "unknown"  # degrees for which no recurrence is accepted
     UNDECIDED = "undecided"  # heights that match no rule of HeightGrowth
 
 

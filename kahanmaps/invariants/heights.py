@@ -1,32 +1,32 @@
-"""Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
+"""Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and the constant of this growth.
 
 The height of a rational point x = (p_1 : ... : p_k : q), with integers without a common factor, is here the bit length
 of the largest of these integers, floor(log2 max(|p_1|, ..., |p_k|, |q|)) + 1: within one bit of the logarithmic
 projective height.
 
-Over a number field Q[t]/g of degree r, it is the height of the rational point that consists of all coefficients of
-1, t, t^2, ... Up to a constant, it lies between the height of the point and r times this height (denominators are
-ideals, and the least positive integer in an ideal is at most its norm), so that the kind of growth is the same.
+Over a number field Q[t]/g of degree r, the height is here that of the rational point of all coefficients of the
+coordinates (polynomials in t). Up to a constant, it lies between 1 and r times the projective height, so the kind of
+growth is the same. (Denominators are ideals, and the least positive integer in an ideal is at most its norm.)
 
 Theory. One step is a rational map of some degree e, so h(Phi(x)) <= e h(x) + O(1): growth is at most exponential. If an
-orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a component. On a rational
-curve, this is a Moebius map: heights grow linearly, or logarithmically if it has one fixed point, or the orbit is
-periodic. On an elliptic curve of degree d in projective space, on which the map is a translation by T,
+orbit stays on a curve, some power of the map is an automorphism of the smooth model of one component. On a rational
+curve, this is a Moebius map: heights grow linearly, or logarithmically if the Moebius map has one fixed point, or the
+orbit is periodic. On an elliptic curve of degree d in projective space, on which the map is a translation by T,
 
     h_n = c n^2 + b n + O(1),        c = d hhat(T)/log 2,
 
-by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form,
-d = 3 and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of infinite orbits are unbounded
-(Northcott).
+by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form of
+a member of the family, d = 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of infinite
+orbits are unbounded (Northcott).
 
-There is a formula for c up to a bounded error. Over Q(gamma) the height pairing <T, T> is 1/12 (docs/mathematics.md,
-by shioda-1990), so hhat(T) = (log 2) h(gamma)/24 + O(1) for rational gamma (tate-1983), and
+In such a plane, c is known up to a bounded error. Over Q(gamma) the height pairing <T, T> is 1/12
+(docs/mathematics.md, by shioda-1990), so hhat(T) = (log 2) h(gamma)/24 + O(1) for rational gamma (tate-1983), and
 
     c = h(gamma)/8 + O(1),       gamma = 1 - disc(h) level^2,
 
-where h(gamma) is the height of a rational number in bits. The O(1) is bounded, but no explicit bound is known to us;
-measured values are -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So longer
-coefficients, eps or initial points mean faster growth.
+where h(gamma) is the height of gamma in bits. No explicit bound of the O(1) is known to us; measured values are -0.55
+to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So coefficients, eps or initial points with
+more digits give faster growth.
 
 Measured, not proved: for a member of the family, c is the sum of the constants of its m planes (six members with m = 1,
 2, 3; at n = 120 the difference is 3 parts in 10^5). This is plausible as long as the denominators of different planes
@@ -57,10 +57,10 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
-MIN_HEIGHTS = 9  # number needed for a decision; exponential growth needs fewer, as the digit budget allows only a few
-_MIN_EXPONENTIAL_HEIGHTS = 6  # number of heights needed for exponential growth
-_MIN_LOGARITHMIC_HEIGHTS = 32  # number of heights needed for logarithmic growth
-_MAX_NOISE = 4  # bits: if an increase r_j deviates by less from a rule, the deviation is ignored
+MIN_HEIGHTS = 9  # heights needed to report any kind but exponential growth, which soon exceeds the digit budget
+_MIN_EXPONENTIAL_HEIGHTS = 6  # heights needed to report exponential growth
+_MIN_LOGARITHMIC_HEIGHTS = 32  # heights needed to report logarithmic growth
+_MAX_NOISE = 4  # in bits: smaller deviations of an increase r_j from a rule are ignored
 _MAX_SHOWN_HEIGHTS = 20  # number of heights in the plain data of a result
 _NO_NORMAL_FORM = NoNormalForm("none was given")
 
@@ -69,13 +69,13 @@ _NO_NORMAL_FORM = NoNormalForm("none was given")
 class HeightGrowth(ResultPart):
     """The heights of an orbit at the steps 0, every, 2 every, ..., and how the orbit ended.
 
-    The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
-    increases over the last four intervals of w steps. Each r_j is w times the slope of a least-squares line, since
-    the heights fluctuate by a few bits or by the logarithm of n. Let e_j = r_{j+1} - r_j. The first rule that holds:
+    The kind of growth is decided in exact arithmetic. Let w be a quarter of the number of heights, and r_1, ..., r_4
+    the increases of the height over the last four intervals of w * `every` steps: each r_j is w times the slope of a
+    least-squares line, since heights fluctuate. Let e_j = r_{j+1} - r_j. The first rule that holds gives the kind:
 
-    * periodic: the orbit returned to its initial point; * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2,
-      and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 = e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is
-      less than 0.9 e_2^2.)
+    * periodic: the orbit returned to its initial point;
+    * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2, and e_1 + e_2 + e_3 >= 8 bits. (For C g^n,
+      e_1 e_3 = e_2^2. For powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is less than 0.9 e_2^2.)
     * quadratic: all e_j > 0, no e_j exceeds 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (For c n^2 + b n all e_j are
       equal. For n^3, e_1 : e_2 : e_3 is 1 : 2 : 3 if the intervals begin at n = 0; otherwise e_3/e_1 >= 1.8.)
     * logarithmic: at least 32 heights; the largest height in the last interval exceeds that in the first; and from the
@@ -95,7 +95,7 @@ class HeightGrowth(ResultPart):
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """The step of each height."""
+        """The number of the step at which each height was measured."""
         return tuple(range(0, self.every * len(self.heights), self.every))
 
     @property
@@ -105,7 +105,7 @@ class HeightGrowth(ResultPart):
 
     @property
     def reason(self) -> str:
-        """The measurement that determined the kind of growth, as a phrase."""
+        """The measured numbers that determined the kind of growth, as a phrase."""
         return self._decision[1]
 
     @cached_property
@@ -113,10 +113,10 @@ class HeightGrowth(ResultPart):
         """The constant c in bits: h_n ~ c n^2 for quadratic growth, h_n ~ c n for linear growth; otherwise None.
 
         It is the leading coefficient of the least-squares polynomial through all heights. If h_n is c n^2 + b n up to
-        fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent fluctuations
-        of standard deviation s; for linear growth, 3 s/n and 3.5 s/n^1.5. The second difference of the heights at n/3,
-        2n/3 and n would have the errors 18 s/n^2 and 11 s/n^2. At n = 120, for six members with known c, its error was
-        2 to 18 parts in 10^5, and that of the polynomial below 3. Omitting the first heights gains nothing.
+        fluctuations in [-s, s], the error of c is at most 12 s/n^2; for independent fluctuations of standard deviation
+        s it is about 13 s/n^2.5. For linear growth the errors are 3 s/n and 3.5 s/n^1.5. A second difference of the
+        heights at n/3, 2n/3 and n would have the errors 18 s/n^2 and 11 s/n^2. At n = 120, for six members with known
+        c, its error was 2 to 18 parts in 10^5; that of the polynomial was below 3 parts.
         """
         match self.kind:
             case Growth.QUADRATIC:
@@ -127,7 +127,7 @@ class HeightGrowth(ResultPart):
 
     @property
     def ratio(self) -> Fraction | None:
-        """The quotient of the last two heights; for exponential growth, the growth factor in `every` steps."""
+        """The quotient of the last two heights. For exponential growth it is the growth factor of `every` steps."""
         return Fraction(self.heights[-1], self.heights[-2]) if len(self.heights) > 1 else None
 
     def __str__(self) -> str:
@@ -175,21 +175,21 @@ class HeightGrowth(ResultPart):
 
 
 def height(point: Sequence[Any]) -> int:
-    """Return the height in bits of a point with exact coordinates; over Q[t]/g, that of the point of coefficients.
+    """Return the height in bits of a point with exact coordinates, as defined at the beginning of this module.
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
     if isinstance(point, str) or not hasattr(point, "__len__"):
         raise wrong_kind(point, "the coordinates of a point", 'write a list, e.g. [3, "1/2"]')
-    # Over the least common denominator q, the numerators and q have no common factor: if a prime p divides q exactly k
-    # times, then p divides the denominator of some fraction k times, and not the numerator of this fraction.
+    # Over the least common denominator q, the numerators and q have no common factor: if p^k divides q exactly, then
+    # p^k divides the denominator of some fraction, and p does not divide the numerator of this fraction.
     numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]
     return IntegerPoint.from_rationals([number for row in numbers for number in row]).bits
 
 
 def height_of(point: OrbitPoint) -> int:
-    """Return the height of a point of an orbit over Q, without forming fractions."""
+    """Return the height of a point of an exact orbit; no fractions are formed if the point is stored with integers."""
     value = point.value
     if isinstance(value, IntegerPoint):
         return value.bits  # the coordinates of an IntegerPoint are in lowest terms
@@ -212,17 +212,17 @@ def height_growth(
 
     Args:
         kahan_map: a map over Q at one eps.
-        start: the initial point, exact.
+        start: the initial point, with exact coordinates.
         steps: the number of steps.
         normal_form: the normal form of the system, if known (family.system_normal_form). It makes steps faster, and for
-            large `every` points are computed directly. Each height then takes a gcd: for three planes 100 steps take
-            0.2 s and 300 steps 8 s, but 0.8 s with `every` = 15, which is nearly as informative.
+            large `every` points are computed directly, without intermediate steps. A height takes a gcd: for three
+            planes 100 heights take 0.2 s and 300 heights 8 s; 300 steps take 0.8 s with `every` = 15.
         every: the number of steps from one height to the next.
-        max_digits: the orbit ends at a number with more digits than this; None means no limit.
+        max_digits: the orbit ends at a coordinate with more digits than this; None means no limit.
         budget: the work limit; when it is spent, the orbit ends after the current step.
 
     Returns:
-        The exact heights up to the end of the orbit, and their measured kind of growth.
+        The exact heights up to the end of the orbit; properties of the result give their kind of growth.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -241,14 +241,14 @@ def height_growth(
     start_height = height(kahan_map.point(start))
     bits = start_height if kahan_map.eps is None else max(start_height, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
-        # One step could take minutes, and its numbers would usually exceed the budget as well.
+        # A step from such a point could take minutes, and its result would usually exceed the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((start_height,), end, every)
     normal_form = _NO_NORMAL_FORM if normal_form is None else normal_form
     method = choose_method(None, "exact", normal_form, None if every == 1 else requested_steps).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
         iterates = Orbit(kahan_map, start, at=requested_steps, normal_form=normal_form, max_digits=max_digits)
-        # Since steps are omitted, a return to the initial point is found only at a multiple of the period.
+        # Only requested steps are computed, so a return to the initial point is detected only at one of them.
         heights: list[int] = []
         start_value, return_step = None, None
         for point, bits in _points_with_heights(iterates, 1, budget):
@@ -257,7 +257,7 @@ def height_growth(
             elif return_step is None and point.value == start_value:
                 return_step = point.step
             heights.append(bits)
-        if not heights:  # the initial point exceeds the budget; a stepwise orbit would still list its height
+        if not heights:  # the initial point exceeds the budget; its height is reported, as for stepwise orbits
             heights.append(height(iterates.start))
         assert iterates.end is not None
         end = iterates.end
@@ -275,7 +275,7 @@ def height_growth(
 
 
 def decimal_text(value: Fraction, digits: int = 6) -> str:
-    """Round a number to this number of significant digits, ties to even; the text is equal on all machines.
+    """Round a number to `digits` significant digits, ties to even. The text is the same on all machines.
 
     >>> decimal_text(Fraction(1, 3)), decimal_text(Fraction(-20, 3), 2), decimal_text(Fraction(5))
     ('0.333333', '-6.7', '5')
@@ -286,14 +286,14 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
 
 
 def _points_with_heights(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
-    """Yield the points at multiples of `every` with their heights until the budget is spent, and count the work."""
+    """Yield (point, height) at steps that are multiples of `every`, until the budget is spent; count the work."""
     bits = increase = 0
     for point in orbit:
         if point.step % every == 0:
             previous_bits, bits = bits, height_of(point)
             increase = max(0, bits - previous_bits)
             yield point, bits
-        # A step that multiplies the height takes gcds of longer numbers than a step with slow growth.
+        # The work grows with the height and with its increase, since gcds of longer numbers are then computed.
         count_work(20 + len(orbit.start) ** 2 * (bits / 100 + increase / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
@@ -336,7 +336,7 @@ def _too_few_heights(heights: Sequence[int]) -> str:
 
 
 def _leading_coefficient(values: Sequence[int], degree: int) -> Fraction:
-    """Return the leading coefficient of the least-squares polynomial of degree 1 or 2 through values at 0, 1, 2, ...
+    """Return the leading coefficient of the least-squares polynomial of degree 1 or 2 for values at 0, 1, 2, ...
 
     The coefficient is computed by projection to the orthogonal polynomial of this degree on these points.
     """

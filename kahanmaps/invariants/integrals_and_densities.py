@@ -1,13 +1,13 @@
-"""Integrals and densities of a map as functions of a point and of eps: claimed functions, and those from theorems.
+"""Integrals and densities of a map, as functions of a point and eps: claimed functions, and functions from theorems.
 
 For f = J grad H, with a cubic H and any constant skew J, the Kahan map Phi_f conserves
 
     H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
 
-and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. The map preserves
-the volume form dx/phi, i.e. phi(x~) = phi(x) det dPhi(x), for phi = det(I - eps f'(x)); the denominator phi is called
-the density here.
-Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH), (eq: CMOQ measure).
+where x~ = Phi_f(x). For homogeneous H and J = [[0, I], [-I, 0]] the modified H is -1/6 of H~ = eps^{-1} x^T J x~ in
+petrera-suris-2016. The map preserves the volume form dx/phi, i.e. phi(x~) = phi(x) det dPhi(x), for
+phi = det(I - eps f'(x)); the denominator phi is called the density here. Sources: cmoq-2013; petrera-suris-2016, eqs.
+(eq: CMOQ integral), (tH), (eq: CMOQ measure).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_MAX_CONDITION = 200  # characters of a condition
+_MAX_CONDITION = 200  # maximal number of characters of a condition
 
 
 class PhaseFunction(ABC):
@@ -53,7 +53,7 @@ class PhaseFunction(ABC):
 
     name: str
     formula: str
-    condition: str = ""  # the eps for which it is defined and not 0, as text returned by `where`
+    condition: str = ""  # the condition on symbols and eps for the claim, as text of `where`
     scales_with_eps: bool = False  # whether it is known to be a power of eps times a function of eps x
 
     @abstractmethod
@@ -66,13 +66,13 @@ class PhaseFunction(ABC):
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """Data that determine the function, for `derive_seed`."""
+        """Data that determine the function; `derive_seed` derives random seeds from them."""
 
 
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    `root`, if given, is the value of the variable before eps. `map_` is needed if the function contains x~.
+    `root`, if given, is the value of the variable before eps. If the function contains x~, `map_` is the map x -> x~.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class ClaimedFunction(PhaseFunction):
             raise InputError(f"found {name}, a function of x and its iterates, expected one of x alone here")
 
     @property
-    def scales_with_eps(self) -> bool:  # type: ignore[override]  # computed from the function
+    def scales_with_eps(self) -> bool:  # type: ignore[override]  # a property here
         weights = [1] * (len(self.function.names) - 1) + [-1]
         if self.root is not None:
             weights[-2] = 0
@@ -107,7 +107,7 @@ class ClaimedFunction(PhaseFunction):
         return self.on(field, eps, points)
 
     def on(self, field: Field, eps: Any, points: Sequence[Sequence[Any]]) -> Any:
-        """Return the value at successive points of an orbit (as many as the function needs); None at a pole."""
+        """Return the value at successive points x, x~, ... of an orbit; None at a pole. Further points are ignored."""
         with field.working():
             values = () if self.root is None else (self.root.over(field),)
             coordinates = [entry for point in points[: self.iterates + 1] for entry in point]
@@ -117,7 +117,7 @@ class ClaimedFunction(PhaseFunction):
 def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
     """Return an orbit of `length` steps with x in the middle, or at the beginning if the inverse map is not known.
 
-    With x in the middle, the formulas of the points have lower degrees.
+    With x in the middle, the coordinates of the points are rational functions of x of lower degree.
     """
     points, steps_back = [x], 0
     try:
@@ -135,9 +135,9 @@ def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[
 def at_eps(
     function: RationalFunction, eps: fmpq | None, root: Root | None = None, k: int = 0
 ) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Return the numerator and the denominator of `function`, at eps if it is given; the denominator may become 0.
+    """Return the numerator and the denominator of `function`, at eps if eps is given; the denominator may become 0.
 
-    If `root` is given, both are reduced modulo its minimal polynomial, written in the k-th variable.
+    If `root` is given, the k-th variable (from 0) stands for it, and both are reduced modulo its minimal polynomial.
     """
     numerator, denominator = function.numerator, function.denominator
     if eps is not None:
@@ -146,11 +146,11 @@ def at_eps(
 
 
 def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
-    """Return the condition on symbols and eps that no polynomial is identically 0; empty if it always holds.
+    """Return the condition on symbols and eps under which no polynomial vanishes identically; empty if it always holds.
 
     Args:
-        dim: the number of variables; the remaining variables of the polynomials are symbols, and eps, which is not 0.
-        polynomials: nonzero polynomials. For a sequence of polynomials, the condition is that not all of them are 0.
+        dim: the number of coordinates, the first variables of the polynomials; the others are symbols and eps (not 0).
+        polynomials: nonzero polynomials; a sequence of polynomials means that not all of them may vanish identically.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y, a, b, eps = ring(["x", "y", "a", "b", "eps"]).gens()
@@ -179,7 +179,7 @@ def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
 
 
 class ImageFunction(PhaseFunction):
-    """A function of x and of its image x~ under the Kahan map of J grad H."""
+    """A function of a point x and its image x~ under the Kahan map of J grad H."""
 
     def __init__(self, hamiltonian: CubicHamiltonian) -> None:
         self.hamiltonian = hamiltonian
@@ -187,7 +187,7 @@ class ImageFunction(PhaseFunction):
 
 
 def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Sequence[Any]) -> Any:
-    """Return H + grad H . (x~ - x)/3 at a point x with the image x~ under any map phi."""
+    """Return H + grad H . (x~ - x)/3 at the point x, where x~ is the image of x under the map `phi`."""
     field, image = phi.field, phi.step(point)
     with field.working():
         total = field.zero
@@ -213,14 +213,14 @@ class ModifiedHamiltonian(ImageFunction):
 
 
 class PaperIntegral(ImageFunction):
-    """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
+    """H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2) of petrera-suris-2016, for homogeneous H and J = [[0, I], [-I, 0]]."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H", index: str = "") -> None:
         if not (hamiltonian.is_homogeneous and hamiltonian.is_standard):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^ is the image of x under the Kahan map of this system; maps of associated systems conserve H~ as well.
+        # The formula has x^, not x~: it is also conserved by maps of associated systems, for which x~ is another image.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -242,10 +242,10 @@ class PaperIntegral(ImageFunction):
 
 
 class CommutantIntegral(ImageFunction):
-    """eps^{-1} x^T J C x~, defined over Q for any chi; C = (A^T)^k commutes with f'(x), for k = `power`.
+    """The integral eps^{-1} x^T J C x~ with C = (A^T)^k, k = `power`, which commutes with f'(x) for every x.
 
-    For C = I it is H~. Over the splitting field of chi, the functions for k < m span the same space as the functions
-    K~_s of all associated systems; the proof is in docs/mathematics.md.
+    For k = 0 it is H~. It has rational coefficients even if chi has irrational roots. Over the splitting field of chi,
+    the functions for k < m span the same space as the K~_s of all associated systems (docs/mathematics.md).
     """
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
@@ -269,7 +269,7 @@ class CommutantIntegral(ImageFunction):
 class ClaimedIntegral(ClaimedFunction):
     """A rational function of the variables and eps that is claimed to be conserved, at `eps` or (None) at every eps.
 
-    `condition` says for which eps it is defined, `is_constant` whether it is constant for the given eps.
+    `condition` says for which symbols and eps it is defined; `is_constant` whether it is constant at `eps`.
     """
 
     def __init__(
@@ -288,10 +288,10 @@ class ClaimedIntegral(ClaimedFunction):
 
 
 def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """Return the condition on symbols and eps under which I = P/Q is defined.
+    """Return the condition on symbols and eps under which an integral I is defined.
 
     Args:
-        integral: a function of `dim` variables, then of symbols and eps.
+        integral: I, a rational function of `dim` coordinates, then of symbols and eps.
         dim: the dimension.
         eps: half the time step, an exact number, or None for every eps.
         root: the algebraic number that the only symbol stands for, if any.
@@ -310,9 +310,9 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
 
 
 def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
-    """Whether the quotient of two polynomials is independent of the first `dim` variables; `denominator` is not 0."""
+    """Whether numerator/denominator does not depend on the first `dim` variables; `denominator` must not be 0."""
     monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
-    # The coefficients of `monomial` in numerator and denominator, polynomials in the remaining variables.
+    # `coefficients`: those of `monomial` in numerator and denominator. They are polynomials in the other variables.
     for polynomial in (numerator, denominator):
         terms = {(*(0,) * dim, *m[dim:]): value for m, value in polynomial.terms() if m[:dim] == monomial}
         coefficients.append(polynomial.context().from_dict(terms))
@@ -321,11 +321,11 @@ def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: 
 
 
 class DeterminantDensity(PhaseFunction):
-    """phi = det(I - eps f'(x))."""
+    """The function phi = det(I - eps f'(x)), a density of the Kahan map if f is Hamiltonian."""
 
     name = "phi"
     formula = "phi = det(I - eps f'(x))"
-    # No condition: phi is 1 at eps = 0, and if it is identically 0 at some eps, there is no map and no claim.
+    # No condition is needed: phi is 1 at eps = 0, and at an eps for which phi is identically 0 there is no Kahan map.
 
     def __init__(self, system: QuadraticSystem) -> None:
         self.map = KahanFamily(system)
@@ -341,7 +341,7 @@ class DeterminantDensity(PhaseFunction):
 class ClaimedDensity(ClaimedFunction):
     """A rational function of the variables and eps that is claimed to be a density, at `eps` or (None) at every eps.
 
-    `condition` is computed by `density_condition`. Raises InputError like `density_condition`.
+    `condition` is that of `density_condition`, which may raise InputError.
     """
 
     def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
@@ -351,10 +351,10 @@ class ClaimedDensity(ClaimedFunction):
 
 
 def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """Return the condition that phi is defined and not 0, since for phi = 0 the law for dx/phi holds trivially.
+    """Return the condition on symbols and eps that phi is defined and not 0; for phi = 0 the law for dx/phi is trivial.
 
     Args:
-        phi: a function of `dim` variables, then of symbols and eps.
+        phi: a rational function of `dim` coordinates, then of symbols and eps.
         dim: the dimension.
         eps: half the time step, an exact number, or None for every eps.
         root: the algebraic number that the only symbol stands for, if any.
@@ -391,7 +391,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
 def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
     """Return numerator and denominator of det dPhi(x); for a Kahan map det(I + eps f'(x~)) and det(I - eps f'(x)).
 
-    For a map with several factors, each is the product of the corresponding determinants of the factors.
+    For a composition of maps, the numerator and the denominator are products over its factors.
     """
     factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerators = [
@@ -405,7 +405,7 @@ def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequ
 
 @dataclass(frozen=True)
 class Normalized:
-    """An integral `function` = (alpha I + beta)/gamma for an integral I, and its limit `leading` as eps -> 0.
+    """An integral `function` = (alpha I + beta)/gamma, made from an integral I, and its limit `leading` as eps -> 0.
 
     The `coefficients` alpha, beta and gamma are polynomials in the symbols and eps without a common factor. `leading`
     is None if I is constant.
@@ -417,7 +417,7 @@ class Normalized:
 
     @property
     def is_shifted(self) -> bool:
-        """Whether a constant was subtracted from I, because I tends to this constant as eps -> 0."""
+        """Whether beta is not 0: I tends to a constant as eps -> 0, and this constant was subtracted."""
         return not self.coefficients[1].is_zero()
 
     def combination(self, name: str) -> str:
@@ -428,21 +428,21 @@ class Normalized:
 
 
 def normalized(function: RationalFunction, dim: int) -> Normalized:
-    """Normalize an integral I: return (alpha I + beta)/gamma that tends to a nonconstant function of x as eps -> 0.
+    """Normalize an integral I: return an integral (alpha I + beta)/gamma with a nonconstant limit as eps -> 0.
 
     If a map conserves I, it conserves (alpha I + beta)/gamma for all functions alpha, beta, gamma of eps and the
-    parameters, and a search returns an arbitrary one of these. If I = const + eps^k H + ..., like the published
-    integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, the values of I hide how well the map conserves H, since
-    errors of H are multiplied by eps^k. So the constant is subtracted, and eps^k divided out.
+    parameters; a search returns any one of them. Let I = const + eps^k H + ..., like the published integrals
+    (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top. Then the errors of I are those of H times eps^k, too small to show
+    how well H is conserved. So the constant is subtracted, and the difference is divided by eps^k.
 
     Args:
-        function: an integral I of a map that approximates a flow, for every eps; a rational function of the variables,
-            the parameters that stay letters and, last, eps.
+        function: an integral I, for every eps, of a map that approximates a flow; a rational function of the variables,
+            the symbolic parameters and, last, eps.
         dim: the number of variables.
 
     Returns:
-        The normalized integral, exact; I itself if it is constant. The limit is in lowest terms; its numerator and
-        denominator have coprime integer coefficients and positive leading ones. A normalized I is returned unchanged.
+        The normalized integral, exact; I itself if I is constant or normalized. The limit is in lowest terms; its
+        numerator and denominator have coprime integer coefficients and positive leading coefficients.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> result = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
@@ -451,13 +451,13 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     """
     P, Q = function.numerator, function.denominator
     eps = P.context().gens()[-1]
-    alpha, beta, gamma = eps**0, eps * 0, eps**0  # alpha I + beta = gamma P/Q
+    alpha, beta, gamma = eps**0, eps * 0, eps**0  # invariant of the loop: alpha I + beta = gamma P/Q
     unchanged_result = Normalized(function, None, (alpha, beta, gamma))
     if P.is_zero():
         return unchanged_result
     while True:
         count_work(20 + len(P) + len(Q))
-        # Divide by factors that do not contain x: they are conserved trivially.
+        # Divide by factors that do not depend on x, which every map conserves.
         numerator, denominator = _content(P, dim), _content(Q, dim)
         P, Q = P / numerator, Q / denominator
         alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
@@ -466,9 +466,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         p, q = p / common_factor, q / common_factor
         if degree_in(p, dim) or degree_in(q, dim):
             break
-        # P/Q = p/q + O(eps), and p and q do not contain x. They are not divisible by eps, since P and Q have no such
-        # content. The loop ends since I depends on x: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds that in
-        # q P - p Q.
+        # P/Q = p/q + O(eps), and p/q does not depend on x: subtract it. P and Q are not divisible by eps (their
+        # contents are 1). The loop ends if I depends on x: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds that
+        # in q P - p Q.
         P, alpha, beta = q * P - p * Q, q * alpha, q * beta - p * gamma
         if P.is_zero():
             return unchanged_result
@@ -481,9 +481,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
 
 
 def measured_integrals(file: SystemFile) -> dict[str, RationalFunction]:
-    """Return the integrals that a file claims, by name, in the form in which they are measured along orbits.
+    """Return the integrals that a file claims, by name, in the form that is evaluated along orbits.
 
-    An integral whose limit as eps -> 0 is constant is replaced by a combination that tends to an integral of the flow.
+    If an integral tends to a constant as eps -> 0, it is replaced by its normalized form, and its name by the formula.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(measured_integrals(load("euler_top"))), list(measured_integrals(load("volterra_periodic_3")))
@@ -500,13 +500,13 @@ def measured_integrals(file: SystemFile) -> dict[str, RationalFunction]:
 
 
 def _content(polynomial: fmpq_mpoly, dim: int) -> fmpq_mpoly:
-    """Return the gcd of the coefficients of all monomials in the first `dim` variables; 1 if the gcd is a number."""
+    """Return the gcd of the coefficients of all monomials in the first `dim` variables; 1 if it is a number."""
     content = reduce(lambda left, right: left.gcd(right), coefficients_in(polynomial, dim))
     return content / content if content.is_constant() else content
 
 
 def _lowest_order_terms(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-    """Return the terms of lowest order in eps (the last variable), divided by the power of eps that they contain."""
+    """Return the terms of lowest order in eps (the last variable), divided by their power of eps."""
     order = min(int(monomial[-1]) for monomial in polynomial.monoms())
     terms: dict[tuple[int, ...], fmpq] = {}
     for monomial, value in polynomial.terms():

@@ -1,7 +1,7 @@
 """Poisson tensors P(x), and the transformation law of a tensor that a map preserves.
 
-A map Phi is Poisson for P if dPhi(x) P(x) dPhi(x)^T = P(x~). If M(x) x~ = r(x) defines the map, then dPhi = M^{-1} N,
-and the law becomes, with no denominators except those in x~ and P,
+A map x~ = Phi(x) is Poisson for P if dPhi(x) P(x) dPhi(x)^T = P(x~). If an equation M(x) x~ = r(x) defines the map,
+dPhi = M^{-1} N with a matrix N(x, x~). Multiplied by M and M^T, the law has only the denominators of x~ and P:
 
     N(x, x~) P(x) N(x, x~)^T = M(x) P(x~) M(x)^T;
 
@@ -48,12 +48,12 @@ class PoissonTensor(ABC):
     name: str
     formula: str
     has_eps: bool = True
-    symbols: tuple[str, ...] = ()  # names of symbols; their values follow the coordinates in `point`
+    symbols: tuple[str, ...] = ()  # the values of symbols follow the coordinates in `point`
 
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """Data that determine the tensor, for `derive_seed`."""
+        """Data that determine the tensor; `derive_seed` derives random seeds from them."""
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -89,7 +89,7 @@ class HamiltonianTensor(PoissonTensor):
 
 
 class MatrixPoissonTensor(PoissonTensor):
-    """A skew matrix of rational functions of the variables, then symbols (if any), then eps.
+    """A skew matrix P of rational functions of, in this order, the variables, symbols (if any) and eps.
 
     Raises InputError for a matrix that is not square or not skew-symmetric.
 
@@ -152,7 +152,7 @@ class MatrixPoissonTensor(PoissonTensor):
         return cls.from_text([[str(entry) for entry in row] for row in rows], variables, parameters)
 
     def toml_section(self) -> str:
-        """Return the tensor as a section [poisson] of a TOML file, in the form that `read` expects."""
+        """Return the tensor as the section [poisson] of a TOML file that `read` can read."""
         rows = [", ".join(f'"{format_rational_function(entry)}"' for entry in row) for row in self.rows]
         return "\n".join(["[poisson]", "tensor = [", *(f"  [{row}]," for row in rows), "]", ""])
 
@@ -164,7 +164,7 @@ class MatrixPoissonTensor(PoissonTensor):
 
     @property
     def formula(self) -> str:  # type: ignore[override]
-        """The nonzero brackets as text."""
+        """The nonzero brackets {x_i, x_j} = P_ij with i < j, as text."""
         equations = [f"{{{a},{b}}} = {format_rational_function(entry)}" for (a, b), entry in self.brackets.items()]
         return ", ".join(equations) or "P = 0"
 
@@ -219,7 +219,7 @@ class MatrixPoissonTensor(PoissonTensor):
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
-    """Return the condition that P is defined and not 0, since for P = 0 the laws for tensors hold trivially.
+    """Return the condition on symbols and eps that P is defined and not 0; P = 0 is trivially a Poisson tensor.
 
     Args:
         tensor: P, a matrix of functions of the variables, symbols and eps.
@@ -241,7 +241,7 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     entries = [at_eps(entry, eps) for entry in tensor.brackets.values()]
     numerators = [numerator for numerator, _ in entries if not numerator.is_zero()]
     if any(denominator.is_zero() for _, denominator in entries):
-        return ""  # P is not defined at this eps; the verdict says so
+        return ""  # P is not defined at this eps; the check will report this
     if not numerators:
         tensor_text = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
         raise InputError(f"found the tensor {tensor_text}, expected one that is not zero: every map preserves 0")
@@ -254,7 +254,7 @@ def transformation_sides(
     """Return the two sides N P(x) N^T and M P(x~) M^T of the transformation law, for x = `point` and x~ = `image`.
 
     `values` are the values of the symbols. Returns None at a pole of the tensor, and if P is 0 at both points, where
-    the law is trivial. For a composition, N and M belong to the last factor; the other factors first transform P(x).
+    the law is trivial. If the map is a composition, N and M belong to its last factor; the others transform P(x) first.
     """
     field, eps = map_.field, map_.eps
     P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))
@@ -271,7 +271,7 @@ def transformation_sides(
 
 
 def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequence[Any]) -> list[Any] | None:
-    """Return sum_l P_il d_l P_jk + cyclic in i, j, k, for all i < j < k; all are zero if P is a Poisson tensor.
+    """Return the cyclic sums of sum_l P_il d_l P_jk over i, j, k, for all i < j < k; all are 0 if P is Poisson.
 
     Returns None at a pole, and if P is 0 at the point, since the sums are then 0 for every tensor.
     """
@@ -280,7 +280,7 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
     if P is None or _is_zero(field, P):
         return None
     with field.working():
-        # derivatives[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk along row i of P.
+        # derivatives[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk in the direction of row i of P.
         derivatives = [tensor.derivative(field, eps, point, [P[i, l] for l in range(n)]) for i in range(n)]
         return [
             derivatives[i][j, k] + derivatives[j][k, i] + derivatives[k][i, j]
@@ -291,5 +291,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    """Whether the matrix is 0. False over a BoundField: bounds for both sides of the law hold whether P is 0 or not."""
+    """Whether all entries are 0; False over a BoundField, where P is only bounded and may be 0 or not."""
     return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

@@ -1,1 +1,1 @@
-"""The laboratory: given a quadratic system, find out what its Kahan map preserves and how it grows."""
+"""The laboratory: searches for what a map preserves, and measurements of the growth of its iterates."""

@@ -1,4 +1,4 @@
-"""The analysis of one map: what it preserves, how fast its iterates grow in complexity, and a verdict.
+"""The analysis of one map: preserved structures, growth of the degrees of its iterates, and a verdict.
 
 The analysis uses the map only, and ignores what a file claims about its system. Every statement has a certainty.
 Formulas are proved or supported, as identities in x and eps. Other statements are derived from the measured singularity
@@ -33,15 +33,15 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Units of work at effort 1 by dimension. The independent steps together have this budget, and the other steps together
-# have a second budget of the same size.
+# Units of work at effort 1, by dimension. The independent steps share one budget of this size, and the other steps
+# share a second one.
 _UNITS_BY_DIMENSION = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
 _MAX_UNITS = 150e6
 
 
 @dataclass
 class Analysis(AnalysisResult, PrintableResult):
-    """The result of `analyze`: the results of all steps, with the statements and the verdict that follow from them."""
+    """The result of `analyze`: the results of all steps, and the statements and the verdict derived from them."""
 
     analyses: tuple[AnalysisStep, ...] = ANALYSES
     interrupted: bool = False
@@ -53,23 +53,23 @@ class Analysis(AnalysisResult, PrintableResult):
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state without the table, whose functions `pickle` cannot store; copies use the default table."""
+        """Return the state for `pickle`, without the table ANALYSES of functions; copies use ANALYSES again."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
 
     @property
     def work(self) -> str:
-        """The effort and the units of work done, as text such as "effort 1, 12.3 million units"."""
+        """The effort and the units of work done, as text: "effort 1, 12.3 million units"."""
         return f"effort {self.effort}, {self.units / 1e6:.1f} million units"
 
     def interrupt(self, reason: str = "interrupted") -> None:
-        """Skip the steps that are pending, after Ctrl-C or at the end of a `time_limit`; `reason` is reported."""
+        """Skip the pending steps, after Ctrl-C or at the end of a `time_limit`; `reason` is reported for each."""
         self.skipped += [f"{name}: {reason}" for name in self.pending]
         self.pending.clear()
         self.interrupted = True
 
     @property
     def conclusion(self) -> Conclusion:
-        """The verdict on integrability, the number of integrals and the growth."""
+        """The verdict on integrability, with the number of integrals and the growth of the degrees."""
         return conclude(self)
 
     @property
@@ -79,19 +79,19 @@ class Analysis(AnalysisResult, PrintableResult):
 
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
-        """The sections of the report that have statements: titles and statements."""
+        """The sections of the report that have statements, as pairs (title, statements)."""
         return self._sections(self._reported_steps)
 
     @property
     def final_sections(self) -> list[tuple[str, list[Statement]]]:
-        """The sections before the first one that a pending step may still change."""
+        """The sections before the first section that a pending step may change, as pairs (title, statements)."""
         steps = self._reported_steps
         indices = (k for k, step in enumerate(steps) if {step.name, *step.requires}.intersection(self.pending))
         return self._sections(steps[: next(indices, None)])
 
     @property
     def _reported_steps(self) -> list[AnalysisStep]:
-        """The steps with statements, in the order of the report."""
+        """The steps that have statements, in the order of their sections in the report."""
         steps = [step for step in self.analyses if step.statements is not None]
         return sorted(steps, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
 
@@ -101,12 +101,12 @@ class Analysis(AnalysisResult, PrintableResult):
         return [(title, lines) for title, lines in (*sections, ("not done", notes)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
-        """One row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
+        """Return one row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
         statements = ((title, line) for title, lines in self.sections for line in lines)
         return [{"section": title, "status": line.status, "text": line.text} for title, line in statements]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: the verdict, the statements, and all results."""
+        """Return plain data: the verdict, the statements, and the results of all steps."""
         from kahanmaps.maps.convention import eps_record
         from kahanmaps.version import __version__
 
@@ -153,26 +153,26 @@ def analyze(
     analyses: Sequence[AnalysisStep] = ANALYSES,
     processes: int = 1,
 ) -> Analysis:
-    """Determine what a map preserves and how fast its iterates grow in complexity, within a budget of counted work.
+    """Determine what a map preserves and how fast the degrees of its iterates grow, within a budget of counted work.
 
     Args:
         system: the map; a differential equation stands for its Kahan map. Claims and facts of a file are ignored. With
-            an algebraic parameter, steps that do not apply over a number field are named in `skip_messages`.
-        symbols: names of parameters that stay symbols in integrals and densities; other results use their values.
+            an algebraic parameter, steps that do not apply over a number field are named in `skipped` of the result.
+        symbols: names of parameters that stay symbols in integrals and densities; in other results they have values.
         eps: half the time step, an exact number; the results then hold at this eps only. None: they hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
-        effort: an integer; each increase by 1 doubles the work that searches may take.
+        effort: an integer; an increase by 1 doubles the budget of counted work.
         seed: the random seed.
         progress: called with a message at the beginning of each step, and repeatedly during long steps.
         on_result: called with the results so far, at the beginning and after each step.
-        analyses: the steps to run, in this order; the verdict rests on their results only.
-        processes: with more than 1, a forked copy of this process runs the independent steps, if there is a second
-            processor (on Linux only; other threads must tolerate a fork). The results are those of one process.
+        analyses: the steps to run, in this order; the verdict depends on their results only.
+        processes: if this is more than 1, and on Linux with at least two processors, a forked process runs the
+            independent steps (other threads must tolerate a fork). The results are the same as with one process.
 
     Returns:
-        An `Analysis`, the same on any machine at any load. Its `skip_messages` names the steps that were not completed.
-        Ctrl-C and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all
-        completed steps.
+        An `Analysis`, which does not depend on the machine or its load. The list `skipped` names the steps that were
+        not completed, with reasons. Ctrl-C and a `time_limit` raise an exception; the object that `on_result` received
+        last then has the results of all completed steps.
 
     Raises:
         InputError: for eps = 0, unknown symbols, or an effort that is not an integer from -20 to 40.
@@ -183,7 +183,7 @@ def analyze(
     ('integrable', 1, 'quadratic')
     """
     file, eps = as_file(system), resolve_eps(eps, time_step, h)
-    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses wrong arguments before any work
+    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # rejects wrong arguments before any work
     units = units_at(effort, _UNITS_BY_DIMENSION.get(file.dim, _MAX_UNITS))
     analysis = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, analyses=tuple(analyses))
     analysis.defect = laboratory.defect if file.is_quadratic else ""
@@ -194,7 +194,7 @@ def analyze(
     can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
     forked_steps = [step for step in steps if step.is_independent and can_fork]
     skip_messages: dict[str, str] = {}
-    # The independent steps have a separate budget, so that their results are the same with one process and with two.
+    # Separate budgets make the results of independent steps the same with one process and with two.
     accounts = {
         is_independent: _Account(context, [step for step in steps if step.is_independent is is_independent], units)
         for is_independent in (False, True)
@@ -206,12 +206,12 @@ def analyze(
             step, outcome = (awaited_steps if has_arrived else own_steps).pop(0), None
             progress(step.name)
             if has_arrived:
-                # The forked process was killed or raised an error; this process then runs the step and meets the error.
+                # If the forked process has ended early, this process runs the step, and may raise the same error.
                 with suppress(EOFError, OSError):
                     outcome = connection.recv()
             account = accounts[step.is_independent]
             result, reason, spent = outcome or account.run(step)
-            account.book(step, spent)  # also for forked steps: this process may have to run the rest of them
+            account.book(step, spent)  # also for forked steps, since this process may have to run those that remain
             analysis.units += spent
             if reason:
                 skip_messages[step.name] = f"{step.name}: {reason}"
@@ -231,13 +231,13 @@ def analyze(
 
 
 class _Account:
-    """A budget shared by successive steps: later steps may use the units of work that earlier steps leave over."""
+    """A budget shared by successive steps: later steps may use the units of work that earlier steps did not use."""
 
     def __init__(self, context: AnalysisContext, steps: Sequence[AnalysisStep], units: float) -> None:
         self.context, self.waiting, self.units = context, list(steps), units
 
     def run(self, step: AnalysisStep) -> tuple[Any, str, int]:
-        """Run a step; return its result or None, the reason if there is no result, and the units that the step took."""
+        """Run a step; return (result or None, the reason for a missing result or "", the units of work used)."""
         if self.units <= 0:
             return None, SPENT, 0
         budget = Budget(self.units * self.context.weight(step) / sum(map(self.context.weight, self.waiting)))
@@ -248,21 +248,21 @@ class _Account:
         return result, reason, budget.spent
 
     def book(self, step: AnalysisStep, spent: int) -> None:
-        """Remove a completed step from the pending ones, and subtract the units that it took from the budget."""
+        """Remove a completed step from the waiting ones, and subtract its units of work from the budget."""
         self.waiting.remove(step)
         self.units -= spent
 
 
 @contextmanager
 def _fork_steps(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
-    """Run the steps, if any, in a forked process, and yield the connection on which their outcomes arrive."""
+    """Run the steps, if any, in a forked process, and yield the connection from which their outcomes are received."""
     parent_id, (receiver, sender) = os.getpid(), Pipe(duplex=False)
     if not steps:
         yield receiver
         return
 
     def work() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the first process handles Ctrl-C
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         end_with_parent(parent_id)
         context.progress = lambda _: None
@@ -278,7 +278,7 @@ def _fork_steps(context: AnalysisContext, steps: Sequence[AnalysisStep], account
     with suppress(OSError):  # too little memory or too many processes: the first process then runs all steps
         process.start()
     try:
-        sender.close()  # so that the receiver sees the end of the pipe when the forked process ends
+        sender.close()  # else the receiver would wait forever after the end of the forked process
         yield receiver
     finally:
         if process.pid is not None:

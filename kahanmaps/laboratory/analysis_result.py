@@ -1,4 +1,4 @@
-"""The results of those steps of an analysis of one map that have run so far."""
+"""The results of the steps of an analysis, of which some may not have run yet."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ class Statement(ResultPart):
 
 @dataclass
 class AnalysisResult:
-    """The results of the steps, None for a step that has not run; `further` has the results that no other step uses."""
+    """The results of the steps; None means that a step has not run. `further` has results that no other step uses."""
 
     file: SystemFile
     eps: fmpq | None
     effort: int | Budget
     seed: int
     symbols: tuple[str, ...] = ()
-    defect: str = ""  # why the Kahan map at this eps is not birational; empty if it is, or if the map is no Kahan map
+    defect: str = ""  # the reason if the Kahan map at this eps is not birational; otherwise empty
     fixed_points: FixedPointSearch | None = None
-    equivalent: Equivalence | None = None  # to a system of the catalogue
+    equivalent: Equivalence | None = None  # an affine equivalence to a system of the catalogue
     integrals: IntegralSearch | None = None
-    pencil: Pencil | None = None  # of invariant curves, for maps of the plane
+    pencil: Pencil | None = None  # the pencil of invariant curves of a map of the plane
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
     flow: FlowAndMap | None = None
@@ -61,15 +61,15 @@ class AnalysisResult:
     symmetries: Symmetries | None = None
     commuting: CommutingSystems | None = None
     hamiltonian: ConstantStructures | None = None
-    normal_form: SystemNormalForm | NoNormalForm | None = None  # in coordinates with the centre as origin
+    normal_form: SystemNormalForm | NoNormalForm | None = None  # the origin is the point `centre`
     tensor: TensorStructure | None = None  # an algebra larger than Q over which f is defined
     further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)  # names of the steps that have not run yet
-    units: int = 0  # counted work of the steps
+    units: int = 0  # units of work that the steps used
 
     def __getitem__(self, key: str) -> Any:
-        """The result of the step `key`, None if this step has not run."""
+        """Return the result of the step with this key; None if the step has not run."""
         return getattr(self, key, self.further.get(key))
 
     def __setitem__(self, key: str, value: Any) -> None:
@@ -92,7 +92,7 @@ class AnalysisResult:
 
     @property
     def integral_count(self) -> int:
-        """The number of independent integrals, from formulas, orbits or theorems; see `count_is_exact`."""
+        """The number of independent integrals, from formulas, orbits or theorems; or a lower bound of it."""
         codimension = self.integrals.codimension if self.integrals is not None else 0
         family = self.normal_form.form.m if isinstance(self.normal_form, SystemNormalForm) else 0
         return max(codimension, family)
@@ -104,6 +104,6 @@ class AnalysisResult:
 
     @property
     def integrals_were_counted(self) -> bool:
-        """Whether `integral_count` was determined; if not, it is 0 because no orbit was followed."""
+        """Whether `integral_count` was determined; otherwise it is 0, since no orbit was examined."""
         has_profile = self.integrals is not None and bool(self.integrals.profile.nullities)
         return has_profile or self.integral_count > 0

@@ -1,7 +1,7 @@
 """The verdict on the integrability of a map, with its evidence.
 
-Degrees, singularities, integrals and heights are computed independently of each other, each with a work limit of its
-own. The verdict uses all proved results. Where two measurements contradict each other, it relies on neither.
+Degrees, singularities, integrals and heights are computed independently, each with its own work limit. The verdict uses
+all proved results. If two measured results contradict each other, the verdict uses neither.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Conclusion(ResultPart):
     `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere defined) or "undecided".
     `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
     "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable", "confining
-    and not integrable", or the same as `kind`. `ground` is the kind of evidence: "proved", "derived" (from the measured
-    singularity patterns), "measured" or "estimated"; it is empty if the kind is "undecided". `integrals` is the number
-    of independent integrals, known or measured; `growth` is the growth of the degrees.
+    and not integrable" (all singularities are confined), or the same as `kind`. `ground` is the certainty: "proved",
+    "derived" (from the measured singularity patterns), "measured" or "estimated"; it is empty if `kind` is "undecided".
+    `integrals` is the number of independent integrals, or a lower bound of it; `growth` is the growth of the degrees.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class _Verdict(NamedTuple):
 
 
 class _Facts:
-    """The results, and phrases that several rules use."""
+    """The results of the analysis, and phrases about them that several rules use."""
 
     def __init__(self, result: AnalysisResult) -> None:
         degrees = result.degrees
@@ -62,7 +62,7 @@ class _Facts:
         self.growth_certainty = degrees.known if degrees is not None else Certainty.MEASURED
         self.growth_text = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis_text = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
-        # The phrase with the number of integrals, or with a lower bound of it.
+        # The phrase that states the number of integrals, or a lower bound of this number.
         suffix = f" in dimension {result.dim}"
         count_text = counted(self.count, "independent integral") if self.count else "no integral"
         self.integrals_text = count_text + suffix if result.count_is_exact else f"at least {count_text}{suffix}"
@@ -74,7 +74,7 @@ class _Facts:
         period = result.integrals.profile.period if result.integrals is not None else None
         self.closing_text = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
-        self.liouville = ""  # why the map is Liouville integrable; empty without a proof
+        self.liouville = ""  # the reason why the map is Liouville integrable; empty without a proof
         if result.dim > 2 and not self.is_linear:
             for tensor in reversed(result.poisson.tensors if result.poisson is not None else ()):
                 verdicts = (tensor.verdict, tensor.jacobi, tensor.involution)
@@ -85,7 +85,7 @@ class _Facts:
 
 
 def conclude(result: AnalysisResult) -> Conclusion:
-    """Return the verdict of the first rule in `_RULES` that applies; without such a rule, return "undecided"."""
+    """Return the verdict of the first rule in `_RULES` that applies; if no rule applies, return "undecided"."""
     facts = _Facts(result)
     undecided = f"The growth is undecided: {facts.growth_text}; {facts.integrals_text}."
     verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
@@ -103,7 +103,7 @@ def conclude(result: AnalysisResult) -> Conclusion:
         facts.growth,
     )
     if verdict.kind == "not integrable":
-        growth = Growth.EXPONENTIAL  # also if the growth is only estimated to be exponential
+        growth = Growth.EXPONENTIAL  # even if exponential growth is only estimated
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
@@ -131,7 +131,7 @@ def _if_linear(facts: _Facts) -> _Verdict | None:
 def _if_inconsistent(facts: _Facts) -> _Verdict | None:
     """Return "undecided" if results contradict each other, or if the map is not birational.
 
-    The degrees and periodic orbits of a map that is not birational are no evidence.
+    For a map that is not birational, degrees and periodic orbits are no evidence of integrability.
     """
     if sentences := contradictions(facts.result):
         sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capitalize(facts.integrals_text)}."
@@ -143,7 +143,7 @@ def _if_inconsistent(facts: _Facts) -> _Verdict | None:
 
 
 def _if_linearisable(facts: _Facts) -> _Verdict | None:
-    """Return the verdict on periodic maps, maps with a constant iterate, and maps of bounded degrees."""
+    """Return the verdict on a map that is periodic, has a constant iterate, or has bounded degrees."""
     proof = facts.degrees.proof if facts.degrees is not None else None
     if proof is not None and proof.is_identity:
         sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals_text}."
@@ -162,7 +162,7 @@ def _if_linearisable(facts: _Facts) -> _Verdict | None:
 
 
 def _if_entropy_positive(facts: _Facts) -> _Verdict | None:
-    """Return the verdict on maps whose dynamical degree is proved to be above 1."""
+    """Return the verdict on a map whose dynamical degree is proved to exceed 1."""
     result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
@@ -176,7 +176,7 @@ def _if_entropy_positive(facts: _Facts) -> _Verdict | None:
 
 
 def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
-    """Return the verdict on a map with orbits on curves; unproved integrals count only if the growth is unknown."""
+    """Return the verdict on a map with orbits on curves; if the growth is known, only proved integrals count."""
     result, proved_count = facts.result, 0  # the number of independent integrals that are proved
     if result.integrals is not None:
         proved_count = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
@@ -184,7 +184,7 @@ def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
     if result.dim > 1 and proved_count >= result.dim - 1:
         sense = "superintegrable" if result.dim > 2 else "integrable"
         genus = result.pencil.genus if result.pencil is not None else None
-        if genus is None and result.dim == 2:  # the genus was not computed, but the growth determines it
+        if genus is None and result.dim == 2:  # the genus was not computed; the growth determines whether it is 0 or 1
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         clause = f"so that orbits lie on {_CURVE_TEXTS.get(genus, f'curves of genus {genus}')}"
         sentence = (
@@ -200,9 +200,9 @@ def _if_orbits_on_curves(facts: _Facts) -> _Verdict | None:
 
 
 def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
-    """Return the verdict that follows from exponential or polynomial growth, measured or derived."""
+    """Return the verdict that follows from exponential or polynomial growth of the degrees."""
     count, integrals = facts.count, facts.integrals_text
-    is_exponential = facts.growth is Growth.EXPONENTIAL  # if False, exponential growth is only estimated
+    is_exponential = facts.growth is Growth.EXPONENTIAL  # if False, the growth may still look exponential
     if is_exponential or (facts.degrees is not None and facts.degrees.looks_exponential):
         clause = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
         growth = f"{facts.growth_text}{facts.basis_text if is_exponential else ''}"
@@ -217,7 +217,7 @@ def _verdict_by_growth(facts: _Facts) -> _Verdict | None:
     return None
 
 
-# Stronger rules first: proved results before measured ones.
+# The order matters: the first rule that applies decides; proved results precede measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_if_nowhere_defined, _if_linear, _if_inconsistent, _if_linearisable, _if_entropy_positive),
     *(_if_orbits_on_curves, _verdict_by_growth),
@@ -231,7 +231,7 @@ def _sense_and_ground(liouville: str, ground: Certainty | None = Certainty.MEASU
 
 
 def _sense_if_not_integrable(result: AnalysisResult) -> str:
-    """Return "confining and not integrable" or "not integrable"."""
+    """Return "confining and not integrable" if all singularities are confined, otherwise "not integrable"."""
     is_confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if is_confined else "not integrable"
 
@@ -243,13 +243,13 @@ def _capitalize(sentence: str) -> str:
 def orbits_lie_on_curves(result: AnalysisResult) -> bool:
     """Return whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
 
-    The map acts on the level curves of the integrals; a curve with an automorphism of infinite order has genus 0 or 1.
+    The map acts on the level curves of these integrals, and an automorphism of infinite order implies genus 0 or 1.
     """
     return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
 def contradictions(result: AnalysisResult) -> list[str]:
-    """Return a sentence on each contradiction between integrals, closed orbits and degrees."""
+    """Return a sentence for each contradiction between integrals, periodic orbits and the growth of degrees."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     period = result.integrals.profile.period if result.integrals is not None else None
     sentences = []
@@ -271,7 +271,7 @@ def contradictions(result: AnalysisResult) -> list[str]:
 
 
 def doubt_of_heights(result: AnalysisResult) -> str:
-    """Return why the growth of heights contradicts the growth of degrees; empty if the two agree."""
+    """Return why the measured growth of heights is inconclusive, e.g. since the degrees contradict it; otherwise ""."""
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth

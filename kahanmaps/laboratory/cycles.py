@@ -1,10 +1,10 @@
 """The number of cycles of each length of a map on projective space over GF(p).
 
-All points of P^n(GF(p)) are followed if there are few enough, and else random points. The counts are exact.
+If P^n(GF(p)) is small, the orbits of all its points are computed, otherwise those of random points. Counts are exact.
 
-The lengths are not compared with a bound. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an
-irreducible curve of genus 1 that the map sends to itself. Integrable maps may have longer cycles, since level sets may
-have several components and be permuted. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
+The lengths are not compared with the Hasse-Weil bound p + 1 + 2 sqrt p. This bound holds for a cycle on an irreducible
+curve of genus 1 that the map sends to itself. Integrable maps may have longer cycles, since level sets may have several
+components, and the map may permute level sets. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 
-MAX_POINTS = 2_000_000  # in a space that is examined completely, up to dimension 6; halved for each further dimension
+MAX_POINTS = 2_000_000  # in a space all of whose points are examined; halved for each dimension above 6
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
-MAX_DIMENSION = 12  # in dimension n the minors at the points fill up to 2^(n + 1) arrays
-MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
+MAX_DIMENSION = 12  # in dimension n the minors of all points of a batch need up to 2^(n + 1) arrays
+MAX_FACTORED = 6  # maximal dimension in which the forms of the map are expanded
 DEFAULT_SAMPLES, MAX_SAMPLES, DEFAULT_STEPS = 500, 100_000, 10_000
 DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3", "5", "4", "6")
 
 
 @dataclass(frozen=True)
 class Census(PrintableResult):
-    """The orbits of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
+    """Exact counts of the orbits of points of P^n over GF(p) under a map at one eps (half the time step).
 
-    `lengths` maps each length to the number of cycles if `complete` is True (all points were followed), and otherwise
-    each period to the number of sampled points with this period. `indeterminate` counts points at which the map is not
-    defined, `pre_indeterminate` points whose orbit reaches such a point, `preperiodic` points whose orbit reaches a
-    cycle on which they do not lie, and `open` sampled points whose orbit was not decided within `steps` steps.
-    `stopped` is True if a time limit ended the work. If all points were still being mapped, `examined` is 0.
+    If `complete`, all points of P^n were examined, and `lengths` maps each length to the number of cycles. Otherwise
+    random points were examined, and `lengths` maps each period to the number of these points with this period.
+    `indeterminate` counts points at which the map is not defined, `pre_indeterminate` other points whose orbit reaches
+    such a point, `preperiodic` points outside cycles whose orbit reaches a cycle, and `open` random points undecided
+    after `steps` steps. `stopped` is True if a time limit ended the work; for all points `examined` is then 0.
     """
 
     prime: int
@@ -73,15 +73,15 @@ class Census(PrintableResult):
 
     @property
     def longest(self) -> int:
-        """The length of the longest cycle seen, 0 if there is none."""
+        """The length of the longest cycle that was detected; 0 if there is none."""
         return max(self.lengths, default=0)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return all fields as plain data."""
         return all_fields(self)
 
     def rows(self) -> list[dict[str, int]]:
-        """One row for each length with the number of cycles or of sampled points, for example for pandas.DataFrame."""
+        """Return a row for each entry of `lengths`, for example for pandas.DataFrame."""
         return [{"length": length, "count": count} for length, count in self.lengths.items()]
 
 
@@ -97,10 +97,10 @@ def cycle_census(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Census:
-    """Count the cycles of a map on P^n over GF(p) by length, from all points or from random points.
+    """Count the cycles of a map on P^n over GF(p) by length, from the orbits of all points or of random points.
 
-    The maps of a composition are applied one after another; a point is indeterminate if one of them is undefined there.
-    Above dimension 6 a point at which a common factor of the forms of the map vanishes is also indeterminate.
+    The factors of a composition are applied one after another; if one of them is undefined, the point is indeterminate.
+    Above dimension 6 a point at which a common factor of the forms of the map vanishes is also called indeterminate.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
@@ -109,15 +109,15 @@ def cycle_census(
         time_step, h: the time step 2 eps, instead of eps.
         samples: the number of random points; by default all points if there are at most 2,000,000 (halved for each
             dimension above 6), otherwise 500.
-        steps: the largest number of steps for a random point.
+        steps: the maximal number of steps of the orbit of a random point.
         seed: the random seed.
         progress: called with messages.
 
     Returns:
-        A `Census`, exact. A TimeLimit ends the count early: `stopped` of the result is then True.
+        A `Census` with exact counts. If a `time_limit` ends the count early, `stopped` of the result is True.
 
     Raises:
-        InputError: for a prime, number or dimension out of range; BadPrime if eps or the map has no reduction modulo p.
+        InputError: for arguments out of range. BadPrime: if eps or the map has no reduction modulo p.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
@@ -135,11 +135,11 @@ def cycle_census(
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
         return _count_all_points(space, census, progress)
     samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.subject, exact_eps, prime))
-    vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # zero vectors among them are no points
+    vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # surplus, since zero vectors are no points
     initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
     census = replace(census, examined=initial_points.shape[1])
     step, lengths, is_stopped = 0, dict[int, int](), False
-    indeterminate = [0, 0]  # initial points without image, and points whose orbits end later
+    indeterminate = [0, 0]  # the numbers of initial points without image, and of those whose orbits end later
     try:
         while step < steps and points.shape[1]:
             progress(f"p = {prime}: step {step} of at most {steps}")
@@ -162,10 +162,10 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
     import numpy as np
 
     p, count = census.prime, census.points
-    # The base-p digits of a code are the coordinates. As the last nonzero digit is 1, codes are p^m, ..., 2 p^m - 1.
+    # A code has the coordinates as base-p digits; its leading digit is 1. So codes are p^m, ..., 2 p^m - 1 for m <= n.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
     place_values = p ** np.arange(census.dim + 1)
-    images = np.full(count + 1, count)  # `count` stands for a point without image
+    images = np.full(count + 1, count)  # the index `count` stands for an undefined image
     try:
         for k in range(0, count, space.batch_size):
             progress(f"p = {p}: the images of {k} of {count} points")
@@ -174,7 +174,7 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
     except TimeLimit:
         return replace(census, stopped=True)
     iterates = images
-    for _ in range(count.bit_length()):  # doubles the number of steps until all orbits have reached their cycles
+    for _ in range(count.bit_length()):  # doubles the number of steps; at the end all orbits are in cycles
         iterates = iterates[iterates]
     cyclic_points = np.setdiff1d(iterates, [count])
     lengths: Counter[int] = Counter()
@@ -196,15 +196,15 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
 
 
 class _ProjectiveMap:
-    """A map at one eps on P^n over GF(p); points are columns of n + 1 residues whose last nonzero residue is 1."""
+    """A map at one eps on P^n over GF(p). A point is a column of n + 1 residues, of which the last nonzero one is 1."""
 
     def __init__(self, map_: MapFamily, eps: fmpq, prime: int) -> None:
         if not 2 < prime < MAX_PRIME or map_.dim > MAX_DIMENSION:  # modulo 2 every Kahan map is the identity
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
-        self.batch_size = 1 << max(8, 18 - map_.dim)  # points in a batch, whose minors should fit in the cache
-        # For each map of a composition: its forms, or a matrix whose maximal minors are its forms, as lists of terms.
+        self.batch_size = 1 << max(8, 18 - map_.dim)  # points in a batch; their minors should fit in a cache
+        # For each factor: (False, a row of its forms) or (True, a matrix whose maximal minors are its forms), as terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
             matrix, is_by_minors = factor.equation.polynomials(), False
@@ -218,7 +218,7 @@ class _ProjectiveMap:
             self.maps.append((is_by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """Return the images of at most `batch_size` points; a point without image has a column of zeros."""
+        """Return the images of at most `batch_size` points (columns); a column of zeros is an undefined image."""
         p = self.prime
         for is_by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}
@@ -247,10 +247,10 @@ class _ProjectiveMap:
 
 
 def default_eps(prime: int) -> list[fmpq]:
-    """Return the first two eps of a fixed list that are nonzero and not equal up to sign modulo the prime.
+    """Return the first two eps of a fixed list that are defined, nonzero and different up to sign modulo the prime.
 
-    The sign is ignored, since -eps gives the inverse map. For p > 5 each of the two eps has eps^4 != 1, since at an eps
-    with eps^4 = 1 a map may be periodic that is not periodic at other eps.
+    The sign is ignored, since -eps gives the inverse map. For p > 5, values with eps^4 = 1 modulo p are omitted, since
+    some maps are periodic only at such eps.
 
     >>> default_eps(101)
     [1/7, 2/11]

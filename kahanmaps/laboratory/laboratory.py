@@ -1,11 +1,11 @@
-"""The reductions of a map modulo primes that searches work with, and the reconstruction of formulas from them.
+"""The reductions of a map modulo primes, which searches use, and the reconstruction of formulas from residues.
 
 Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is interpolated, modulo a prime at which g splits, from its
-values at all roots of g. The c_j are functions over Q, which are then reconstructed from their residues.
+values at the roots of g. So residues of the c_j are known, from which the c_j are reconstructed as functions over Q.
 
-Formulas are certified as identities in x, eps and the symbols, without quotients. For I = P/Q the identity is
-P(x~) Q(x) = P(x) Q(x~), which is shorter to expand. Some identities are too long to expand in the given coordinates,
-but short in coordinates in which the planes of a normal form separate.
+Formulas are certified as identities in x, eps and the symbols. For an integral I = P/Q the identity is
+P(x~) Q(x) = P(x) Q(x~), whose expansion is shorter than that of the quotients. Some identities are too long to expand
+in the given coordinates, but short in coordinates in which the planes of a normal form separate.
 """
 
 from __future__ import annotations
@@ -71,30 +71,30 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIME_DEPENDENT = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
-MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one in 720 primes
-_BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, which thus proves the same identities
+MAX_DEGREE = 6  # of a number field: about one prime in at most 6! = 720 splits
+_BUDGET = DEFAULT_BUDGET  # also that of `check-integrals`, except for identities with long coefficients
 _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number in the search for invariant hyperplanes over Q
 Spaces = Sequence[DarbouxSpace]
 
 
 @dataclass(frozen=True)
 class ClosedForms:
-    """Bases of spaces as polynomials in the variables, the symbols and eps, or None and the reason why."""
+    """Bases of spaces of polynomials in the variables, the symbols and eps; or None, and the reason why."""
 
     bases: list[list[fmpq_mpoly]] | None
     reason: str = ""
 
 
 class Laboratory:
-    """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
+    """The reductions `maps` of the map of a file modulo two primes, each with its own eps and values of the symbols.
 
-    If `eps` (half the time step, exact) is given, both are at this eps. If `flow` is True, the flow is reduced instead:
-    for an adjusted Kahan map of the field at eps = 0, and for a polarised map `map` is then x + eps f. If `algebraic`
-    and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
+    If `eps` (half the time step, exact) is given, both are at this eps. If `flow` is True, the flow is reduced instead
+    of the map. An adjusted Kahan map stands for the flow of its field at eps = 0; for a polarised map of f, `map` is
+    then x + eps f. If `algebraic` and a parameter is an algebraic number, this `root` is the only symbol.
 
-    `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
-    `field` is the system or, for a flow, its field of any degree. `free_symbols` are the symbols with random values.
-    Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
+    `system` is the system if the map is a Kahan map of a system without eps in its coefficients (theorems then apply),
+    otherwise None. `field` is `system` or, for the flow of a polarised map, its field of any degree. `free_symbols` are
+    the symbols with random values. Raises InputError for eps = 0, eps both a number and a symbol, and wrong symbols.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("euler_top"), ["a1"])
@@ -143,8 +143,8 @@ class Laboratory:
             self.field = self.map.of_field
             self.map = euler_map(self.field)
         self.flow = flow
-        # Caches of one search. Each search has a laboratory of its own, so that no answer depends on another search.
-        # For integrals (False) and densities (True): the smallest number of terms that was too large to expand.
+        # Caches of one search. Each search has its own laboratory, so that no answer depends on another search.
+        # `_too_long`: for integrals (False) and densities (True), the least number of terms too large to expand.
         self._too_long: dict[bool, int] = {}
         self._flow_polynomials: FlowPolynomials | None = None
         if flow and (self.field is None or self.eps is not None):
@@ -153,13 +153,13 @@ class Laboratory:
                 f"found {found_text}, expected a polynomial vector field without eps for an analysis of the flow"
             )
         map_key = self.map.subject if self.root is None else file.map.subject
-        self.seed = derive_seed(seed, self.symbols, map_key, self.eps)  # of all random choices for this map
+        self.seed = derive_seed(seed, self.symbols, map_key, self.eps)  # the seed of all random choices for this map
         self.maps = list(self._draw_maps("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
-        self.request = file, self.free_symbols, self.eps, seed, self.primes  # the first fields of every search result
+        self.request = file, self.free_symbols, self.eps, seed, self.primes  # the first fields of each result
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
-        """Return the map modulo a prime; the residue `eps` is ignored if eps is a given number. Raises BadPrime."""
+        """Return the map modulo a prime; the residue `eps` is ignored if `self.eps` is a number. Raises BadPrime."""
         if self.eps is not None:
             eps = int(GF(prime).convert(self.eps))
             if eps == 0:
@@ -169,9 +169,9 @@ class Laboratory:
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
-        """Return the map at values of the names in formulas: the symbols, followed by eps if eps enters as a symbol.
+        """Return the map modulo a prime, at `values` of the symbols and, if eps enters formulas as a symbol, of eps.
 
-        If eps does not enter as a symbol, it is 1 or the given number.
+        If eps does not enter as a symbol, the map is at eps = 1, or at `self.eps` if this is a number.
         """
         count = len(self.symbols)
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
@@ -195,7 +195,7 @@ class Laboratory:
 
     @property
     def eps_enters(self) -> str:
-        """How eps enters formulas: "not" if it is a number, "by weight" if f is homogeneous, else as a "symbol"."""
+        """How eps enters formulas: "not" (a number, or no eps), "by weight" if f is homogeneous, else as a "symbol"."""
         if self.eps is not None or self.flow or not self.map.has_eps:
             return "not"
         if self.system is None:
@@ -204,7 +204,7 @@ class Laboratory:
 
     @property
     def defect(self) -> str:
-        """Why the map at the given eps is not birational, measured at random points; empty if it is."""
+        """The reason why the map is not birational, measured at random points; empty if it seems birational."""
         if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
         at_eps_text = "" if self.eps is None else f"at eps = {self.eps} "
@@ -221,7 +221,7 @@ class Laboratory:
         return ""
 
     def cofactors(self) -> list[Cofactor]:
-        """The cofactors that the search for Darboux polynomials tries."""
+        """Return the cofactors that the search for Darboux polynomials of the map tries."""
         if self.flow:
             return []
         if self.system is None:
@@ -229,7 +229,7 @@ class Laboratory:
         return [*self.affine_cofactors(), *determinant_factors(self.map)]
 
     def affine_cofactors(self) -> list[Cofactor]:
-        """The cofactors of affine Darboux functions of the system; requires `self.system`."""
+        """Return the cofactors of the affine Darboux functions of the system; requires that `system` is not None."""
         assert self.system is not None
         context, full_ring, n = self.system.rhs[0].context(), ring(self.map.names), self.system.dim
         return [
@@ -237,19 +237,19 @@ class Laboratory:
                 format_polynomial(affine.function), 1, affine.function.compose(*full_ring.gens()[:n], ctx=full_ring)
             )
             for affine in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
-            # l must divide f . grad l for all values of the symbols, not only for those of the file or for the stand-in
+            # the affine function l must divide f . grad l for all values of the symbols, not only those of the search
             if darboux_cofactor(self.system, affine.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 
     def flow_polynomials(self, budget: Budget) -> FlowPolynomials:
-        """Return Darboux polynomials of the flow in (variables, symbols, eps); the first call searches for them."""
+        """Return Darboux polynomials of the flow, in (variables, symbols, eps); the first call searches for them."""
         if self._flow_polynomials is not None:
             return self._flow_polynomials
         assert self.field is not None
         result, context = flow_polynomials(self.field, budget=budget, seed=self.seed), ring(self.map.names)
         gens = context.gens()[:-1]
         functions = [P.compose(*gens, ctx=context) for P in result.functions]
-        # With symbols the search for flow polynomials ends at a low degree, so the affine ones are added here.
+        # With symbols the search for Darboux polynomials ends at a low degree, so the affine ones are added here.
         affine = self.affine_cofactors() if self.symbols and self.system is not None else []
         polynomials = [cofactor.polynomial for cofactor in affine if cofactor.polynomial is not None]
         functions += [P for P in polynomials if P not in functions]
@@ -259,9 +259,9 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Decide whether the map preserves I = `function`, or dx/phi, as `verdict_on` below; for a flow, by expansion.
+        """Decide whether the map or the flow preserves an integral or a density `function`; see `verdict_on` below.
 
-        A function is not expanded if an earlier one with at most as many terms was too long to expand.
+        The identity is not expanded if that of an earlier function with at most as many terms was too long to expand.
         """
         if self.field is not None and self.flow:
             is_preserved = flow_preserves(self.field, function, is_density=is_density, factor=factor)
@@ -297,24 +297,24 @@ class Laboratory:
         variables: Sequence[str] = (),
         eps_enters: str = "",
     ) -> ClosedForms:
-        """Reconstruct the polynomials that span spaces whose reduced echelon bases are known modulo primes.
+        """Reconstruct polynomials that span spaces; the reduced echelon bases of these spaces are known modulo primes.
 
         Args:
-            model: the spaces for the first map.
-            spaces_on: returns the spaces for another map in the same order, or None if that map is special.
+            model: the spaces for the first of the maps.
+            spaces_on: returns the spaces for another map, in the same order; None if this map is special.
             budget: the work limit.
             variables: the variables of the polynomials, by default those of the map.
-            eps_enters: "not" if the spaces are for the given eps, "symbol", or "by weight" if they are for eps = 1 and
-                x becomes eps x in the polynomials, as for homogeneous f; by default `self.eps_enters`.
+            eps_enters: "not" if the spaces are for the given eps; "symbol"; or, for homogeneous f, "by weight": the
+                spaces are for eps = 1, and x is replaced by eps x in the polynomials. By default `self.eps_enters`.
 
         Returns:
-            Primitive polynomials in (variables, symbols, eps): the coefficients are integers, and no integer or
-            polynomial in the symbols is a common factor.
+            Primitive polynomials in (variables, symbols, eps): the coefficients are integers, and the coefficients of
+            monomials in the variables have no common factor.
         """
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
         supports = [set(space.indices) for space in model]
-        # In echelon forms the coefficient of the largest monomial is 1. The unknowns are all other nonzero
+        # In a reduced echelon basis the coefficient of the largest monomial is 1. The unknowns are the other nonzero
         # coefficients.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
         unknowns = [
@@ -358,7 +358,7 @@ class Laboratory:
                 P = primitive_part(P)[1]
                 if root is not None:
                     P = primitive_over(root, P, n)
-                if eps_enters == "by weight":  # P(eps x), divided by a power of eps
+                if eps_enters == "by weight":  # replace P(x) by P(eps x), divided by a power of eps
                     degrees = {monomial: sum(map(int, monomial[:n])) for monomial in P.monoms()}
                     lowest_degree = min(degrees.values())
                     P = context.from_dict({(*m[:-1], degrees[m] - lowest_degree): c for m, c in P.terms()})
@@ -368,15 +368,15 @@ class Laboratory:
 
 
 def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
-    """Call `reconstruct`; if there is a root, the first of the names stands for it.
+    """Reconstruct functions of `names` with `reconstruct`; if `root` is given, the first of the names stands for it.
 
-    The black box is evaluated at all roots modulo primes at which the minimal polynomial of the root splits. The
-    functions are polynomials in the root of lower degree than the field. `options` are passed to `reconstruct`.
+    In this case the black box is evaluated at all roots of the minimal polynomial modulo primes at which it splits. The
+    functions are polynomials in the root, of degree less than that of the field. `options` are passed to `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
     m = root.degree
-    assert m <= MAX_DEGREE  # for larger degrees suitable primes are too rare; Laboratory refuses them
+    assert m <= MAX_DEGREE  # for higher degrees suitable primes are too rare; Laboratory rejects them
 
     def draw_splitting_prime(rng: random.Random) -> int:
         while True:
@@ -407,10 +407,10 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
 
 
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
-    """Divide a nonzero polynomial in n variables, the root and eps by its factors that contain no variable.
+    """Divide a nonzero polynomial in n variables, the root and eps by all factors that do not contain the variables.
 
-    The result has integer coefficients without a common factor. It is the shortest among those multiples of the
-    polynomial that have a rational coefficient.
+    The result has integer coefficients without a common factor. It is determined up to a factor in the number field;
+    the shortest of the multiples with a rational coefficient is returned.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
@@ -424,7 +424,7 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
         row = rows_in_eps.setdefault(tuple(exponents), [])
         row += [K.zero] * (e + 1 - len(row))
         row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
-    # Euclid's algorithm over the field: the content is a polynomial in eps, defined up to a number of the field.
+    # Euclid's algorithm over the number field: the content is a polynomial in eps, up to a factor in the field.
     content: list[EtaleElement] = []
     for row in rows_in_eps.values():
         content, remainder = row, content
@@ -449,9 +449,9 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
 
 
 def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
-    """Return quotient and remainder of polynomials over a field, given by coefficients in ascending order.
+    """Return quotient and remainder of P by Q, polynomials over a field with coefficients in ascending order.
 
-    The last coefficient of each polynomial is not 0.
+    The last coefficients of P and Q are not 0.
     """
     quotient, remainder = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
     while len(remainder) >= len(Q):
@@ -464,7 +464,7 @@ def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[
 
 
 def euler_map(field: PolynomialField) -> ImplicitMap:
-    """Return the map x -> x + eps f(x), which represents the flow of f, with the variables and symbols of f."""
+    """Return the map x -> x + eps f(x), which stands for the flow of f; it has the variables and symbols of f."""
     context = ring((*field.variables, *field.symbols, "eps"))
     *gens, eps = context.gens()
     images = (x + eps * f.compose(*gens, ctx=context) for x, f in zip(gens, field.rhs, strict=False))
@@ -480,7 +480,7 @@ def flow_preserves(
 ) -> bool:
     """Return whether f . grad I = 0, or for a density phi whether f . grad phi = phi div f (dx/phi is invariant).
 
-    With a factor c, a function of the symbols, return whether f . grad I = c I, so that exp(-c t) I is a time-dependent
+    With a `factor` c, a function of the symbols, return whether f . grad I = c I; then exp(-c t) I is a time-dependent
     integral. Exact: the identity is expanded. `function` is I or phi, in (variables, symbols, eps).
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
@@ -512,21 +512,21 @@ def verdict_on(
 ) -> tuple[Certainty, Evidence]:
     """Certify that I(x~) = I(x), or for a density phi that phi(x~) = det dPhi(x) phi(x) (dx/phi is invariant).
 
-    The identity is to hold for every value of the symbols of the map and, if `eps` is None, for every eps.
+    The verdict is about the identity for every value of the symbols of the map and, if `eps` is None, for every eps.
 
     Args:
-        system_like: the map, some of its parameters symbols; a system stands for its Kahan map.
+        system_like: the map, whose parameters may be symbols; a system stands for its Kahan map.
         function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
         eps: half the time step (exact), or None for every eps.
         seed: the random seed.
         is_density: whether the function is a density phi.
-        factor: c, a function of the same names, for I(x~) = c I(x) or phi(x~) = c det dPhi(x) phi(x); None for 1.
+        factor: c, a function of the same names, in I(x~) = c I(x) or phi(x~) = c det dPhi(x) phi(x); None means c = 1.
         expands: whether to try a proof by expansion after random points have supported the identity.
 
     Returns:
-        The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
-            undecided. It is undecided if the two sides are undefined, as for a map that is singular everywhere, and for
-            a density also if the map is not invertible.
+        The pair (verdict, evidence): proved by expansion, supported or refuted at random points modulo primes, or
+        undecided. It is undecided if the two sides are undefined at all points, e.g. for a map that is defined nowhere;
+        for a density also if the map is not invertible.
 
     Source: celledoni-2019.
 
@@ -546,7 +546,7 @@ def verdict_on(
     n, root = map_.dim, map_.root
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times denominator and numerator of det dPhi."""
+        """Return P(x~) Q(x) and P(x) Q(x~) for I = P/Q; for a density, times denominator and numerator of det dPhi."""
         x, symbols = point[:n], point[n:]
         map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)
@@ -581,7 +581,7 @@ def verdict_on(
 
 
 def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
-    """Return the verdict on an identity, by random points and, if `expands`, by expansion."""
+    """Return the pair (verdict, evidence) for an identity, from random points and, if `expands`, from expansion."""
     decision = decide(identity, seed)
     if expands:
         decision = try_expand(identity, decision, seed, _BUDGET)
@@ -590,13 +590,13 @@ def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[C
 
 @dataclass(frozen=True)
 class SeparatedSystem:
-    """A system written in z, where x = T z; Kahan's method is equivariant under linear changes of variables."""
+    """A system in coordinates z with x = T z; Kahan's method is equivariant under linear changes of variables."""
 
     system: QuadraticSystem
     T: fmpq_mat
 
     def function(self, function: RationalFunction) -> RationalFunction:
-        """Write a function of (x, ...) as a function of (z, ...)."""
+        """Return a function of (x, symbols, eps) as a function of (z, symbols, eps)."""
 
         def change_variables(polynomial: fmpq_mpoly) -> fmpq_mpoly:
             context, n = polynomial.context(), self.system.dim
@@ -607,9 +607,9 @@ class SeparatedSystem:
 
 
 def separate_planes(system: QuadraticSystem) -> SeparatedSystem | None:
-    """Write a system in coordinates in which the planes over Q of its normal form separate.
+    """Return a system in coordinates in which the planes over Q of its normal form separate.
 
-    Returns None for a system without such planes, and if the system written so is no shorter.
+    Returns None for a system without such planes, and if the new formulas are not shorter.
 
     >>> from kahanmaps.documents.catalog import load
     >>> system = load("paper_m2").system

@@ -1,4 +1,4 @@
-"""Points, steps and values of monomials modulo a prime, from which integrals and densities are searched."""
+"""Points, steps and values of monomials modulo a prime: the data for searches for integrals and densities."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
-Values = Sequence[Any]  # Python integers, or nmod, whose products take half the time
+Values = Sequence[Any]  # Python integers, or `nmod` (products take half the time)
 Exponent = tuple[int, ...]
-_TRIES = 60  # random points, or orbits
+_TRIES = 60  # maximal number of random points or orbits that are tried
 _UNDEFINED = "the map is not defined at random points modulo a prime"
 
 
 class NoPoint(KahanmapsError):
-    """The map is not defined at any of many random points modulo a prime."""
+    """The map is undefined at too many random points, or on too many orbits, modulo a prime."""
 
 
 class ModularMap:
-    """A map modulo `prime`, at the residues `values` of its symbols and `eps`; a system stands for its Kahan map.
+    """A map modulo `prime`, at residues `eps` and `values` (of its symbols); a system stands for its Kahan map.
 
-    All random choices come from `rng`. Raises BadPrime if the prime divides a denominator, or eps.
+    All random choices use `rng`. Raises BadPrime if the prime divides eps or a denominator in the map.
     """
 
     def __init__(
@@ -63,8 +63,8 @@ class ModularMap:
         return tuple(self.rng.randrange(self.prime) for _ in range(self.dim))
 
     def step(self, x: Point) -> Point | None:
-        """Return the image of a point, None if the map is not defined there."""
-        # The evaluation of polynomials counts its own work.
+        """Return the image of a point; None if the map is not defined there."""
+        # Only the work of other operations is counted here: the evaluation of polynomials counts its own.
         count_work(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
@@ -78,7 +78,7 @@ class ModularMap:
         return int(numerator), int(denominator)
 
     def pairs(self, count: int) -> Iterator[tuple[Point, Point]]:
-        """Yield `count` random points with their images. Raises NoPoint if the map is undefined at too many points."""
+        """Yield `count` random points with their images. Raises NoPoint if the map is undefined at over 60 points."""
         failure_count = 0
         while count > 0:
             x = self.random_point()
@@ -94,7 +94,7 @@ class ModularMap:
     def orbit(self, count: int) -> list[Point]:
         """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
 
-        If an orbit meets an indeterminacy point, another one is tried. Raises NoPoint if all tried orbits meet one.
+        If an orbit contains an indeterminacy point, another random orbit is tried. Raises NoPoint after 60 such orbits.
         """
         max_length = 0
         for _ in range(_TRIES):
@@ -113,9 +113,9 @@ class ModularMap:
     ) -> tuple[Sequence[Values], Point, int | None]:
         """Evaluate all monomials up to a degree along an orbit of `count` points.
 
-        Returns the values (one row for each point), the first point, and the period if it is less than `count`, else
-        None. A polynomial vanishes along the orbit if the rows annihilate its coefficients. A `support` is a list of
-        indices of monomials, closed under divisors; there are then columns for these monomials only. Raises NoPoint.
+        Returns (values, first point, period); the period is None if it is not less than `count`. The matrix of values
+        has a row for each point and a column for each monomial; it annihilates polynomials that vanish along the orbit.
+        A `support` (indices of monomials, closed under divisors) restricts the columns. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
@@ -125,7 +125,7 @@ class ModularMap:
     def monomials_at_both(
         self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
     ) -> tuple[Values, Values]:
-        """Return the values of all monomials up to a degree: at x times factors[0], at the image times factors[1]."""
+        """Return the values of all monomials up to a degree, at x and at the image, times factors[0] and factors[1]."""
         layers, p = _layers(self.dim, degree), self.prime
         return _layered_values(x, layers, p, factors[0]), _layered_values(image, layers, p, factors[1])
 
@@ -133,22 +133,22 @@ class ModularMap:
 class ModularFlow(ModularMap):
     """The flow of a vector field modulo `prime`, at the residues `values` of its symbols; a step is x -> x + f(x).
 
-    It has the interface of a map, so that the same searches find its integrals. A solution x(t) is a power series, and
-    the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough
-    coefficients are 0. The searches for maps use P(x~); for a flow, P(x~) means P + P' with P' = f . grad P. Bilinear
-    expressions such as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
+    It has the interface of a map, so that the searches for maps also apply to flows. A solution x(t) is a power series,
+    and the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough
+    coefficients are 0. Where a search evaluates P(x~), a flow returns P + P' with P' = f . grad P. So the expressions
+    P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
 
-    Raises BadPrime if the prime divides a denominator.
+    Raises BadPrime if the prime divides a denominator in f.
     """
 
     def __init__(self, field: PolynomialField, prime: int, values: Sequence[int] = (), seed: int = 0) -> None:
-        # There is no map, so the constructor of ModularMap is not called.
+        # The constructor of ModularMap is not called, since a flow has no attribute `map`.
         self.prime, self.eps, self.dim, self.values = prime, 1, field.dim, tuple(values)
         self.rng = random.Random(f"flow {seed} {prime} {self.values}")
         self.degree = field.degree
         self._f = [self._terms(f) for f in field.rhs]
         self._divergence = self._terms(field.divergence)
-        # The products from which f is evaluated: each monomial is a variable times an earlier monomial.
+        # The products from which the monomials of f are evaluated: a monomial is a variable times an earlier monomial.
         tables = monomial_tables(self.dim, self.degree)
         indices = {index for terms in self._f for _, index in terms}
         products: dict[int, tuple[int, int]] = {}
@@ -161,7 +161,7 @@ class ModularFlow(ModularMap):
         self._products = sorted(products.items())
 
     def _terms(self, polynomial: fmpq_mpoly) -> list[tuple[int, int]]:
-        """Return pairs (coefficient, index of its monomial), modulo the prime at the values of the symbols."""
+        """Return pairs (residue of a coefficient at the values of the symbols, index of its monomial)."""
         field, n = GF(self.prime), self.dim
         terms = []
         for monomial, coefficient in polynomial.terms():
@@ -178,7 +178,7 @@ class ModularFlow(ModularMap):
         return tuple((a + sum(c * values[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """Return 1 + div f(x) and 1, whose quotient is the ratio of P + P' to P for a density P."""
+        """Return 1 + div f(x) and 1; a density P of the flow satisfies P + f . grad P = (1 + div f) P."""
         values = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * values[k] for c, k in self._divergence), 1
 
@@ -199,14 +199,14 @@ class ModularFlow(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return the Taylor coefficients of monomials along a solution, its initial point, and None (no period)."""
+        """Return the Taylor coefficients of monomials along a solution, its initial point, and None for the period."""
         start = self.random_point()
         return self.series(start, degree, count, support), start, None
 
     def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[Values]:
-        """Return the first `orders` Taylor coefficients of all monomials, or those in `support`, along a solution.
+        """Return the first `orders` Taylor coefficients of all monomials (or those in `support`) along a solution x(t).
 
-        Each row of the result has the coefficients of one order in t.
+        A row of the result has the coefficients of one order in t, a column those of one monomial.
         """
         p, factors = self.prime, monomial_tables(self.dim, degree)
         column_count = len(factors) if support is None else len(support)
@@ -235,26 +235,26 @@ class ModularFlow(ModularMap):
             return monomial_series[index]
 
         expansions = [series_of(index).coeffs() for index in (range(len(factors)) if support is None else support)]
-        # A list of coefficients ends with its last nonzero entry, so every list may be shorter than `orders`.
+        # Lists of coefficients end with a nonzero entry, so that all may be shorter than `orders`: append zeros.
         rows: list[Values] = list(islice(zip_longest(*expansions, fillvalue=nmod(0, p)), orders))
         return rows + [[nmod(0, p)] * column_count] * (orders - len(rows))
 
 
 @cache
 def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
-    """Return the exponents of all monomials of degree at most `degree`, by increasing degree."""
+    """Return the exponents of all monomials in `dim` variables of degree at most `degree`, by increasing degree."""
     return tuple(m for k in range(degree + 1) for m in monomials(dim, k))
 
 
 @cache
 def monomial_index(dim: int, degree: int) -> dict[Exponent, int]:
-    """Return the index of each monomial in `exponents_up_to` this degree."""
+    """Return a dict that maps the exponents of each monomial to its index in `exponents_up_to(dim, degree)`."""
     return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
 
 
 @cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
-    """Return, for each monomial, (variable, exponent, index of monomial/variable) for each of its variables."""
+    """Return for each monomial the triples (variable, exponent, index of monomial/variable) of its variables."""
     indices = monomial_index(dim, degree)
     return [
         [(k, e, indices[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
@@ -263,7 +263,7 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
-    """Return, by degree, for each monomial of the support one of its variables and the index of monomial/variable."""
+    """Return, by degree, a pair (variable, column of monomial/variable) for each monomial of the support except 1."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
     columns = {index: column for column, index in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
@@ -287,7 +287,7 @@ def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
 
 
 def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
-    """Return the values of the monomials in the layers of `_layers_of`, times a factor."""
+    """Return the values of the monomials 1 and those in `layers` (see `_layers_of`), times a factor."""
     x, values = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
         values += [values[quotient_index] * x[variable] for variable, quotient_index in layer]
@@ -296,12 +296,12 @@ def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], p
 
 
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
-    """Return the value and the gradient at a point of the polynomial with these coefficients."""
+    """Return the value and the gradient, at a point, of the polynomial with the coefficients `vector`."""
     value, gradient = 0, [0] * len(point)
     residues = monomial_values(point, degree, prime)
     count_work(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
     for coefficient, factors, residue in zip(vector, monomial_tables(len(point), degree), residues, strict=True):
-        if coefficient:  # most are 0
+        if coefficient:  # most coefficients are 0
             value += coefficient * residue
             for variable, exponent, quotient_index in factors:
                 gradient[variable] = (gradient[variable] + coefficient * exponent * residues[quotient_index]) % prime
@@ -309,7 +309,7 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
 
 
 def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int]]:
-    """Return the partial derivatives of all monomials of degree at most `degree`, a row for each variable."""
+    """Return the partial derivatives at a point of all monomials up to a degree; a row for each variable."""
     residues = monomial_values(point, degree, prime)
     rows = [[0] * len(residues) for _ in point]
     count_work(len(point) * len(residues) / 5)
@@ -320,9 +320,9 @@ def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int
 
 
 def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime: int) -> list[int] | None:
-    """Return the coefficients of the product P Q; None if its degree is higher than `degree`.
+    """Return the coefficients of the product P Q modulo a prime; None if the degree of P Q exceeds `degree`.
 
-    Lists of coefficients may end before the last monomial; missing coefficients are 0.
+    P and Q are lists of coefficients in the order of `exponents_up_to`; missing coefficients at the end are 0.
     """
     exponents, indices = exponents_up_to(dim, degree), monomial_index(dim, degree)
     coefficients = [0] * len(exponents)
@@ -339,7 +339,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 
 
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
-    """Return the polynomial modulo a prime with these values at distinct nodes, of degree less than their number."""
+    """Return the polynomial modulo a prime with given values at n distinct nodes; its degree is less than n."""
     differences = list(values)
     count_work(len(nodes) ** 2 / 2)
     inverse = cache(lambda difference: pow(difference, -1, prime))
@@ -353,16 +353,16 @@ def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmo
 
 
 def scaled_gradient(function: RationalFunction, field: Any, point: Sequence[Any], n: int) -> list[Any]:
-    """Return the gradient of N/D in the first n variables, times D^2."""
+    """Return D^2 times the gradient, in the first n variables, of the function N/D at a point."""
     N, D = (evaluate(polynomial, field, point) for polynomial in (function.numerator, function.denominator))
     dN, dD = (gradient(polynomial)[:n] for polynomial in (function.numerator, function.denominator))
     return [evaluate(a, field, point) * D - evaluate(b, field, point) * N for a, b in zip(dN, dD, strict=True)]
 
 
 class IndependentGradients:
-    """The gradients of independent functions at one random point modulo a prime, for tests of independence.
+    """The gradients of functions at one random point modulo a prime, for tests of functional independence.
 
-    `rows` are multiples of the gradients of the functions added so far.
+    `rows` are multiples of the linearly independent gradients stored so far.
     """
 
     def __init__(self, map_: ModularMap, functions: Sequence[RationalFunction] = ()) -> None:
@@ -370,7 +370,7 @@ class IndependentGradients:
         self.rows = [self.gradient(function) for function in functions]
 
     def gradient(self, function: RationalFunction) -> list[int]:
-        """Return a multiple of the gradient, in the variables, of a function of (variables, symbols, eps)."""
+        """Return a multiple of the gradient, in the variables only, of a function of (variables, symbols, eps)."""
         field = GF(self.map.prime)
         point = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
         return [int(entry) for entry in scaled_gradient(function, field, point, self.map.dim)]

@@ -1,1 +1,1 @@
-"""The analyses of a report, a file each; `table.py` lists them."""
+"""The steps of an analysis (`table.py`) and the statements of its report (`statements.py`)."""

@@ -1,4 +1,4 @@
-"""The statements of the report, which are the lines of its sections, in the order of the report."""
+"""The statements of the report of an analysis: each function yields the lines of one section of the report."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 
 PROVED, MEASURED, UNDECIDED, NOTE = Certainty.PROVED, Certainty.MEASURED, Certainty.UNDECIDED, Certainty.NOTE
 
-MAX_POINTS = 8  # sets of fixed points that are listed; three quadratic equations have up to 8 points
-MAX_NAMES = 6  # names that are listed one by one
-MAX_DEGREES = 12  # degrees of iterates that are printed
-MAX_FIELDS = 6  # vector fields that are listed one by one
-MAX_CHARACTERS = 300  # of a sentence with a formula
+MAX_POINTS = 8  # maximal number of listed sets of fixed points; three quadratic equations have up to 8 solutions
+MAX_NAMES = 6  # maximal number of names that are listed one by one
+MAX_DEGREES = 12  # maximal number of printed degrees of iterates
+MAX_FIELDS = 6  # maximal number of vector fields that are listed one by one
+MAX_CHARACTERS = 300  # maximal length of a sentence with a formula
 
 
 def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield statements on div f and the fixed points or, if there are many, the first fixed points."""
+    """Yield statements on div f, on the fixed points (if many, the first ones) and on an equivalent system."""
     search = result.fixed_points
     if search is None:
         return
@@ -42,7 +42,7 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
     elif not search.found:
         yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
-        # A fixed point of the flow is a fixed point of the map if det(I - eps f'(x)) is not 0 there.
+        # A fixed point x of the flow is a fixed point of the map if det(I - eps f'(x)) is not 0.
         are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
         undefined = [
             points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False
@@ -72,7 +72,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         profile = search.profile
         if search.by_theorems:
             count_text = counted(search.by_theorems, "independent integral")
-            status = MEASURED if search.symbols else PROVED  # symbols have random values here
+            status = MEASURED if search.symbols else PROVED  # the theorems were applied at random values of the symbols
             yield Statement(status, f"{count_text} by theorems: {search.theorems}")
         if not profile.nullities:
             yield Statement(UNDECIDED, f"the number of integrals was not measured: {search.reason}")
@@ -121,12 +121,12 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def _join_names(names: Sequence[str]) -> str:
-    """Return the names or, if there are more than 6, the first and the last one."""
+    """Return the names, separated by commas; of more than 6 names, only the first and the last."""
     return ", ".join(names) if len(names) <= MAX_NAMES else f"{names[0]}, ..., {names[-1]}"
 
 
 def of_densities(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the densities, or the reason why none was found."""
+    """Yield a statement on each density, or the reason why the search found none."""
     search = result.densities
     if search is None:
         return
@@ -150,7 +150,7 @@ def of_flow(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the tensor of a member of the commuting family, and the tensors of the search."""
+    """Yield statements on the Poisson tensor of a member of the commuting family, and on those of the search."""
     search = result.poisson
     if isinstance(result.normal_form, SystemNormalForm) and result.normal_form.form.m > 1:
         text = f"with {result.normal_form.form.m} integrals in involution, as a member of the commuting family"
@@ -162,13 +162,13 @@ def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_growth(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the degrees with their recurrence, then the heights."""
+    """Yield statements on the degrees of the iterates and their recurrence, then on the heights along orbits."""
     degrees, heights = result.degrees, result.heights
     if degrees is not None:
         degrees_text = ", ".join(map(str, degrees.degrees[1 : MAX_DEGREES + 1]))
         ellipsis = ", ..." if len(degrees.degrees) > MAX_DEGREES + 1 else ""
         if degrees_text:
-            status = MEASURED if degrees.primes else PROVED  # without primes: degrees of powers of a matrix
+            status = MEASURED if degrees.primes else PROVED  # without primes, powers of a matrix give the degrees
             yield Statement(status, f"degrees of the iterates: {degrees_text}{ellipsis}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
@@ -185,7 +185,7 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the verdict on the singularities and the longest confined pattern; if verdicts differ, that they do."""
+    """Yield the verdict on the singularities and the longest confined pattern, or that different eps disagree."""
     if not result.singularities:
         return
     verdicts = {run.verdict for run in result.singularities}
@@ -203,7 +203,7 @@ def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield one-parameter groups, and the generators of the finite group."""
+    """Yield statements on the affine symmetries: one-parameter groups, and generators of a finite group."""
     search = result.symmetries
     if search is None:
         return
@@ -227,7 +227,7 @@ def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_structure(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield the Hamiltonian, invariant hyperplanes, the commuting family and the normal form."""
+    """Yield statements on the Hamiltonian, invariant hyperplanes, the commuting family and the normal form."""
     structures = result.hamiltonian
     if structures is not None and structures.hamiltonian is not None:
         H = format_polynomial(structures.hamiltonian.H)
@@ -236,7 +236,7 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
     elif structures is not None and structures.proved:
         yield Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}")
     if result.file.is_quadratic:
-        # The hyperplanes that are invariant under the flow, grouped by the action of the map on them.
+        # Hyperplanes that are invariant under the flow, grouped by what the map does with them.
         system, eps = result.file.system, result.eps
         planes_by_image: dict[str, list[str]] = {}
         for darboux in affine_darboux(system).functions:
@@ -276,7 +276,7 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
-    """Yield statements on the systems g whose Kahan maps commute with that of f, one statement for g and -g."""
+    """Yield statements on the systems g whose Kahan maps commute with that of f; g and -g share a statement."""
     if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
         is_split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
@@ -287,7 +287,7 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     if search.every_g_commutes:
         yield Statement(PROVED, "the map is the identity and commutes with every other")
     listed_fields: list[CommutingField] = []
-    for g in search.nontrivial:  # -g is also a solution, since its map is the inverse
+    for g in search.nontrivial:  # -g commutes as well, since its map is the inverse of that of g
         if not any(g.system == other.system.scaled(-1) for other in listed_fields):
             listed_fields.append(g)
             text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(g.rhs)})"
@@ -295,10 +295,10 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     for k, family in enumerate(search.families):
         opposite = family.base.system.scaled(-1), [g.system for g in family.directions]
         if opposite not in [(other.base.system, [g.system for g in other.directions]) for other in search.families[:k]]:
-            # All fields g of the family, or the number of its parameters if the formula is long.
+            # The formula of all fields g of the family; if it is long, the number of parameters.
             base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
             terms = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
-            fields_text = "g and -g, g" if base else "all g"  # without a base the family contains -g
+            fields_text = "g and -g, g" if base else "all g"  # a linear space of fields contains -g
             parameters = ", ".join(f"t{j}" for j in range(1, len(terms) + 1))
             text = (
                 f"commutes with the Kahan maps of {fields_text} = {' + '.join([*base, *terms])}, for all {parameters}"

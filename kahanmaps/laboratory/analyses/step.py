@@ -1,4 +1,4 @@
-"""A step of an analysis, with its computation and its statements in the report, and the context in which it runs."""
+"""The class of the steps of an analysis (computation and statements in the report), and their shared context."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class MapKinds(Flag):
 
 @dataclass(frozen=True)
 class AnalysisStep:
-    """One analysis, a row of `table.py`.
+    """A step of an analysis, an entry of the table `ANALYSES`.
 
     `run(context, effort=..., progress=...)` returns the result, or None if the step does not apply. The result is
-    stored as `result[key]`. In JSON the key has the value of the `to_json` of the result, unless `json` gives other
-    entries. `statements` yields the lines of the section `title`; this section is complete after the step and the steps
+    stored as `result[key]` of the analysis. In JSON it is `key: result.to_json()`, unless `json` returns other entries.
+    `statements` yields the lines of the section `title` of the report. This section also needs the results of the steps
     in `requires`.
     """
 
@@ -42,12 +42,12 @@ class AnalysisStep:
     title: str = ""
     statements: Callable[[Any], Iterable[Statement]] | None = None
     applies_to: MapKinds = MapKinds.VECTOR_FIELDS
-    weight: float = 0.1  # the share of the step in the budget, relative to the weights of the other steps
-    key: str = ""  # the key of the result; by default the name of the step
+    weight: float = 0.1  # the share of the budget, relative to the weights of other steps
+    key: str = ""  # the key of the result; default: the name of the step
     requires: tuple[str, ...] = ()
-    # Above this dimension the step is slow: it runs last, with a quarter of its weight; no other step uses its result.
+    # Above this dimension the step is slow: it runs last, with a quarter of its weight, so no step may use its result.
     slow_above: float = inf
-    # A second process may run the step: it uses only results of independent steps, and its own result can be pickled.
+    # A second process may run the step: it uses only results of independent steps, and its result can be pickled.
     is_independent: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 
@@ -55,7 +55,7 @@ class AnalysisStep:
         object.__setattr__(self, "key", self.key or self.name)
 
     def to_json(self, result: AnalysisResult) -> dict[str, Any]:
-        """Return the entries of the step in JSON."""
+        """Return the entries of the JSON output that this step contributes."""
         return {self.key: plain(result[self.key])} if self.json is None else self.json(result)
 
 
@@ -69,7 +69,7 @@ class AnalysisContext:
         self.result, self.seed = result, result.seed
         self.map, self.dim, self.root = file.map, file.dim, laboratory.root
         self.system = file.system if file.is_quadratic else None
-        # No step may read the claims of a file about its system. If there are symbols, the file itself is needed.
+        # No step may use the claims of a file about its system, so they are removed; symbols need the file itself.
         self.file_without_claims = (
             file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
         )
@@ -84,20 +84,20 @@ class AnalysisContext:
 
     @property
     def integrals(self) -> tuple[FoundIntegral, ...]:
-        """The integrals with a formula."""
+        """The integrals for which a formula is known."""
         return () if self.result.integrals is None else self.result.integrals.integrals
 
     def applies(self, step: AnalysisStep) -> bool:
-        """Return whether the step applies to this kind of map over this number field."""
+        """Return whether the step applies to the kind of the map and to the field of its coefficients."""
         if self.root is not None:
             return MapKinds.OVER_NUMBER_FIELDS in step.applies_to
         kind = MapKinds.OTHER_MAPS if self.system is None else MapKinds.VECTOR_FIELDS
         return kind in step.applies_to
 
     def weight(self, step: AnalysisStep) -> float:
-        """Return the weight of the step in the dimension of the map."""
+        """Return the weight of the step, which is reduced in dimensions in which the step is slow."""
         return step.weight / 4 if self.dim > step.slow_above else step.weight
 
     def run(self, step: AnalysisStep, budget: Budget) -> Any:
-        """Return the result of the step, within a budget."""
+        """Run the step within a budget of counted work, and return its result."""
         return step.run(self, effort=budget, progress=lambda text: self.progress(f"{step.name}: {text}"))

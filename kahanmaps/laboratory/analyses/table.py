@@ -1,4 +1,4 @@
-"""The steps of an analysis in the order in which they run; a step may use results of earlier ones."""
+"""The steps of an analysis, in the order in which they run; a step may use the results of earlier steps."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
-_POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities; in higher dimensions the search is slow
+_POISSON_DIMENSIONS = (3, 4)  # Poisson tensors in the plane are densities; above dimension 4 the search is slow
 
 
 def _find_normal_form(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form of a member of the commuting family, with the centre of its Hamiltonian as origin."""
+    """Return the normal form of a member of the commuting family, with the centre of its Hamiltonian as the origin."""
     structures = context.result.hamiltonian
     if structures is None or structures.hamiltonian is None:
         return system_normal_form(context.field)
@@ -62,7 +62,7 @@ def _normal_form_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
-    """Return the singularities at the given eps or at two values of eps; [] if formulas would be too large."""
+    """Return the singularities at the given eps, or at two eps; [] if their formulas would be too large."""
     values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
     if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
@@ -74,9 +74,9 @@ def _trace_patterns(context: AnalysisContext, effort: Budget, progress: Callable
 
 
 def _measure_degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
-    """Return the degrees of the iterates, derived from the singularity patterns if these are known."""
+    """Return the degrees of the iterates; they are derived from the singularity patterns if these are known."""
     singularity_runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
-    # Only patterns that are known for all steps are passed on: `degree_growth` would compute the same ones.
+    # Only patterns that are known for all steps are passed on; `degree_growth` traces others again.
     computed_patterns = patterns_of(singularity_runs) if singularity_runs else None
     patterns = None if computed_patterns is None or computed_patterns.running else computed_patterns
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
@@ -91,7 +91,7 @@ def _find_pencil(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil |
 
 
 def _pencil_json(result: AnalysisResult) -> dict[str, Any]:
-    """Return the invariant curves and the action of the map on them; None if the degrees exclude such curves."""
+    """Return the pencil of invariant curves and the motion on them for JSON; None if the degrees exclude a pencil."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     if result.pencil is None or result.pencil.contradiction(growth):
         return {"invariant_curves": None}
@@ -99,7 +99,7 @@ def _pencil_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _find_relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
-    """Return the Hirota-Kimura relations with few terms, in the lowest degrees in which there are any."""
+    """Return the Hirota-Kimura relations with few terms, in the lowest degrees in which relations exist."""
     profile = None if context.result.integrals is None else context.result.integrals.profile
     if profile is None or profile.first_degree is None or profile.period is not None:
         return ()
@@ -113,7 +113,7 @@ def _find_relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation,
 
 
 def _find_poisson_tensors(context: AnalysisContext, effort: Budget, **options: Any) -> PoissonSearch | None:
-    """Return the invariant tensors of low degree, with their Casimirs and the integrals in involution."""
+    """Return the invariant Poisson tensors of low degree, with their Casimirs and the brackets of the integrals."""
     if context.dim not in _POISSON_DIMENSIONS:
         return None
     search = find_poisson(context.file_without_claims, integrals=(), **context.settings, effort=effort, **options)
@@ -121,14 +121,14 @@ def _find_poisson_tensors(context: AnalysisContext, effort: Budget, **options: A
 
 
 def _find_limits(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
-    """Return the limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
+    """Return the limits of the integrals and of a density for eps -> 0, and the integrals and a density of the flow."""
     if context.result.integrals is None:
         return None
     flow = flow_and_map(context.result.integrals, known=context.result.integral_count, **options)
     return None if flow is None else with_limit(flow, context.result.densities)
 
 
-# The titles of sections in the order of the report; any other title comes after these.
+# The titles of the sections, in the order of the report; sections with other titles follow.
 TITLES = (
     *("vector field", "integrals", "measure", "the flow", "Poisson tensors", "growth", "singularities", "symmetry"),
     *("structure", "commuting systems"),
@@ -154,7 +154,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "a larger algebra",
-        # An algebra larger than Q over which f is defined; if f has a normal form, this says more and is enough.
+        # An algebra larger than Q over which f is defined; not searched for if f has a normal form, which implies more.
         lambda context, **_: (
             None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
         ),
@@ -176,7 +176,7 @@ ANALYSES = (
         lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
         key="equivalent",
     ),
-    # The step "degrees" uses the singularities, but not above dimension 4, where these are slow and run last.
+    # The step "degrees" uses the singularities up to dimension 4; above it, "singularities" is slow and runs last.
     AnalysisStep(
         "singularities",
         _trace_patterns,
@@ -256,7 +256,7 @@ ANALYSES = (
     ),
     AnalysisStep(
         "commuting systems",
-        # All g of one shape whose Kahan maps commute with that of f, for every eps.
+        # All g of one ansatz whose Kahan maps commute with that of f for every eps.
         lambda context, **options: (
             find_commuting(context.system or context.map, seed=context.seed, **options)
             if context.result.eps is None

@@ -1,1 +1,1 @@
-"""How the degrees and heights of a map grow."""
+"""The growth of the degrees of iterates, and of heights along orbits."""

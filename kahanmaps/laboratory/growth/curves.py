@@ -1,17 +1,17 @@
 """The images t -> Phi^n(a + b t) of a random line under a birational map over GF(p), exactly.
 
-The curve is stored as n + 1 polynomials without a common factor, n = dim. A map is a composition of one or more
-factors. The equation of a factor (maps/equation.py) is an n x (n + 1) matrix of forms; its kernel, at the polynomials
-of the curve, is the image of the curve. The kernel is computed in one of two ways:
+In dimension n, the curve is stored as n + 1 coprime polynomials in t. A map is a composition of one or more factors.
+The equation of a factor (maps/equation.py) is an n x (n + 1) matrix of forms. Evaluated at the polynomials of a curve,
+the matrix has a kernel of dimension 1, which is the image of the curve. It is computed in one of two ways:
 
     minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
     series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as
-            many terms as the image needs. A random quotient of two affine functions on the image is a power series
-            whose shortest recurrence (massey-1969) gives the common denominator of the coordinates. All further
-            terms of all coordinates must satisfy this recurrence.
+            many terms as determine the image. The quotient of two random affine functions of x~ is a power series; its
+            shortest recurrence (massey-1969) gives the common denominator of the coordinates. All further terms of all
+            coordinates must satisfy this recurrence.
 
 An explicit map is evaluated by its forms, without a kernel, in any dimension. In the plane minors are five to ten times
-as fast as series; in dimension 6 the two ways take the same time.
+as fast as series; in dimension 6 both take the same time.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map, MapFamily
 
 _MAX_MINORS_DIMENSION = 5  # the largest dimension in which minors are used
-_MARGIN = 8  # terms of a series beyond those that determine the curve; a term of a wrong curve agrees once in 2^60
+_MARGIN = 8  # terms of a series beyond those that determine the curve; a wrong curve fits one with probability 2^-60
 
 
 class Ended(StrEnum):
@@ -42,32 +42,32 @@ class Ended(StrEnum):
     DERIVED = "derived"  # the recurrence follows from the singularity patterns, and enough measured terms agree
     PROVED = "proved"  # the map is monomial, and powers of its exponent matrix give the degrees
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, but not all singularity patterns have settled
-    TERMS = "terms"  # the requested number of terms was computed
+    TERMS = "terms"  # as many terms as requested were computed
     BUDGET = "budget"  # the budget was spent
     STOPPED = "stopped"  # a TimeLimit stopped the computation
-    DEGREE = "degree"  # the next degree exceeds the limit
+    DEGREE = "degree"  # the next degree exceeds `max_degree`
     CONSTANT = "constant"  # the iterate is a constant map
     SINGULAR = "singular"  # the next iterate is nowhere defined
     LINES = "lines"  # the degrees along different lines differ
 
 
 class Stopped(Exception):
-    """Raised when no further curve or degree is computed; `ended` is the kind of reason, `message` a sentence."""
+    """Ends the computation of curves and degrees; `ended` is the kind of reason, `message` the reason as a sentence."""
 
     def __init__(self, ended: Ended, message: str) -> None:
         self.ended, self.message = ended, message
 
 
 def reduce_map(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
-    """Return the map modulo a random prime of 61 bits, at a random residue if `eps` is None. Raises BadPrime."""
+    """Return the map modulo a random prime of 61 bits, at eps or (None) a random residue. Raises BadPrime."""
     field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
 
 
 class Line:
-    """The image of a line a + b t under n steps, as coprime polynomials (X : Z) in t over GF(p), Z the denominator.
+    """The image of a line a + b t under `steps` steps of a map over GF(p), as coprime polynomials (X : Z) in t.
 
-    The map is over GF(p); the line is random or given as `start`.
+    X are the numerators of the coordinates and Z is their denominator. The line is random or given as `start`.
     """
 
     def __init__(
@@ -94,9 +94,9 @@ class Line:
         return all(equation.explicit is not None for equation in self._equations)
 
     def step(self, guess: int) -> None:
-        """Replace the curve by its image; `guess` is the expected degree of the image.
+        """Replace the curve by its image under the map; `guess` is the expected degree of the image.
 
-        Raises ZeroDivisionError if the map is undefined on the whole curve, and Stopped at the limit of degree or work.
+        Raises Stopped at a limit, and ZeroDivisionError if the map is undefined on the curve (with series: at t = 0).
         """
         for equation in self._equations:
             degree_error = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
@@ -105,7 +105,7 @@ class Line:
                 curve = self._image_by_minors(equation)
             max_length = 2 * self._max_degree + _MARGIN + 1
             length = min(2 * guess + _MARGIN + 1, max_length)
-            # With a guess that is too small the terms of the margin disagree, and the length is doubled.
+            # If `guess` is too small, the terms of the margin disagree, and twice the length is tried.
             while curve is None:
                 self._require_budget()
                 curve = self._image_by_series(equation, length)
@@ -134,7 +134,7 @@ class Line:
         for entry in (*numerators, denominator):
             count_work(product_units(len(common_factor), len(entry) - len(common_factor) + 1) + len(entry) / 20)
             quotient = entry // common_factor
-            # With probability about 1/p the random combination has a factor that is not common to all numerators.
+            # With probability about 1/p, `common_factor` does not divide all entries; their gcd is then used instead.
             if quotient(t) * common_factor(t) != entry(t):
                 common_factor = reduce(nmod_poly.gcd, numerators, denominator)
                 return [entry // common_factor for entry in (*numerators, denominator)]
@@ -150,7 +150,7 @@ class Line:
             raise Stopped(Ended.BUDGET, f"work limit reached at iterate {self.steps + 1}; raise --effort")
 
     def _image_by_series(self, equation: Equation, length: int) -> list[nmod_poly] | None:
-        """Return the image from power series with `length` terms, or None if these are too few to be certain."""
+        """Return the image from power series with `length` terms; None if more terms are needed to be certain."""
         X = [entry.truncate(length) for entry in self._X]
         monomials = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
         count_work(row_units(equation, length))
@@ -164,7 +164,7 @@ class Line:
         count_work(series_units(length) + len(x) * product_units(length, length))
         reciprocal = denominator.inverse_series_trunc(length)
         x = [entry.mul_low(reciprocal, length) for entry in x]
-        # Find the polynomials (X : Z) whose quotients X/Z have the power series x.
+        # Reconstruct the polynomials (X : Z) whose quotients X/Z have the power series x.
         for _ in range(2):
             numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)
@@ -174,8 +174,8 @@ class Line:
             count_work(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
             inverse = denominator_series.inverse_series_trunc(length)
             values = [int(c) for c in numerator_series.mul_low(inverse, length).coeffs()]
-            # Numerator and denominator may have the same degree; without its first term the series is t times a
-            # proper fraction.
+            # The rational function may have numerator and denominator of equal degree; minus its value at t = 0, it is
+            # t times a proper fraction.
             values = (values + [0] * (length - len(values)))[1:]
             recurrence = self._context.minpoly(values)
             degree = int(recurrence.degree())
@@ -184,7 +184,7 @@ class Line:
             denominator = nmod_poly([int(c) for c in reversed(recurrence.coeffs())], self.prime)
             Z = denominator.mul_low(inverse, length)
             curve = [*(Z.mul_low(entry, length) for entry in x), Z]
-            # Unless the random functions are in special position, this is the denominator of all coordinates.
+            # Except for random functions in special position, `denominator` is the denominator of all coordinates.
             if all(entry.degree() <= degree for entry in curve):
                 return curve
         return None

@@ -1,17 +1,17 @@
-"""Degrees of the iterates of a Kahan map: d_n is the degree of Phi^n as a map of projective space to itself.
+"""Degrees of the iterates of a map Phi: d_n is the degree of Phi^n as a map of projective space to itself.
 
-It is measured as the degree of the rational curve t -> Phi^n(a + b t) for a random line over GF(p) (`curves`), with p
-and (where eps is not given) the residue of eps random. A line in special position, or a bad prime, can only make a
-degree too small. So d_n is the larger one of the degrees along two lines, each with its own prime and eps.
+d_n is measured as the degree of the rational curve t -> Phi^n(a + b t) (module `curves`), for a random line a + b t
+over GF(p), a random prime p and, if eps is not given, a random residue eps. A line in special position, or a bad prime,
+can only make the degree too small. So d_n is the maximum of the degrees for two lines, each with its own prime and eps.
 
 A recurrence that fits the first degrees may fail later: an exceptional hypersurface (contracted by the map) lowers no
-degree before its image lies in the indeterminacy locus, perhaps a hundred steps later. So the singularity patterns of
-these hypersurfaces are computed (`singularities`). If all patterns are known, the degrees of all iterates are derived
-from them (`renewal`), and the measured degrees have to agree. If not, a recurrence of the measured degrees is accepted
-only with enough terms beyond the last step at which a pattern lowers the degree.
+degree before one of its images lies in the indeterminacy locus, perhaps a hundred steps later. So the singularity
+patterns of these hypersurfaces are computed (`singularities`). If all patterns are known, the degrees of all iterates
+are derived from them (`renewal`), and the measured degrees have to agree. Otherwise a recurrence of measured degrees is
+accepted only with enough terms beyond the last step at which a known pattern lowers the degree.
 
-The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for all known integrable maps, and its
-logarithm is the algebraic entropy (bellon-viallet-1999).
+The dynamical degree lim d_n^(1/n) measures complexity; it is 1 for all known integrable maps. The logarithm of the
+dynamical degree is the algebraic entropy (bellon-viallet-1999).
 """
 
 from __future__ import annotations
@@ -54,31 +54,31 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 
-MAX_TERMS = 10_000  # iterates that are measured
-_LINES = 2  # random lines along which each degree is measured
-_DENSE_TERMS, _SEARCH_INTERVAL = 64, 8  # recurrences are searched for after each of the first 64 terms, then every 8
-_MIN_QUOTIENTS = 6  # d_n/d_{n-1}, for the estimate whether the growth is exponential
-_AGREEING_TERMS = 12  # measured terms, beyond twice the longest pattern, that must agree with the derived degrees
-_LARGE_DEGREE = 2000  # from this degree on no further measured terms need to agree
-_MATRIX_TERMS = 60  # of monomial maps
-_MAX_REPLACEMENTS = 6  # of lines in special position; about one line in 2^40 is in such a position
+MAX_TERMS = 10_000  # maximal number of measured iterates
+_LINES = 2  # number of random lines; the degree of an iterate is measured for each
+_DENSE_TERMS, _SEARCH_INTERVAL = 64, 8  # a recurrence is searched for at each of the first 64 terms, then at every 8th
+_MIN_QUOTIENTS = 6  # minimal number of quotients d_n/d_{n-1} to estimate whether the growth is exponential
+_AGREEING_TERMS = 12  # derived degrees must agree with this many measured ones, beyond twice the longest pattern
+_LARGE_DEGREE = 2000  # above this degree, the terms measured so far suffice
+_MATRIX_TERMS = 60  # number of degrees of a monomial map that are computed
+_MAX_REPLACEMENTS = 6  # maximal number of replaced lines; about one line in 2^40 is in special position
 
 
 @dataclass(frozen=True)
 class DegreeGrowth(PrintableResult):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and their growth.
 
-    `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns, None if
-    they were not computed. Degrees and patterns are measured, which is evidence and no proof. `enclosure` has proved
-    bounds of the dynamical degree of a planar map, or is None without a lower bound above 1. `proof` is a proof of the
-    growth, or None. The degrees of monomial maps are exact, and need no primes.
+    `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns; None if
+    they were not computed. Degrees and patterns are measured modulo primes, which is evidence but no proof. `enclosure`
+    has proved bounds of the dynamical degree of a planar map; it is None without a proved lower bound above 1. `proof`
+    is a proof of the growth, or None. The degrees of monomial maps are exact; `primes` is then empty.
     """
 
     _parts = "degrees"
 
     degrees: tuple[int, ...]
     eps: fmpq | None
-    ended: str  # one of `Ended`, or what a record says
+    ended: str  # a member of `Ended`, or the text in a stored record
     message: str
     seed: int
     primes: tuple[int, ...]
@@ -90,19 +90,19 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def fitted(self) -> Recurrence | None:
-        """The shortest recurrence with enough confirming degrees for `find_recurrence`, or None; see `unconfirmed`."""
+        """The shortest recurrence that `find_recurrence` accepts for the degrees, or None. It may be `unconfirmed`."""
         return find_recurrence(self.degrees)
 
     @cached_property
     def derived(self) -> Recurrence | None:
-        """The recurrence derived from the singularity patterns, if these are known and the measured degrees agree."""
+        """The recurrence derived from the singularity patterns; None if these are unknown or contradict a degree."""
         if self.patterns is None or not self.patterns.series or self.disagreement is not None:
             return None
         return recurrence_of(self.patterns.fraction, self.degrees)
 
     @cached_property
     def disagreement(self) -> int | None:
-        """The first n for which the measured d_n contradicts the singularity patterns; None if there is no such n."""
+        """The first n for which the measured d_n differs from that of the singularity patterns; None if all agree."""
         if self.patterns is None or not self.patterns.series:
             return None
         expected = coefficients(self.patterns.fraction, len(self.degrees))
@@ -110,7 +110,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def unconfirmed(self) -> str:
-        """Why the fitted recurrence may fail later; empty if there is no such recurrence, or if it is confirmed."""
+        """The reason why the fitted recurrence may fail later; empty if it is confirmed, or if there is none."""
         if self.disagreement is not None:
             return (
                 f"the measured degree of iterate {self.disagreement} contradicts the singularity patterns; "
@@ -135,7 +135,7 @@ class DegreeGrowth(PrintableResult):
     def recurrence(self) -> Recurrence | None:
         """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed, or None.
 
-        A fitted recurrence is confirmed by terms beyond the last confinement.
+        With a proof of the growth, a fitted recurrence needs no confirmation, but must have the proved growth.
         """
         if self.proof is None or self.derived is not None:
             return self.derived or (None if self.unconfirmed else self.fitted)
@@ -150,7 +150,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth(self) -> Growth:
-        """The kind of growth by a proof, the recurrence, or bounds of the dynamical degree; UNKNOWN without these."""
+        """The kind of growth, from a proof, the recurrence, or bounds of the dynamical degree; or UNKNOWN."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
@@ -161,14 +161,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """The limit of d_n^(1/n) as an algebraic number, from a proof or the recurrence; None without these."""
+        """The limit of d_n^(1/n), an algebraic number, from a proof or the recurrence; None if neither is known."""
         if self.proof is not None:
             return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
 
     @property
     def estimate(self) -> str | None:
-        """A rounded estimate of the dynamical degree: d_n/d_{n-1} if this quotient settles, else d_n^(1/n)."""
+        """A rounded estimate of the dynamical degree: d_n/d_{n-1} if `looks_exponential`, else d_n^(1/n)."""
         if len(self.degrees) < 3 or self.degrees[-1] == 0:
             return None
         n = len(self.degrees) - 1
@@ -178,8 +178,8 @@ class DegreeGrowth(PrintableResult):
     def looks_exponential(self) -> bool:
         """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
 
-        For polynomial growth a quotient 1 + r decreases by about r/n in the next step; the answer is True if the last
-        two decreases are less than r/(4 n). It is an estimate, for sequences too short for a recurrence.
+        For polynomial growth a quotient 1 + r decreases by about r/n in the next step. The answer is True if the last
+        two changes are less than r/(4 n), and r > 0.2. It is an estimate, for sequences too short for a recurrence.
         """
         d = self.degrees
         n = len(d) - 1
@@ -190,7 +190,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def kind_text(self) -> str:
-        """The kind of growth with its power or rate, or an estimate if no recurrence is confirmed, in one phrase."""
+        """The kind of growth, with its power or dynamical degree; an estimate if no recurrence is confirmed."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
         if (source := self.proof or self.recurrence) is not None:
@@ -215,14 +215,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def basis(self) -> str:
-        """The evidence for the growth as a phrase: the proof, or the number of steps searched for confinement."""
+        """The certainty of the growth, with the proof or the number of steps searched for confinement, as a phrase."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
     def known(self) -> Certainty:
-        """The certainty of the growth; the bounds in `enclosure` are proved in any case."""
+        """The certainty of the kind of growth; the bounds in `enclosure` are always proved."""
         if self.proof is not None:
             return Certainty.PROVED
         if self.derived is not None:
@@ -233,17 +233,17 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth_text(self) -> str:
-        """The kind of growth with its power or rate and the number of steps searched for confinement, in one phrase."""
+        """The phrase `kind_text`, with `basis` in parentheses if there is a proof or a limited number of steps."""
         is_limited = self.recurrence is not None and self.patterns is not None and self.patterns.limit
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each iterate, for example for `pandas.DataFrame(growth.rows())`."""
+        """Return a row for each iterate, for example for `pandas.DataFrame(growth.rows())`."""
         return [{"n": n, "degree": degree} for n, degree in enumerate(self.degrees)]
 
     @property
     def text(self) -> str:
-        """The lines of the report, each a label, a tab and its value."""
+        """The lines of the report; each line has a label, a tab and a value."""
         lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
         if self.recurrence is not None:
             lines.append(("recurrence", self.recurrence.text))
@@ -262,7 +262,7 @@ class DegreeGrowth(PrintableResult):
         return "\n".join(f"{label}\t{value}" for label, value in lines)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; primes are text, since many JSON readers do not represent such large integers exactly."""
+        """Return plain data; primes and residues are text: many JSON readers do not read such integers exactly."""
         lines = zip(self.primes, self.residues, strict=True)
         names = ("growth", "growth_text", "basis", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
         return {
@@ -292,25 +292,25 @@ def degree_growth(
 ) -> DegreeGrowth:
     """Measure the degrees of the iterates of a map, for one exact eps or for generic eps.
 
-    The search stops when a recurrence is confirmed, if also the singularity patterns give this recurrence or enough
-    terms lie beyond the last confinement. At least 6 terms, and as many as its order, must confirm a recurrence.
+    The search stops when a recurrence is confirmed: at least 6 further terms, and as many as its order, satisfy it, and
+    the singularity patterns give the same recurrence or enough terms lie beyond the last confinement.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step, an exact number; None for generic eps.
         time_step, h: the time step 2 eps, instead of eps.
-        effort: each increase by 1 doubles the work limit. With a Budget this is a stage of another computation.
-        max_terms: if given, d_1, ..., d_max_terms are measured, even if a recurrence is confirmed earlier.
-        max_degree: the search stops before an iterate of a higher degree.
+        effort: each increase by 1 doubles the work limit; or the Budget of a computation that contains this search.
+        max_terms: if given, all of d_1, ..., d_max_terms are measured, even if a recurrence is confirmed earlier.
+        max_degree: the search stops before the first iterate of higher degree.
         seed: the random seed.
-        steps: the number of steps for which singularities are followed.
-        patterns: the singularity patterns, if known; by default they are computed.
-        enclosed: whether to search, in the plane, for a proof of exponential growth.
+        steps: the number of steps for which the images of exceptional hypersurfaces are computed.
+        patterns: the singularity patterns, if they are known; by default they are computed.
+        enclosed: whether to search for bounds of the dynamical degree if the degrees of a planar map look exponential.
         progress: called with a message at each stage.
 
     Returns:
-        A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
-        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised again.
+        A `DegreeGrowth`. Degrees are measured modulo random primes of 61 bits; only `enclosure` and `proof` are proved.
+        A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised again.
 
     Raises:
         InputError: for eps = 0, and for other values out of range.
@@ -338,7 +338,7 @@ def degree_growth(
     except TimeLimit as stop:
         if isinstance(effort, Budget):
             raise
-        if search.measured is not None:  # only the bounds of the dynamical degree are missing
+        if search.measured is not None:  # the time limit ended the search for bounds
             return replace(search.measured, message=f"{search.measured.message}; {stop}")
         return search.result(Ended.STOPPED, f"{stop} at iterate {len(search.degrees)}")
 
@@ -346,9 +346,9 @@ def degree_growth(
 def dynamical_degree(
     system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None, effort: int = 1, seed: int = 0
 ) -> GrowthRate | DynamicalDegreeBounds | None:
-    """Return the dynamical degree lim d_n^(1/n) of a map, with the arguments of `degree_growth`.
+    """Return the dynamical degree lim d_n^(1/n) of a map; the arguments are those of `degree_growth`.
 
-    Returns an algebraic number, proved bounds, or None if undecided; `degree_growth(system).known` is the certainty.
+    Returns an algebraic number (its certainty is `degree_growth(system).known`), proved bounds, or None if undecided.
 
     >>> dynamical_degree("euler_top")
     <GrowthRate: 1>
@@ -360,7 +360,7 @@ def dynamical_degree(
 def algebraic_entropy(
     system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None, effort: int = 1, seed: int = 0
 ) -> float | None:
-    """Return the logarithm of the dynamical degree of a map, rounded; None if the degree is not known exactly.
+    """Return the logarithm of the dynamical degree of a map, rounded; None if no algebraic number is known for it.
 
     >>> algebraic_entropy("euler_top")
     0.0
@@ -371,7 +371,7 @@ def algebraic_entropy(
 
 @dataclass
 class _Search:
-    """The state of one search: its random lines, and the degrees measured on them so far."""
+    """The state of a search: random lines, and the degrees of their images measured so far."""
 
     map: MapFamily
     eps: fmpq | None
@@ -384,14 +384,14 @@ class _Search:
     notes: list[str] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     replaced: int = 0
-    measured: DegreeGrowth | None = None  # the result without the bounds of the dynamical degree
+    measured: DegreeGrowth | None = None  # the result before the search for bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
-        """Measure the degrees of successive iterates until there is a reason to stop."""
+        """Measure the degrees of successive iterates until a member of `Ended` applies; return the result."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
-            # The degrees of a monomial map are exact: powers of its exponent matrix give them.
+            # The degrees of a monomial map follow exactly from the powers of its exponent matrix.
             power, ending, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
             while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
                 recurrence = find_recurrence(self.degrees) if max_terms is None else None
@@ -431,7 +431,7 @@ class _Search:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as stop:
             ending, message = stop.ended, stop.message
-        if ending is Ended.DEGREE:  # there may be too few degrees for a recurrence
+        if ending is Ended.DEGREE:  # at high degrees, there may be too few terms for a recurrence; patterns may suffice
             self._compute_patterns()
         result = self.result(ending, message)
         patterns = self.patterns
@@ -456,12 +456,12 @@ class _Search:
         return DegreeGrowth(tuple(self.degrees), self.eps, ending, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
-        """Compute the singularity patterns when useful. If `may_stop`, a confirmed recurrence raises Stopped."""
+        """Search for a recurrence; compute patterns when useful. If `may_stop`, raise Stopped if it is confirmed."""
         term_count = len(self.degrees)
         if term_count < 2 or (term_count > _DENSE_TERMS and term_count % _SEARCH_INTERVAL):
             return
         recurrence = find_recurrence(self.degrees)
-        # Above dimension 4 patterns of maps without short forms are slow: wait until the degrees suggest a recurrence.
+        # Above dimension 4, patterns of maps without explicit formulas are slow, and a recurrence is awaited first.
         if self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit:
             self._compute_patterns()
         if not may_stop:
@@ -489,24 +489,24 @@ class _Search:
             )
 
     def _compute_patterns(self) -> None:
-        """Compute the singularity patterns at the first call, unless the map is affine."""
+        """Compute the singularity patterns, if unknown, of a map of degree above 1 with rational coefficients."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             options: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **options)
 
     def _step(self, new_line: Callable[[], Line]) -> None:
-        """Replace all curves by their images, and lines in special position by new lines."""
+        """Append the degree of the next iterate: map all curves; replace lines in special position by new lines."""
         n, degrees = len(self.degrees), self.degrees
 
         def degree_on(curve: Line) -> int:
-            """The degree of iterate n on a line; -1 if this line does not give the degree."""
+            """Return the degree of iterate n on a line; -1 if the line is in special position."""
             try:
                 while curve.steps < n:
                     k = curve.steps + 1
                     guess = degrees[k] if k < n else self.map.dim if k == 1 else degrees[1] * degrees[-1]
                     if k == n > 1 and degrees[-2]:
-                        # Degrees are almost log-concave: the last ratio is nearly a bound of the next one. A guess that
-                        # is too low requires a second attempt.
+                        # Degrees are almost log-concave: the last quotient of degrees is nearly a bound of the next
+                        # one. A guess that is too low only costs a second attempt.
                         guess = min(guess, degrees[-1] * degrees[-1] // degrees[-2] + 4)
                     curve.step(guess)
                     if k < n and curve.degree != degrees[k]:

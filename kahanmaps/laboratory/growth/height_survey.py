@@ -1,8 +1,8 @@
-"""A comparison of the growth of heights along exact orbits, from several initial points and for several eps.
+"""The growth of heights along several exact orbits, which have different initial points and different eps.
 
-A single orbit is weak evidence: it may lie on a special curve, and its eps may be special (for q'' = -w^2 q + Q(q)
-with eps^2 w^2 = 1 the fourth iterate of the Kahan map is the identity). `kahanmaps.invariants.heights` decides the
-kind of growth of one orbit; this module chooses the orbits and compares them.
+A single orbit is weak evidence: it may lie on a special curve, and its eps may be special. For example, the fourth
+iterate of the Kahan map of q'' = -w^2 q + Q(q), Q quadratic, is the identity if eps^2 w^2 = 1. The module
+`kahanmaps.invariants.heights` decides the kind of growth of one orbit; this one compares orbits.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
-_MAX_STARTS = 1000  # initial points for each eps
+_MAX_STARTS = 1000  # maximal number of initial points for each eps
 _GROWTH_TEXTS = {
     Growth.PERIODIC: "points come back",
     Growth.BOUNDED: "bit lengths stay bounded",
@@ -44,7 +44,7 @@ _GROWTH_TEXTS = {
     Growth.QUADRATIC: "bit lengths grow quadratically",
     Growth.EXPONENTIAL: "bit lengths grow exponentially",
 }
-_MAX_ATTEMPTS = 20  # the largest number of random initial points tried for one orbit without a singular point
+_MAX_ATTEMPTS = 20  # random initial points are tried until an orbit has no singular point, but at most so many
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class SurveyedOrbit:
     growth: HeightGrowth
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {**attributes(self, "eps", "start"), **self.growth.to_json()}
 
 
@@ -65,7 +65,7 @@ class HeightSurvey(PrintableResult):
     """The orbits of the survey, in the order of eps and then of initial points.
 
     `is_complete` is False if the budget or a TimeLimit ended the survey. If the map has no eps, the `eps` of the orbits
-    has no meaning. `heights.height` defines heights over number fields.
+    has no meaning. For heights over number fields see `kahanmaps.invariants.heights`.
     """
 
     _parts = "orbits"
@@ -77,13 +77,13 @@ class HeightSurvey(PrintableResult):
 
     @property
     def kinds(self) -> tuple[Growth, ...]:
-        """The different kinds of growth that were decided, in the order of their first orbits."""
+        """The distinct kinds of growth of the decided orbits, in order of first occurrence."""
         kinds = [orbit.growth.kind for orbit in self.orbits]
         return tuple(dict.fromkeys(kind for kind in kinds if kind is not Growth.UNDECIDED))
 
     @property
     def kind(self) -> Growth:
-        """The kind of growth on all decided orbits; UNDECIDED if they differ, or if an eps has no decided orbit."""
+        """The kind of growth of the decided orbits; UNDECIDED if kinds differ, or if an eps has no decided orbit."""
         all_eps = {orbit.eps for orbit in self.orbits}
         decided_eps = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
         return self.kinds[0] if len(self.kinds) == 1 and decided_eps == all_eps else Growth.UNDECIDED
@@ -94,7 +94,7 @@ class HeightSurvey(PrintableResult):
         total, note = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
-            # If the kinds agree for each single eps, they differ only between the eps.
+            # If the kinds agree at each eps, they differ only between different eps.
             decided_kinds = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
             cause_text = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
             return f"heights of exact orbits are undecided: {cause_text} disagree ({', '.join(counts)}){note}"
@@ -116,7 +116,7 @@ class HeightSurvey(PrintableResult):
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return attributes(self, "kind", "kinds", "text", complete="is_complete", orbits="orbits")
 
 
@@ -140,17 +140,17 @@ def height_survey(
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
         time_step, h: the time step 2 eps, instead of eps.
-        starts: the initial points, or the number of random points whose orbits do not meet a singular point.
-        steps: the length of the orbits.
-        max_digits: orbits end at a number with more digits; None for no limit.
-        effort: each increase by 1 doubles the work limit, at which the current orbit ends and no further orbit starts.
+        starts: the initial points, or the number of random points whose orbits contain no singular point.
+        steps: the number of steps of each orbit.
+        max_digits: an orbit ends at a coordinate with more digits; None means no limit.
+        effort: each increase by 1 doubles the work limit; at this limit the survey ends with the current orbit.
         normal_form: the normal form of the system, if it is known.
         seed: the random seed.
         progress: called with a message before each orbit.
 
     Returns:
-        The survey. If a TimeLimit expires, the survey has the orbits that were complete. If `effort` is a Budget, the
-        survey is a stage of another computation, and the TimeLimit is raised.
+        The survey. If a TimeLimit expires, it has the orbits that were complete. If there are none, or if `effort` is a
+        Budget (of a computation of which the survey is a part), the TimeLimit is raised.
 
     Raises:
         InputError: for eps = 0, for no or too many initial points, and for points of a wrong dimension.
@@ -169,7 +169,7 @@ def height_survey(
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field_name = "" if map_.root is None else map_.root.number_field.name
-    eps_values = DEFAULT_EPS if eps is None else (rational(eps),)  # refuses text that is no number, for every map
+    eps_values = DEFAULT_EPS if eps is None else (rational(eps),)  # rejects invalid text for every map
     for value in eps_values if map_.has_eps else (fmpq(1),):
         map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
@@ -184,8 +184,8 @@ def height_survey(
             try:
                 progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(initial_points)}")
                 for _ in range(_MAX_ATTEMPTS if start is None else 1):
-                    # Many maps have invariant curves with short equations, such as eps^2 x^2 = 1. To avoid these,
-                    # numerators are primes: a coordinate is no simple multiple of 1/eps.
+                    # Many maps have invariant curves with short equations, such as eps^2 x^2 = 1. Random points avoid
+                    # these curves: their numerators are primes, so that no coordinate is a simple multiple of 1/eps.
                     candidate = start or tuple(
                         fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
                         for _ in range(map_.dim)

@@ -1,8 +1,8 @@
 """Proofs of the growth of degrees, for monomial maps and for maps with a linear iterate.
 
-A monomial map x~_i = c_i x^(a_i) has the exponent matrix A with the rows a_i, and its n-th iterate has the exponent
-matrix A^n. The dynamical degree is the spectral radius of A (hasselblatt-propp-2007). If the N-th iterate has degree 1
-on projective space, then d_(n + N) = d_n for all n; the iterates are computed by composing formulas.
+A monomial map x~_i = c_i x^(a_i) has the exponent matrix A with rows a_i, and its n-th iterate has the exponent matrix
+A^n. The dynamical degree is the spectral radius of A (hasselblatt-propp-2007). If the N-th iterate of a map has degree
+1 on projective space, the degrees d_n of the iterates satisfy d_(n + N) = d_n; this is proved by composing formulas.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, growth_rate, polynomial_growth
 from kahanmaps.maps.implicit import MapFamily
 
-_BUDGET = 1_000_000  # products of terms, to compose formulas
-_MAX_FACTORS = 24  # of a composition
-_MAX_ORDER = 12  # of a linear iterate
-_MAX_DIMENSION = 8  # for the spectral radius, which needs factors of polynomials of degree up to 2 dim^2
-_BITS = 256  # working precision of the roots
-_LARGEST_ORDER = 60  # of an integer matrix of finite order with at most _MAX_DIMENSION rows
+_BUDGET = 1_000_000  # maximal number of products of terms, to compose formulas
+_MAX_FACTORS = 24  # maximal number of factors of a composition
+_MAX_ORDER = 12  # maximal order of a linear iterate that is tested
+_MAX_DIMENSION = 8  # for the spectral radius, which needs factors of polynomials of degree 2 dim^2
+_BITS = 256  # initial precision of the roots
+_LARGEST_ORDER = 60  # maximal finite order of an integer matrix with at most 8 rows
 
 
 @dataclass(frozen=True)
 class GrowthProof:
     """A proved statement about the degrees of all iterates.
 
-    The degrees grow as n^power rate^n, where the `rate` is the dynamical degree; `reason` is the proof as a phrase. If
-    there is a `period` N, the N-th iterate is linear; `is_identity` says whether this iterate is the identity.
+    The degrees grow as n^power rate^n, where `rate` is the dynamical degree; `reason` is the proof as a phrase. If
+    `period` is a number N, the N-th iterate is linear; `is_identity` says whether it is the identity.
     """
 
     growth: Growth
@@ -48,14 +48,14 @@ class GrowthProof:
     is_identity: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return attributes(self, "reason", "period", "is_identity")
 
 
 def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
-    """Return the matrix with the rows a_i of a monomial map x~_i = c_i x^(a_i), at eps or (None) over Q(eps), or None.
+    """Return the exponent matrix of a map, at eps or (None) over Q(eps); None if the map is not monomial.
 
-    A composition of monomial maps is monomial, and its matrix is the product of their matrices.
+    Row i has the exponents a_i of x~_i = c_i x^(a_i). The matrix of a composition is the product of the matrices.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.maps.explicit import explicit_map
@@ -69,7 +69,7 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
     value = field.variables[0] if isinstance(field, FunctionField) else fmpq(1) if eps is None else eps
     try:
         equations = map_.at(value, field).equations
-    except (BudgetExceeded, InputError):  # InputError: an inverse is not known
+    except (BudgetExceeded, InputError):  # InputError: the inverse of a factor is not known
         return None
     if len(equations) > _MAX_FACTORS:
         return None
@@ -87,17 +87,17 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
         if len(rows_by_variable) < n:
             return None
         product = fmpz_mat([rows_by_variable[j] for j in range(n)]) * product
-    return None if product.det() == 0 else product  # the matrix is singular only at special eps
+    return None if product.det() == 0 else product  # a singular matrix means a map that is not dominant
 
 
 def monomial_degree(matrix: fmpz_mat) -> int:
-    """Return the degree on projective space of the monomial map with this exponent matrix.
+    """Return the degree, on projective space, of a monomial map with the exponent matrix `matrix`.
 
     >>> monomial_degree(fmpz_mat([[0, 1], [-1, 0]])), monomial_degree(fmpz_mat([[2, 1], [1, 1]]))
     (2, 3)
     """
     rows: list[list[int]] = [[int(entry) for entry in row] for row in matrix.tolist()]
-    # The powers of X_j and Z that clear the denominators of all coordinates. Their product is the last coordinate.
+    # `powers`: the exponents of the X_j in the least common denominator, the last homogeneous coordinate.
     powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
     degree: int = sum(powers) + max(0, *(sum(row) for row in rows))
     return degree
@@ -106,7 +106,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     """Return how the degrees of a monomial map Phi with exponent matrix A grow; None in dimensions above 8.
 
-    The reason: deg(Phi^n) divided by the largest modulus of the entries of A^n lies between two positive constants.
+    Reason: deg(Phi^n), divided by the largest modulus of an entry of A^n, lies between two positive constants.
     """
     if matrix.nrows() > _MAX_DIMENSION:
         return None
@@ -120,10 +120,10 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
 
 
 def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
-    """Prove that a monomial map with exponent matrix A is periodic; return None if it is not, or is the identity.
+    """Prove that a monomial map with exponent matrix A is periodic; return None without a proof, or for the identity.
 
-    If A^n = 1, the n-th iterate multiplies each variable by a number or a function of eps. The map is then periodic
-    only if this iterate has order 1 or 2.
+    If A^n = I, the n-th iterate multiplies each variable by a rational number or function of eps. So the map is
+    periodic only if this iterate has order 1 or 2.
     """
     identity = matrix**0
     order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == identity), None)
@@ -134,9 +134,9 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
-    """Return the largest modulus of an eigenvalue, exactly, with the size of the largest Jordan block as multiplicity.
+    """Return the largest modulus of an eigenvalue (exact); its `multiplicity` is the size of the largest Jordan block.
 
-    The matrix must be invertible; only Jordan blocks of eigenvalues with this modulus count.
+    The matrix must be invertible. Only Jordan blocks of eigenvalues with the largest modulus count.
 
     >>> spectral_radius(fmpz_mat([[2, 1], [1, 1]])).text
     '2.61803398874989484820, root of t^2 - 3*t + 1'
@@ -144,8 +144,8 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     '1.21060779440608593277, root of t^6 - t^4 - 1'
     """
     minimal_factors = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
-    # The polynomial with all products of two eigenvalues as roots has |e|^2 = e conj(e) as a root for every eigenvalue
-    # e. Its largest real root is the radius squared.
+    # The roots of the characteristic polynomial of the Kronecker square are all products of two eigenvalues. For an
+    # eigenvalue e, |e|^2 = e conj(e) is such a product; the largest real root is the squared spectral radius.
     rows = matrix.tolist()
     kronecker_square = fmpz_mat([[a * b for a in row for b in other_row] for row in rows for other_row in rows])
     product_factors = [factor for factor, _ in kronecker_square.charpoly().factor()[1]]
@@ -159,7 +159,7 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal_factors]
             moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
             largest_moduli = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
-            # Moduli are among the real roots. So a modulus whose ball meets the ball of only one root is that root.
+            # Each modulus equals a real root. So if its ball meets the ball of only one root, it equals this root.
             if all(radius > other for other, _ in other_roots) and not any(
                 modulus.overlaps(other) for modulus, _ in largest_moduli for other, _ in other_roots
             ):
@@ -168,10 +168,10 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
 
 
 def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProof | None:
-    """Prove that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
+    """Prove that the iterate Phi^period is linear on projective space, or the identity, at one eps or over Q(eps).
 
-    Exact, by composing formulas. Returns None if the iterate is not linear or the formulas have too many terms. If it
-    is linear, its powers up to the 12th are computed, and the proof names the first power that is the identity.
+    Exact, by composing formulas. Returns None if the iterate is not linear, or if the formulas have too many terms. If
+    it is linear, its powers up to the 12th are computed; if one of them is the identity, the proof states this.
     """
     if map_.symbols or map_.root is not None:
         return None
@@ -189,7 +189,7 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
         return None
     denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.denominator for entry in point))
     forms = [entry.numerator * (denominator / entry.denominator) for entry in point] + [denominator]
-    # The forms have no common factor, so that their degree is the degree on projective space.
+    # The forms have no common factor, so that their degree is the degree of the iterate on projective space.
     if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None
     linear_period = period

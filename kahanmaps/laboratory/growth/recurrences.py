@@ -1,9 +1,9 @@
-"""Shortest linear recurrences of integer sequences, their kind of growth, and the exact growth rate.
+"""Shortest linear recurrences of integer sequences, their kinds of growth, and their exact growth rates.
 
 The shortest linear recurrence over Q of a sequence of integers has integer coefficients and leading coefficient 1
-(fatou-1906). So it is computed modulo one large prime (massey-1969), lifted to integers, and then checked exactly on
-every term. Terms that were not needed to determine the recurrence are evidence for it; they do not prove that it holds
-for all further terms.
+(fatou-1906). So the recurrence is computed modulo one large prime (massey-1969), its coefficients are lifted to
+integers, and it is checked exactly on every term. Terms that were not needed to determine the recurrence are evidence
+for it, but no proof that it holds for all terms.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from kahanmaps.algebra.printing import attributes, format_univariate, plain
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.invariants.growth import Growth
 
-_PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
+_PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits can be lifted
 _MODULAR_CONTEXT = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
 _BITS = 256  # working precision of the roots
-_MAX_CLASSES = 12  # residue classes of n with a polynomial each
+_MAX_CLASSES = 12  # maximal number of residue classes of n, each with its own polynomial
 
 
 @dataclass(frozen=True)
 class GrowthRate(ResultPart):
-    """The largest modulus of the characteristic roots, if it is itself a root: lim a_n^(1/n) for positive sequences.
+    """The largest modulus of characteristic roots, if it is itself a root; for positive a_n it is lim a_n^(1/n).
 
     `minimal_polynomial` is irreducible over Q, `enclosure` is the text of a ball that provably contains the number, and
-    `multiplicity` is the multiplicity of the root; above 1 the growth has a polynomial factor.
+    `digits` is the rounded number. `multiplicity` is that of the root; above 1 the growth has a polynomial factor.
     """
 
     minimal_polynomial: fmpz_poly
@@ -44,7 +44,7 @@ class GrowthRate(ResultPart):
 
     @property
     def text(self) -> str:
-        """The number: exact if it is an integer, else rounded and with its minimal polynomial."""
+        """The number as text: exact if it is an integer, otherwise rounded and with its minimal polynomial."""
         if self.minimal_polynomial.degree() == 1:
             return str(-self.minimal_polynomial[0])
         return f"{self.digits}, root of {format_univariate(fmpq_poly(self.minimal_polynomial))}"
@@ -53,14 +53,14 @@ class GrowthRate(ResultPart):
         return float(self.digits)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; coefficients are text, from x^0 up."""
+        """Return plain data; coefficients are text, in ascending order."""
         coefficients = plain(self.minimal_polynomial.coeffs())
         size = attributes(self, value="digits", enclosure="enclosure")
         return {**size, "minimal_polynomial": coefficients, "multiplicity": self.multiplicity}
 
 
 def growth_rate(minimal_polynomial: fmpz_poly, ball: arb, multiplicity: int) -> GrowthRate:
-    """Return the root of an irreducible polynomial that lies in the ball."""
+    """Return, as a GrowthRate, the root of an irreducible polynomial that lies in the ball."""
     if minimal_polynomial.degree() == 1:
         integer_text = str(-minimal_polynomial[0])
         return GrowthRate(minimal_polynomial, integer_text, integer_text, multiplicity)
@@ -77,10 +77,10 @@ def polynomial_growth(power: int) -> Growth:
 class Recurrence(ResultPart):
     """The shortest linear recurrence of a_0, a_1, ..., which holds for all `terms` given terms.
 
-    `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] stands for
-    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the recurrence without this factor holds from
-    the term k (`preperiod`) on. `checked` terms were not needed to determine the recurrence. If it was derived from
-    other results, only the first `measured` values were measured, and the recurrence gives the others.
+    `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] in ascending order stand for
+    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. If x^k divides it, the recurrence without this factor holds from the
+    term k (`preperiod`) on. `checked` terms were not needed to determine the recurrence. If it was derived from other
+    results, the first `measured` values were measured, and the recurrence gives the others.
 
     >>> recurrence = find_recurrence([2 * n * n + 1 for n in range(12)])
     >>> recurrence.characteristic, recurrence.order, recurrence.checked, str(recurrence.growth)
@@ -95,38 +95,38 @@ class Recurrence(ResultPart):
 
     @property
     def terms(self) -> int:
-        """The number of terms from which the recurrence was computed or on which it was checked."""
+        """The number of given terms: the recurrence was computed from some of them and checked on the others."""
         return len(self.values) if self.measured is None else self.measured
 
     @property
     def order(self) -> int:
-        """The length of the recurrence, including the preperiod."""
+        """The order of the recurrence, which includes the length of the preperiod."""
         return int(self.characteristic.degree())
 
     @property
     def checked(self) -> int:
-        """The number of terms that satisfy the recurrence and were not needed to find it."""
+        """The number of terms that satisfy the recurrence and were not needed to determine it."""
         return self.terms - 2 * self.order if self.measured is None else self.terms
 
     @cached_property
     def factors(self) -> tuple[tuple[fmpz_poly, int], ...]:
-        """The irreducible factors over Q, other than x, of the characteristic polynomial, with their multiplicities."""
+        """The irreducible factors over Q of the characteristic polynomial, except x, with their multiplicities."""
         factors = self.characteristic.factor()[1]
         return tuple((factor, int(k)) for factor, k in factors if factor[0] != 0)
 
     @cached_property
     def preperiod(self) -> int:
-        """The number k of initial terms for which the recurrence does not hold; x^k divides `characteristic`."""
+        """The largest k for which x^k divides `characteristic`; the first k terms are the preperiod."""
         return next(k for k in count() if self.characteristic[k] != 0)
 
     @cached_property
     def is_polynomial(self) -> bool:
-        """Whether all roots other than 0 are roots of unity (decided exactly)."""
+        """Whether all nonzero roots of `characteristic` are roots of unity (decided exactly)."""
         return all(int(factor.is_cyclotomic()) for factor, _ in self.factors)
 
     @property
     def power(self) -> int:
-        """The k in growth as n^k, or as n^k r^n if the growth is exponential; 0 for the zero sequence."""
+        """The exponent k if the terms grow as n^k, or as n^k r^n with r > 1; 0 for a sequence that ends in zeros."""
         if not self.factors:
             return 0
         if self.is_polynomial or self.rate is None:
@@ -135,19 +135,19 @@ class Recurrence(ResultPart):
 
     @property
     def growth(self) -> Growth:
-        """The kind of growth."""
+        """The kind of growth of the terms."""
         if not self.factors:
             return Growth.ZERO
         return polynomial_growth(self.power) if self.is_polynomial else Growth.EXPONENTIAL
 
     @cached_property
     def rate(self) -> GrowthRate | None:
-        """The growth rate; None for the zero sequence, and if no positive root has the largest modulus."""
+        """The growth rate; None for a sequence that ends in zeros, and if no positive root has the largest modulus."""
         if not self.factors:
             return None
         if self.is_polynomial:
             return GrowthRate(fmpz_poly([-1, 1]), "1", "1", max(k for _, k in self.factors))
-        # The largest positive root; balls certify that no other root has a larger modulus.
+        # The largest positive root is searched for; balls show whether another root has a larger modulus.
         largest_root: tuple[arb, fmpz_poly, int] | None = None
         with flint.ctx.workprec(_BITS):
             moduli = []
@@ -155,7 +155,7 @@ class Recurrence(ResultPart):
                 roots: Any = factor.complex_roots()  # pairs (root, multiplicity); the stubs of python-flint are wrong
                 for root, _ in roots:
                     moduli.append(abs(root))
-                    # FLINT recognizes real roots: their imaginary part is exactly 0.
+                    # FLINT detects real roots: the imaginary part of their ball is exactly 0.
                     if root.imag == 0 and root.real > 0 and (largest_root is None or root.real > largest_root[0]):
                         largest_root = (root.real, factor, multiplicity)
             if largest_root is None or any(modulus > largest_root[0] for modulus in moduli):
@@ -165,9 +165,9 @@ class Recurrence(ResultPart):
 
     @cached_property
     def closed_form(self) -> str | None:
-        """The polynomials in n that give a_n, one for each class of n modulo the period; None for exponential growth.
+        """The polynomials in n that give a_n, one for each residue class of n; None if the growth is exponential.
 
-        They hold from n = `preperiod` on. None also if the period is more than 12.
+        The polynomials hold from n = `preperiod` on. The value is None also if there are more than 12 residue classes.
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None
@@ -178,7 +178,7 @@ class Recurrence(ResultPart):
         polynomials = []
         for residue in range(period):
             n0 = next(n for n in count(self.preperiod) if n % period == residue)
-            nodes = [n0 + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
+            nodes = [n0 + period * k for k in range(size)]  # nodes of a polynomial of degree below `size`
             powers = fmpq_mat(size, size, [fmpq(n) ** k for n in nodes for k in range(size)])
             column = fmpq_mat(size, 1, [fmpq(self.predict(n)) for n in nodes])
             polynomials.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
@@ -190,7 +190,7 @@ class Recurrence(ResultPart):
 
     @property
     def closed_form_text(self) -> str | None:
-        """The closed form; if it does not hold from n = 0 on, with the first n for which it holds."""
+        """The closed form, with the first n for which it holds, unless this is 0."""
         condition = f" for n >= {self.preperiod}"
         if not self.closed_form or not self.preperiod:
             return self.closed_form
@@ -212,7 +212,7 @@ class Recurrence(ResultPart):
 
     @property
     def text(self) -> str:
-        """The recurrence as an equation, with the evidence for it."""
+        """The recurrence as an equation, with the number of terms that confirm it."""
         if self.measured is not None:
             return f"{self.equation}, derived from the singularity patterns; {self.terms} measured terms agree"
         return f"{self.equation}, found from {self.terms - self.checked} terms, confirmed by {self.checked} more"
@@ -228,7 +228,7 @@ class Recurrence(ResultPart):
         return f"a(n) = {right_side}{condition_text}"
 
     def predict(self, n: int) -> int:
-        """Return a_n; beyond the given terms the recurrence continues the sequence.
+        """Return a_n; the recurrence extends the sequence beyond the given terms.
 
         >>> find_recurrence([1, 2, 4, 8, 16]).predict(10)
         1024
@@ -240,7 +240,7 @@ class Recurrence(ResultPart):
         return values[n]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; coefficients are text, from x^0 up."""
+        """Return plain data; coefficients are text, in ascending order."""
         return {
             **attributes(self, "order", "preperiod", "terms", "checked"),
             "characteristic": plain(self.characteristic.coeffs()),
@@ -250,10 +250,10 @@ class Recurrence(ResultPart):
 
 
 def find_recurrence(values: Sequence[int]) -> Recurrence | None:
-    """Return the shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
+    """Return the shortest linear recurrence over Q of an integer sequence a_0, a_1, ...; None if it is not accepted.
 
-    The first 2k terms determine a recurrence of order k. It is accepted if it holds for all terms, and if there are at
-    least 2 and at least k/3 further terms. It may begin after a preperiod, whose length is part of the order. Raises
+    A recurrence of order k is determined by the first 2k terms. It is accepted if it holds for all terms, and if there
+    are at least max(2, k/3) further terms. It may hold only after a preperiod, whose length is counted in k. Raises
     InputError if a value is not an integer.
 
     >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
@@ -270,8 +270,8 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     order = int(polynomial.degree())
     if len(values) < 2 * order + needed_checks(order):
         return None
-    # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
-    # to 0 are candidates for the coefficients. The test that follows is exact, and rejects wrong candidates.
+    # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues of
+    # least absolute value are candidates for them. The following test is exact, and rejects wrong candidates.
     integer_coefficients = [int(c) for c in polynomial.coeffs()]
     integer_coefficients = [c - _PRIME if 2 * c > _PRIME else c for c in integer_coefficients]
     for n in range(len(values) - order):
@@ -281,5 +281,5 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
 
 
 def needed_checks(order: int) -> int:
-    """Return how many terms must confirm a recurrence of this order, beyond those that determine it."""
+    """Return the number of terms, beyond those that determine a recurrence of this order, that must confirm it."""
     return max(2, -(-order // 3))

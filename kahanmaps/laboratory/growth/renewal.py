@@ -1,15 +1,15 @@
 """The degrees of all iterates from the singularity patterns: the renewal equation.
 
-Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract. At the t-th
-step along a generic curve through C_i let mu_i(t) be the power of the curve parameter that is divided out, and nu_ij(t)
-the order of the form of C_j. If a generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points,
+Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract. In step t
+along a generic curve through C_i, let mu_i(t) be the power of the curve parameter that is divided out, and nu_ij(t) the
+order of the form of C_j. If a generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points,
 
     d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
     s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
 
 for the degrees d_k of the iterates, d_0 = 1: the factors that are divided out are powers of the forms of these
-preimages, and the zeros of C_i along the image of the line lie in such preimages, too. For the generating functions in
-z this is a linear system over Q(z), proved in docs/mathematics.md. Only the multiplicities mu and nu are measured.
+preimages, and the zeros of the form of C_i along the image of the line lie in such preimages, too. For the generating
+functions in z, this is a linear system over Q(z). docs/mathematics.md has the proof. Only mu and nu are measured.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def degree_series(
     """Return the generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms; exact.
 
     Args:
-        degrees: the degree d_1 of the map; for a composition, whose maps are applied periodically, the degree of each
-            of its maps.
-        hypersurfaces: for each exceptional hypersurface its degree and its settled orbit data, with a column for each
-            hypersurface in this order. Multiplicities that are not known must not belong to needed hypersurfaces.
-        stages: for a composition, the index (from 0) of the map that contracts each hypersurface. The series then has
-            the degrees of the iterates of the whole composition only, while the exponent of z counts single maps.
+        degrees: a list with the degree d_1 of the map; for a composition, the degrees of its factors, which are applied
+            periodically.
+        hypersurfaces: pairs (degree, settled orbit data) of the exceptional hypersurfaces. The rows of the data have
+            columns for the hypersurfaces, in this order. All multiplicities of needed hypersurfaces must be known.
+        stages: for a composition, the index (from 0) of the factor that contracts each hypersurface. The series then
+            has the degrees of the iterates of the composition only, while the exponent of z counts factors.
 
     Source: docs/mathematics.md.
 
@@ -51,7 +51,7 @@ def degree_series(
     indices = needed_hypersurfaces(patterns)
     if indices is None:
         raise ValueError("expected known multiplicities of all hypersurfaces that are needed")
-    # Unknowns: series S_i of the needed hypersurfaces, then series D of the stages 1, 2, ..., 0. Constants come last.
+    # Unknowns: series S_i of needed hypersurfaces, then degree series D of stages 1, 2, ..., 0. Constants come last.
     period, rows = len(degrees), []
     stages = stages or [0] * len(patterns)
 
@@ -68,7 +68,7 @@ def degree_series(
         mu = []
         for j in indices:
             series, first_exponent = _continued_series(patterns, j, 0), (stage - stages[j]) % period
-            if period > 1:  # keep the terms with the exponents first_exponent + k period
+            if period > 1:  # keep the terms with exponents first_exponent + k period
                 numerator, denominator = (f(z**period) for f in every_nth(series, period, first_exponent))
                 series = numerator * z**first_exponent, denominator
             mu.append(series)
@@ -97,10 +97,10 @@ def degree_series(
 
 
 def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
-    """Return the hypersurfaces on which the degrees depend; None if one of their multiplicities is unknown.
+    """Return the indices of the hypersurfaces on which the degrees depend; None if a multiplicity of these is unknown.
 
-    These are the hypersurfaces that lower the degree, the hypersurfaces with images in one of these, and so on. An
-    unknown multiplicity, in a hypersurface of `eventually_in`, matters only if that hypersurface is needed.
+    These are the hypersurfaces that lower the degree, those with images in one of them, and so on. Multiplicities in
+    the hypersurfaces `eventually_in` are unknown; this matters only if such a hypersurface is among the results.
 
     >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
     >>> lowering = OrbitData(((1, 0),), (), 9, True)
@@ -109,7 +109,7 @@ def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
     >>> needed_hypersurfaces([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))]) is None
     True
     """
-    # Each hypersurface, followed by those onto which later iterates map it, in this order.
+    # For each hypersurface, the indices of it and of those that continue its pattern, in this order.
     chains = [[k] for k in range(len(patterns))]
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
@@ -124,10 +124,10 @@ def needed_hypersurfaces(patterns: Sequence[OrbitData]) -> list[int] | None:
 
 
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
-    """Return the generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
+    """Return the generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of `series`.
 
-    Exact. The roots of the new denominator are the n-th powers of the roots of the given one, so that the degree of the
-    denominator does not grow. Raises ArithmeticError if the new coefficients have more than 520 bits.
+    Exact. The roots of the new denominator are n-th powers of the roots of the given denominator, so that the degree
+    does not grow. Raises ArithmeticError if coefficients of the new denominator have more than 520 bits.
 
     >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
     ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)
@@ -144,7 +144,7 @@ def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
 
 
 def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
-    """Return the recurrence of the power series coefficients of a fraction; `measured` are the measured terms.
+    """Return the recurrence of the power series coefficients of a fraction; `measured` are those that were measured.
 
     >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
     'a(n) = 2*a(n-1) for n >= 1, derived from the singularity patterns; 3 measured terms agree'
@@ -169,7 +169,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
 
 
 def _continued_series(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
-    """Return the generating function of a column of the pattern with index `start` and of those that continue it."""
+    """Return the generating function of a column of the pattern with index `start`, continued by other patterns."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}

@@ -1,4 +1,4 @@
-"""Conditions over Q on parameters, lifted from components of the set of special members modulo primes."""
+"""Conditions over Q on the parameters of a family, lifted from components of its special members modulo primes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from kahanmaps.laboratory.scan.modular_components import ModularComponents, find
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
-_SHARE = 0.5  # a curve over GF(p) has at least _SHARE * p points
+_SHARE = 0.5  # a curve over GF(p) is assumed to have at least _SHARE * p points
 
 
 def conditions(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """Find the components over Q of the special members with these degrees.
+    """Return the components over Q of the special members whose iterates have these degrees.
 
-    Hypersurfaces come first, from random lines, which rarely meet components of lower dimension; then components of
-    lower dimension, from the points outside these hypersurfaces. `check` is called repeatedly, and may raise.
+    Hypersurfaces are lifted first, from members on random lines, which rarely meet components of lower dimension. The
+    latter are lifted from points outside these hypersurfaces. `check` is called repeatedly, and may raise.
     """
     components: list[Component] = []
     parameter_count = len(names)
@@ -43,7 +43,7 @@ def conditions(
                     reductions.append(
                         find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check)
                     )
-        if parameter_count > 1:  # the constant is last in rows of hyperplanes, but first in other forms
+        if parameter_count > 1:  # the constant is the last entry of a hyperplane, but the first of other forms
             hypersurfaces = {
                 reduction.prime: [
                     *((row[-1], *row[:-1]) for (row,) in reduction.linear.get(parameter_count - 1, [])),
@@ -66,7 +66,7 @@ def conditions(
         if dimension == 0 and len(subspaces) > 1:
             low_prime, high_prime = min(subspaces), max(subspaces)
             low_count, high_count = len(subspaces[low_prime]), len(subspaces[high_prime])
-            # The number of points grows like the prime: they lie on a curve that was not found, and are not isolated.
+            # The number of points grows like the prime: so they lie on an undetected curve, and are not isolated.
             if low_count >= _SHARE * low_prime and high_count - low_count >= _SHARE * (high_prime - low_prime):
                 continue
         lifts = lift_linear(subspaces)
@@ -97,7 +97,7 @@ def conditions(
 
 
 def points_outside(points: Sequence[Point], components: Iterable[Component], prime: int) -> list[Point]:
-    """Return the points modulo a prime that lie on none of the components."""
+    """Return those of the points modulo a prime that lie on none of the components."""
     import numpy as np
 
     outside_points = np.array(points, dtype=np.int64)

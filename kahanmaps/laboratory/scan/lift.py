@@ -1,13 +1,13 @@
 """Lift components modulo several small primes to varieties over Q, by Chinese remaindering and rational reconstruction.
 
-A variety reconstructed from some of the primes must also appear modulo all other primes. This does not prove that it is
-a component over Q; `scan` confirms it at members on the variety.
+A variety reconstructed from some primes must also appear modulo all other primes. This does not prove that it is a
+component over Q; `scan` measures random members on the variety to confirm it.
 
-A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 in the field:
-for most fields more than half of the primes. One residue modulo each of several primes is taken, no matter of which of
-the conjugate points, and these are combined by the Chinese remainder theorem. The equations are small integer
-relations between products of the coordinates, which are short vectors of a lattice: an equation over Q for the first
-coordinate, and for each further coordinate an equation over the field of the earlier coordinates.
+A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 in the field.
+For most fields these are more than half of all primes. Modulo each of several primes one point is chosen, no matter
+which of the conjugates, and these are combined by the Chinese remainder theorem. The equations of the point are small
+integer relations between products of its coordinates, which are short vectors of a lattice: an equation over Q for the
+first coordinate, then equations over the field of the earlier coordinates.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from kahanmaps.laboratory.scan.modular_components import Rows
 
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
-_MAX_PAIRS = 100_000  # tried pairs of affine subspaces modulo two primes
-_MAX_CONJUGATES = 24  # the largest number of hypersurfaces modulo a prime for which products of two are tried
-_LOW_HEIGHT = 12  # up to this height a subspace may be missing modulo one prime
-_MIN_PRIMES = 3  # modulo which a variety over Q must appear
+_MAX_PAIRS = 100_000  # maximal number of tried pairs of affine subspaces modulo two primes
+_MAX_CONJUGATES = 24  # products of two hypersurfaces modulo a prime are tried for at most so many hypersurfaces
+_LOW_HEIGHT = 12  # a subspace of at most this height may be missing modulo one prime
+_MIN_PRIMES = 3  # minimal number of primes modulo which a variety over Q must appear
 MAX_FIELD_DEGREE = 6
-SPARE_BITS = 12  # bits by which relations of a point must be shorter than relations of random residues
-_MAX_FAILURES = 200  # successive combinations of residues without conjugate points
-_MAX_POINTS = 24  # points modulo a prime
-_MAX_PRIMES = 14  # primes that are combined
+SPARE_BITS = 12  # accepted relations are shorter by so many bits than relations of random residues
+_MAX_FAILURES = 200  # maximal number of successive combinations that give no conjugate points
+_MAX_POINTS = 24  # maximal number of points modulo a prime
+_MAX_PRIMES = 14  # maximal number of combined primes
 
 
 def height_bound(primes: Sequence[int]) -> int:
-    """Return the bound on numerators and denominators that are reconstructed from the two smallest primes."""
+    """Return the largest numerator and denominator that can be reconstructed modulo the two smallest primes."""
     return isqrt((prod(sorted(primes)[:2]) - 1) // 2)
 
 
 def lift_linear(
     subspaces: Mapping[int, Sequence[Rows]], everywhere: bool = True
 ) -> dict[RationalRows, tuple[int, ...]]:
-    """Return the affine subspaces over Q, as reduced rows, whose residues occur modulo the primes, with these primes.
+    """Return a dict: reduced rows of affine subspaces over Q -> the primes modulo which the subspaces occur.
 
-    A subspace must occur modulo all primes (all but one up to height 12); if `everywhere` is False, three suffice.
+    A subspace must occur modulo all primes (all but one up to height 12) or, if `everywhere` is False, modulo three.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lift_linear(modulo)
@@ -62,7 +62,7 @@ def lift_linear(
     lifted_subspaces: dict[RationalRows, tuple[int, ...]] = {}
     pair_counts = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
     pair_count = 0
-    # Pairs of primes with few pairs of subspaces first: one pair of residues suffices to lift a subspace.
+    # A subspace is lifted from two primes. Pairs of primes with few pairs of subspaces come first.
     for p, q in sorted(pair_counts, key=pair_counts.__getitem__):
         pair_count += pair_counts[p, q]
         if pair_count > _MAX_PAIRS:
@@ -82,7 +82,7 @@ def lift_linear(
 
 
 def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    """Return the equations of an affine subspace as primitive polynomials.
+    """Return the equations of the affine subspace with the given `rows` as primitive polynomials in `names`.
 
     >>> linear_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
     (2*a - 1,)
@@ -104,7 +104,7 @@ def _lift_rows(rows_p: Rows, p: int, rows_q: Rows, q: int) -> RationalRows | Non
 
 
 def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
-    """Return the rows modulo a prime; None if the prime divides a denominator."""
+    """Return the rows modulo the prime p; None if p divides a denominator."""
     if any(int(x.q) % p == 0 for row in rows for x in row):
         return None
     return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
@@ -115,9 +115,9 @@ def lift_hypersurfaces(
 ) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
     """Lift hypersurfaces modulo primes to irreducible hypersurfaces over Q; return them with their primes.
 
-    Three kinds are tried: single hypersurfaces; products of two, which may be conjugate over a quadratic field; and the
-    product of all remaining hypersurfaces. This product is lifted from all primes but one, and compared with the
-    product modulo the last prime.
+    Three kinds of lifts are tried: those of single hypersurfaces; of products of two, which may be conjugate over a
+    quadratic field; and of the product of all remaining hypersurfaces. The latter product is lifted from all primes but
+    one, and compared with the product modulo this prime.
 
     >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
     >>> lift_hypersurfaces(circle, ["a", "b"])
@@ -150,7 +150,7 @@ def lift_hypersurfaces(
 def _lift_product(
     hypersurfaces: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:
-    """Lift the product of all hypersurfaces modulo each prime; return its factors over Q and the primes."""
+    """Lift the product of all hypersurfaces; return its irreducible factors over Q and the primes."""
     products = {p: _multiply(forms, p, len(names)) for p, forms in hypersurfaces.items() if forms}
     if not products:
         return [], ()
@@ -170,14 +170,14 @@ def _lift_product(
 
 
 def _factor(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
-    """Return the primitive irreducible factors over Q of the polynomial with these coefficients."""
+    """Return the primitive irreducible factors over Q of the polynomial with the coefficients `values`."""
     degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == len(values))
     terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
     return [primitive_part(factor)[1] for factor, _ in ring(names).from_dict(terms).factor()[1]]
 
 
 def _multiply(forms: Sequence[Sequence[int]], p: int, variable_count: int) -> list[int]:
-    """Return the coefficients of the product of polynomials, scaled so that the first nonzero one is 1."""
+    """Return the coefficients of the product of `forms` modulo p, scaled so that the first nonzero one is 1."""
 
     def degree_of(form: Sequence[int]) -> int:
         return next(d for d in range(100) if len(exponents_up_to(variable_count, d)) == len(form))
@@ -195,9 +195,9 @@ def lift_conjugate_points(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
-    """Return, for sets of conjugate points, one equation for each parameter and the primes at which all points occur.
+    """Return, for each set of conjugate points, equations (one for each parameter), and the primes where all occur.
 
-    For all but one of the primes modulo which equations have solutions, the solutions must be among the `points`.
+    Modulo at most one prime, the equations may have solutions that are not among the `points`.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
     >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))
@@ -212,14 +212,14 @@ def lift_conjugate_points(
         check()
         failure_count += 1
         candidate_primes = [p for p in remaining_points if remaining_points[p]]
-        # Combine one random point modulo each of a few primes until small relations appear.
+        # Combine one random point modulo each of a few primes until its coordinates have small relations.
         values: Sequence[int] = [0] * len(names)
         modulus, equations = 1, None
         for p in rng.sample(candidate_primes, min(len(candidate_primes), _MAX_PRIMES)):
             values, modulus = chinese(values, modulus, rng.choice(sorted(remaining_points[p])), p), modulus * p
             if (equations := _search_equations(values, modulus, names)) is not None:
                 break
-        # If the points are not conjugate, the relation of the first coordinate is reducible.
+        # The relation of the first coordinate is reducible only if the combined points are not conjugate.
         if equations is None or len(equations[0].factor()[1]) > 1:
             continue
         size = len(names)
@@ -227,7 +227,7 @@ def lift_conjugate_points(
             equation[tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))]
             for k, equation in enumerate(equations)
         ]
-        # Modulo a prime that divides a leading coefficient no solutions are counted: some of them are at infinity.
+        # Modulo a prime that divides a leading coefficient some solutions are at infinity, so that none are counted.
         solution_sets = {
             p: set[tuple[int, ...]]()
             if any(int(c.p) % p == 0 for c in leading_coefficients)
@@ -243,9 +243,9 @@ def lift_conjugate_points(
 
 
 def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
-    """Return a relation of least degree in each coordinate; None if there are no relations with small coefficients."""
+    """Return an equation of least degree for each coordinate; None if an equation would have large coefficients."""
     context = ring(names)
-    basis = [(context.constant(1), 1)]  # products of powers of earlier coordinates, with residues
+    basis = [(context.constant(1), 1)]  # pairs (product of powers of earlier coordinates, residue)
     equations = []
     for x, value in zip(context.gens(), values, strict=True):
         lower_monomials, (power, residue) = list(basis), (x, value)
@@ -262,9 +262,9 @@ def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str])
 
 
 def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits: int) -> list[int] | None:
-    """Return small integers c_i with sum c_i r_i = 0 modulo `modulus`, the last one not 0; None if there are none.
+    """Return small integers c_i with sum c_i r_i = 0 modulo `modulus`, the last c_i not 0; None if there are none.
 
-    The first residue must be 1. Small means `spare_bits` bits smaller than expected for random residues r_i.
+    The r_i are `monomial_residues`, r_0 = 1. Small means smaller, by `spare_bits` bits in total, than for random r_i.
     """
     size = len(monomial_residues)
     rows = [[modulus, *[0] * (size - 1)]]
@@ -272,6 +272,6 @@ def _search_relation(monomial_residues: Sequence[int], modulus: int, spare_bits:
     count_work(20 * size + size**3 * modulus.bit_length() / 500)
     shortest_row = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest_row)
-    # Any residues have a relation of a height with (2 height + 1)^size about the modulus; this one must be smaller.
+    # Random residues have relations with (2 height + 1)^size of about `modulus`; this one must be smaller.
     is_small = (2 * height + 1) ** size << spare_bits <= modulus
     return [int(c) for c in shortest_row] if is_small and shortest_row[-1] else None

@@ -1,4 +1,4 @@
-"""Members of a family on a component of parameter space, and their degrees, computed independently of the sweep."""
+"""Members of a family on a component of parameter space, and a measurement of the degrees of their iterates."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import MapFamily
 
-_TRIES = 200  # the number of random values of the free variables for which a root of the equations is tried
-_PRIMES = 40  # random primes that are tried for a member
-_HEIGHT = 120  # of random values, if the equations are linear in their pivots
-_SMALL_HEIGHT = 12  # of random values, if an equation of higher degree must have a rational root
+_TRIES = 200  # maximal number of random values of the free variables for which the equations are solved
+_PRIMES = 40  # maximal number of random primes that are tried for a member
+_HEIGHT = 120  # height of random values if the equations are linear in their pivots
+_SMALL_HEIGHT = 12  # height of random values if an equation of higher degree must have a rational root
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
-    """Return random values of `count` variables, of small height over Q or in GF(p), that solve equations, or None.
+    """Return random values of `count` variables that solve equations, over Q or GF(p); None if no solution occurs.
 
-    `equations` define an affine subspace (reduced: the first variable of each equation occurs in no other), or a
-    hypersurface, or a point over a number field (each equation has one more variable than the one before). Raises
+    `equations` define an affine subspace (reduced: the first variable of an equation occurs in no other equation), a
+    hypersurface, or a point over a number field (each equation has one variable more than the previous one). Raises
     BadPrime if the prime divides a denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
@@ -40,7 +40,7 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
     """
     pivots: list[int] = []
     for equation in equations:
-        # Solve for the variable of smallest positive degree that is not the pivot of an earlier equation.
+        # An equation is solved for its pivot, the variable of least positive degree that is no earlier pivot.
         degrees = [int(d) for d in equation.degrees()]
         pivots.append(min((k for k, d in enumerate(degrees) if d and k not in pivots), key=lambda k: degrees[k]))
     is_linear = all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))
@@ -56,9 +56,9 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
 def solutions(
     equations: Sequence[fmpq_mpoly], pivots: Sequence[int], values: Sequence[Any], field: Field
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield all solutions over a field with the given values of the variables that are not pivots.
+    """Yield all solutions over a field; the variables that are not pivots have the given `values`.
 
-    Each equation is solved for its pivot; pivots of later equations do not occur in it.
+    Each equation is solved for its pivot, and must not contain the pivots of later equations.
     """
     if not equations:
         yield tuple(values)
@@ -81,9 +81,9 @@ def solutions(
 
 @dataclass(frozen=True)
 class ScannedFamily:
-    """A scanned family: the file and its map with the parameters `names` as symbols; the last name may be eps.
+    """A scanned family: a file, and its map with the parameters `names` as symbols; the last name may be eps.
 
-    `eps` is an exact number, or None for generic eps.
+    `eps` is half the time step: an exact number, or None for generic eps.
     """
 
     file: SystemFile
@@ -93,20 +93,20 @@ class ScannedFamily:
     seed: int
 
     def member(self, values: Mapping[str, fmpq]) -> tuple[SystemFile, fmpq | None]:
-        """Return the system of a member and its eps."""
+        """Return the system and the eps of the member with these values of the parameters."""
         parameters = {name: value for name, value in values.items() if name != "eps"}
         return member_of(self.file, parameters), values.get("eps", self.eps)
 
     def degrees_on(
         self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, max_degree: int = 1 << 20
     ) -> Degrees | None:
-        """Measure the degrees of a random member on a component modulo a random prime of 61 bits, on one random line.
+        """Measure the degrees of iterates of a random member on a component, modulo a random prime, on a random line.
 
-        Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is nowhere
-        defined. The sequence is as long as the `expected` degrees (guesses that only affect speed), or ends before a
-        degree above `max_degree`.
+        Returns None if no point on the component was obtained modulo random primes of 61 bits. A degree is -1 if the
+        iterate is nowhere defined. The sequence is as long as `expected` (guesses of the degrees, which only affect
+        speed), or ends before a degree above `max_degree`.
         """
-        for _ in range(_PRIMES):  # a point over a number field has residues modulo some primes only
+        for _ in range(_PRIMES):  # a point over a number field has residues only modulo some primes
             field = GF(random_prime(rng))
             try:
                 values = point_on(equations, len(self.names), field, rng)

@@ -1,8 +1,8 @@
-"""The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces of affine subspaces, single points.
+"""The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces in affine subspaces, single points.
 
-The points with a given degree sequence are the points of certain varieties, without special subvarieties, and a few
-points by chance. So a candidate is a variety through few random points of the set; it is accepted as a component if the
-set contains most of its points, of which there are about p^d in dimension d.
+The members with a given degree sequence are points of certain varieties outside special subvarieties, and a few further
+points by chance. So a candidate for a component is a variety through a few random points of the set. A variety of
+dimension d has about p^d points; it is accepted as a component if the set contains most of them.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ Rows = tuple[tuple[int, ...], ...]
 
 Form = tuple[int, ...]
 
-MAX_DEGREE = 6  # of the product of all hypersurfaces with the same degree sequence
-_SHARE = 0.5  # the least share of the points of a component; points on special subvarieties are missing
-_SPARE = 1.2  # number of points per coefficient of a hypersurface
-# Numbers of samples of points. With more than 3 parameters a sample rarely lies on one component, so that more samples
-# are needed. From degree 3 on a sample is expensive, and useless if its points lie on two components.
+MAX_DEGREE = 6  # maximal degree of the product of all hypersurfaces with the same degree sequence
+_SHARE = 0.5  # minimal share of the points of a component in the set; points on special subvarieties are not in it
+_SPARE = 1.2  # number of interpolated points per coefficient of a hypersurface
+# Numbers of samples of points. With more than 3 parameters a sample rarely lies on one affine subspace. From degree 3
+# on the interpolation of a sample is expensive, and useless if its points lie on two components.
 _TRIES, _TRIES_MANY_PARAMETERS, _TRIES_HIGH_DEGREE = 80, 3000, 12
-_MAX_PRODUCT_DEGREE = 12  # of a product of hypersurfaces that is interpolated
-_MAX_SINGLE_POINTS = 400  # if more points lie on no component, they are not isolated points
+_MAX_PRODUCT_DEGREE = 12  # maximal degree of an interpolated product of hypersurfaces
+_MAX_SINGLE_POINTS = 400  # if more points lie on no component, they are not reported as isolated points
 
 
 @dataclass
 class ModularComponents:
     """The components of a set of points modulo `prime`.
 
-    `linear` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
-    `hypersurfaces` has the irreducible hypersurfaces of each affine subspace (no rows: the full space). A hypersurface
-    is given by the coefficients, in the order of `exponents_up_to`, of monomials in the free variables of the subspace.
+    `linear` maps dimensions to affine subspaces, i.e. to reduced rows (c_1, ..., c_k, c_0) of their equations
+    c_1 a_1 + ... + c_0 = 0. `hypersurfaces` maps affine subspaces (no rows: the full space) to the irreducible
+    hypersurfaces in them, lists of coefficients (in the order of `exponents_up_to`) in free variables of the subspace.
     """
 
     prime: int
@@ -54,10 +54,10 @@ def find_components(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> ModularComponents:
-    """Find the components of dimension `min_dimension` or more of a set of points, selected from `measured` points.
+    """Return the components, of dimension `min_dimension` or more, of some points among `measured` points.
 
-    `min_dimension` is 0 if all points of GF(p)^k were measured, and k - 1 for points on random lines. `check` is called
-    repeatedly, and may raise.
+    `min_dimension` is 0 if all points of GF(p)^k were measured, and k - 1 if only points on random lines were measured.
+    `check` is called repeatedly, and may raise an exception.
 
     >>> line = [(a, (2 * a + 3) % 31) for a in range(31)]
     >>> components = find_components([*line, (5, 5)], 31, 31**2, 0, random.Random(0))
@@ -71,7 +71,7 @@ def find_components(
     unassigned = np.array(points, dtype=np.int64)
 
     def affine_subspaces(dimension: int, min_count: float) -> Iterator[tuple[Rows, Any]]:
-        """Yield affine subspaces with at least `min_count` of the points, each with a mask of the points in it."""
+        """Yield affine subspaces with at least `min_count` unassigned points, each with a mask of the points in it."""
         for _ in range(_TRIES if dim <= 3 else _TRIES_MANY_PARAMETERS):
             check()
             if len(unassigned) < min_count:
@@ -86,8 +86,8 @@ def find_components(
                     yield tuple(map(tuple, rows)), is_inside
 
     for dimension in range(dim - 1, max(min_dimension, 1) - 1, -1):
-        # Affine subspaces first, then hypersurfaces of affine subspaces of one dimension more. The largest dimension
-        # comes first, so that the points of a hyperplane do not appear as many smaller components.
+        # First affine subspaces of this dimension, then hypersurfaces in affine subspaces of one dimension more.
+        # Dimensions decrease, so that a hyperplane does not appear as many smaller components.
         min_count = max(_SHARE * measured / prime ** (dim - dimension), dimension + 3)
         for rows, mask in affine_subspaces(dimension, min_count):
             components.linear.setdefault(dimension, []).append(rows)
@@ -115,10 +115,10 @@ def find_components(
 def _find_hypersurfaces(
     points: Any, min_count: float, prime: int, rng: random.Random, check: Callable[[], None]
 ) -> Iterator[tuple[Form, Any]]:
-    """Yield irreducible hypersurfaces with at least `min_count` of the points, each with a mask of the points on it.
+    """Yield irreducible hypersurfaces on which at least `min_count` points lie, each with a mask of these points.
 
     The first attempt interpolates more points than there are coefficients, and gives the product of all hypersurfaces.
-    Further attempts interpolate as many points as determine one hypersurface, if all of them happen to lie on it.
+    Further attempts interpolate as many points as determine a hypersurface; they succeed if all points lie on one.
     """
     dim = points.shape[1]
     context = nmod_mpoly_ctx.get([f"a{k}" for k in range(dim)], modulus=prime, ordering=Ordering.degrevlex)
@@ -141,7 +141,7 @@ def _find_hypersurfaces(
                 coefficients = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
                 factor_degree = max(map(sum, coefficients))
                 row = [coefficients.get(e, 0) for e in exponents_up_to(dim, factor_degree)]
-                scale = pow(next(c for c in row if c), -1, prime)  # makes the first nonzero coefficient 1
+                scale = pow(next(c for c in row if c), -1, prime)  # the first nonzero coefficient becomes 1
                 form = tuple(c * scale % prime for c in row)
                 is_inside = _evaluate_monomials(points, factor_degree, prime) @ form % prime == 0
                 if is_inside.sum() >= min_count:
@@ -150,7 +150,7 @@ def _find_hypersurfaces(
 
 
 def degree_reached(points: float, count: int) -> int:
-    """Return the largest degree, at most 6, such that `points` points in `count` variables determine hypersurfaces.
+    """Return the largest degree, at most 6, of hypersurfaces in `count` variables that `points` points can determine.
 
     >>> degree_reached(53, 2), degree_reached(11, 2)
     (6, 2)
@@ -160,7 +160,7 @@ def degree_reached(points: float, count: int) -> int:
 
 
 def _evaluate_monomials(points: Any, degree: int, prime: int) -> Any:
-    """Return the values of all monomials up to a degree, one row for each point."""
+    """Return the values modulo a prime of all monomials up to a degree, with one row for each point."""
     import numpy as np
 
     divisors = monomial_tables(points.shape[1], degree)

@@ -1,7 +1,7 @@
-"""Search for projective changes of parameters that permute the special members of a family.
+"""Search for projective transformations of the parameters of a family that permute its special members.
 
-Three kinds are tried: signed permutations of the parameters; signed permutations with a shift or a factor for each
-parameter; and, for families whose parameters are ratios, signed permutations of the coordinates (a : b : ... : 1).
+Three kinds of changes are tried: signed permutations of the parameters a, b, ...; these with a shift or a factor for
+each parameter; and, for parameters that are ratios, signed permutations of the coordinates (a : b : ... : 1).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
 Row = tuple[fmpq, ...]
-Change = tuple[Row, ...]  # a matrix acting on (a, b, ..., 1), scaled to first nonzero entry 1 in the last row
+Change = tuple[Row, ...]  # a matrix acting on (a, b, ..., 1); in its last row the first nonzero entry is 1
 
-_MAX_POINTS = 24  # rational point components from which shifts and factors are taken
+_MAX_POINTS = 24  # maximal number of rational points that determine shifts and factors
 
 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return generators of the group of all changes of parameters that were found, as images of the parameters.
+    """Return generators of the group of all changes of parameters that were detected, as images of the parameters.
 
-    Modulo each prime for which all members were tried, a change maps special members to members with equal degrees of
-    iterates, or to infinity. It does the same with hypersurfaces over Q. Only changes that move a component,
-    or preserve a component that is not affine, are reported.
+    Modulo each prime for which all members were tried, such a change maps every special member to a member with equal
+    degrees of iterates, or to infinity. It also maps hypersurfaces over Q to hypersurfaces with equal degrees of
+    iterates. Only changes that move a component, or preserve a component that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]
@@ -50,7 +50,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
             generators.append(change)
             group = _generate_group(generators, len(names))
     texts = []
-    for change in generators:  # a denominator is a constant or a multiple of one parameter
+    for change in generators:  # the common denominator is a constant or a multiple of one parameter
         *numerators, denominator = map(format_polynomial, _images_of_parameters(change, names))
         if denominator == "1":
             texts.append(tuple(numerators))
@@ -60,7 +60,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
 
 
 def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
-    """Return whether every special member modulo p is mapped to a member with the same degrees, or to infinity."""
+    """Return whether the change maps every special member modulo p to one with the same degrees, or to infinity."""
     rows = residues(change, p)
     count_work(20)
     for point, degrees in special.items() if rows is not None else ():
@@ -72,7 +72,7 @@ def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) 
 
 
 def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
-    """Yield the changes to be tried; their shifts and factors map a rational point component to another one."""
+    """Yield the changes to be tried; shifts and factors map the first rational point of the components to another."""
     signed_permutations = [
         tuple(
             tuple(fmpq(sign * (k == index)) for k in range(count + 1))
@@ -99,18 +99,18 @@ def _apply_change(change: Change, vector: Sequence[fmpq]) -> Row:
 
 
 def _images_of_parameters(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
-    """Return the numerators of the images of the parameters, and as the last entry their common denominator."""
+    """Return the numerators of the images of the parameters, followed by the common denominator of the images."""
     context = ring(names)
     vector = [*context.gens(), context.constant(1)]
     return [sum((c * x for c, x in zip(row, vector, strict=True)), context.constant(0)) for row in change]
 
 
 def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
-    """Return whether hypersurfaces go to ones with equal degrees of iterates, and some component moves or is curved."""
+    """Return whether preimages of hypersurfaces are components of equal degrees, and a component moves or is curved."""
     *images, denominator = _images_of_parameters(change, names)
 
     def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:
-        """Return the equation of the preimage of a component; a constant if it has only points at infinity."""
+        """Return the equation of the preimage of a hypersurface; a constant if its points are all at infinity."""
         terms = {(*m, equation.total_degree() - sum(m)): c for m, c in equation.terms()}
         form = ring([f"x{k}" for k in range(len(images) + 1)]).from_dict(terms)
         return primitive_part(form.compose(*images, denominator, ctx=denominator.context()))[1]
@@ -126,14 +126,14 @@ def _is_reportable(change: Change, components: Sequence[Component], names: Seque
         is_affine = all(equation.total_degree() == 1 for equation in component.equations)
         if component.values is None:
             is_fixed = set(map(str, preimage)) == set(map(str, component.equations))
-        else:  # tested at one member: for a single point this is the point itself
+        else:  # tested at a rational member of the component; a point component is its only member
             is_fixed = replace(component, equations=tuple(preimage)).contains([*component.values.values()])
         is_reportable = is_reportable or not (is_affine and is_fixed)
     return is_reportable
 
 
 def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
-    """Return the group that changes generate (finite, since it permutes points), or 2000 or more of its elements."""
+    """Return the group that changes generate, or at least 2000 elements; it is finite, since it permutes points."""
 
     def compose(first: Change, second: Change) -> Change:
         rows = tuple(zip(*(_apply_change(second, column) for column in zip(*first, strict=True)), strict=True))

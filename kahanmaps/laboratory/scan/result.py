@@ -1,4 +1,4 @@
-"""The result of a scan: components of parameter space, and which part of the space was searched."""
+"""The result of a scan: components of parameter space, and a description of what was searched."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from kahanmaps.laboratory.scan.lift import MAX_FIELD_DEGREE, SPARE_BITS, height_
 from kahanmaps.laboratory.scan.modular_components import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
-_MAX_LISTED = 12  # primes that are listed
-STEPS = 40  # the number of steps for which singularities are traced to determine the growth at a member
+_MAX_LISTED = 12  # maximal number of listed primes
+STEPS = 40  # the number of steps for which singularities of a member are traced to determine its growth
 
 
 @dataclass(frozen=True)
 class Component:
-    """A component of parameter space on which the polynomials `equations` over Q vanish, found modulo `primes`.
+    """A component of parameter space, given by `equations` over Q, which occurs modulo `primes`.
 
-    `degrees` are d_1, ..., d_N there, and `confirmed` of `tried` random members have these degrees. `values` are the
-    parameters of a rational member, None if none was found; `growth` is the growth of the degrees of this member, and
-    `verdict` the verdict of its analysis, None if no analysis was requested.
+    `degrees` are the degrees d_1, ..., d_N of the iterates of a member on the component; `confirmed` of `tried` random
+    members have these degrees. `values` are the parameters of a rational member; None if none is known. `growth` is the
+    growth of degrees, and `verdict` the verdict of an analysis of the rational member (None: unknown).
     """
 
     equations: tuple[fmpq_mpoly, ...]
@@ -57,19 +57,19 @@ class Component:
 
     @property
     def member_text(self) -> str:
-        """The parameters of the rational member, in parentheses if there are several; empty if none is known."""
+        """The parameters of the rational member, in parentheses if there are several; empty if no member is known."""
         values = [format_number(value) for value in (self.values or {}).values()]
         return f"({', '.join(values)})" if len(values) > 1 else "".join(values)
 
     @property
     def text(self) -> str:
-        """The condition as text: the parameters of a point, or equations."""
+        """The condition on the parameters as text: the parameters of a point, or equations."""
         if self.is_rational_point:
             return self.member_text
         return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
 
     def contains(self, point: Sequence[fmpq]) -> bool:
-        """Return whether the equations hold at a rational point."""
+        """Return whether a rational point of parameter space lies on the component."""
         return not any(evaluate(equation, QQ, point) for equation in self.equations)
 
     def to_json(self) -> dict[str, Any]:
@@ -84,12 +84,12 @@ class Component:
 
 
 def growth_on(components: Sequence[Component]) -> DegreeGrowth | None:
-    """Return the first known growth among components with the same degrees."""
+    """Return the first known growth of degrees among components with the same first degrees."""
     return next((component.growth for component in components if component.growth is not None), None)
 
 
 def _abbreviate(texts: Sequence[str]) -> str:
-    """Join the texts; if there are many, only the first three and the last one."""
+    """Join the texts; of more than 12 texts, only the first three and the last one."""
     return ", ".join(texts if len(texts) <= _MAX_LISTED else [*texts[:3], "...", f"{texts[-1]} ({len(texts)} of them)"])
 
 
@@ -97,11 +97,11 @@ def _abbreviate(texts: Sequence[str]) -> str:
 class Scan(PrintableResult):
     """The result of a scan: components of parameter space, in the order of increasing growth.
 
-    `generic` are the degrees d_1, ..., d_N of a generic member, `sweeps` the special members modulo each prime, and
-    `unassigned` the numbers of special members on no component: points over number fields or of a height above
-    `height`, or special by chance. `symmetric` contains changes of parameters that permute the special members; each is
-    given by the images of the parameters. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was
-    not done.
+    `over` are the scanned parameters, `generic` the degrees d_1, ..., d_N of the iterates of a generic member, and
+    `sweeps` the special members modulo each prime. `unassigned` has, for each sweep, the number of special members on
+    no component: points over number fields or of a height above `height`, or special by chance. `symmetric` contains
+    changes of parameters that permute the special members, each given by the images of the parameters. `ended` is
+    "complete", "budget" or "interrupted"; `omitted` names what was not done.
     """
 
     file: SystemFile
@@ -126,13 +126,13 @@ class Scan(PrintableResult):
 
     @property
     def height(self) -> int:
-        """The largest numerator and denominator for which conditions are found; 0 with too few primes."""
+        """The bound for numerators and denominators of conditions that can be detected; 0 with too few primes."""
         bounds = [height_bound([sweep.prime for sweep in sweeps]) for sweeps in self._grouped_sweeps if len(sweeps) > 2]
         return min(bounds, default=0)
 
     @property
     def _grouped_sweeps(self) -> tuple[list[Sweep], ...]:
-        """The sweeps over all members, over random lines of parameter space, and over random planes."""
+        """The lists of sweeps over all members, over random lines of parameter space, and over random planes."""
         return (
             [sweep for sweep in self.sweeps if sweep.complete],
             *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == k] for k in (1, 2)),
@@ -140,7 +140,7 @@ class Scan(PrintableResult):
 
     @property
     def degree(self) -> int:
-        """The largest total degree of hypersurfaces, with the same degrees of iterates, that is found."""
+        """The maximal total degree of hypersurfaces with the same degrees of iterates that can be detected."""
         count = len(self.over)
         degrees = [
             degree_reached(0.75 * min(sweep.measured / sweep.prime for sweep in sweeps), count)
@@ -151,7 +151,7 @@ class Scan(PrintableResult):
 
     @property
     def classes(self) -> list[tuple[Degrees, list[Component]]]:
-        """The components grouped by their degrees, in the order of `components`."""
+        """The components, grouped by their degrees: pairs (degrees, components), in the order of `components`."""
         groups: dict[Degrees, list[Component]] = {}
         for component in self.components:
             groups.setdefault(component.degrees, []).append(component)
@@ -159,7 +159,7 @@ class Scan(PrintableResult):
 
     @property
     def coverage(self) -> str:
-        """A sentence on the members that were measured and on the components that can be found from them."""
+        """A sentence on the members that were measured, and on the components that these measurements can detect."""
         if not self.height:
             primes_text = counted(len(self.sweeps), "prime")
             return f"conditions need members modulo three primes, and those modulo {primes_text} were tried"
@@ -199,9 +199,9 @@ class Scan(PrintableResult):
 
     @property
     def text(self) -> str:
-        """The lines of the report, each a label, a tab and its value."""
+        """The lines of the report; each line has a label, a tab and a value."""
         if not self.height:
-            lines = [  # no component was lifted: the numbers of special members by degrees
+            lines = [  # no condition was lifted: report the numbers of special members
                 ("special", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {sweep.prime}")
                 for sweep in self.sweeps
                 for degrees, points in sorted(sweep.classes.items())
@@ -243,7 +243,7 @@ class Scan(PrintableResult):
         if any(self.unassigned):
             pairs = list(zip(self.unassigned, self.sweeps, strict=True))
             count_texts = [f"{n} modulo {sweep.prime}" for n, sweep in pairs if n or len(pairs) <= _MAX_LISTED]
-            missed_dimension = 0  # the largest dimension of a variety with at most about n points
+            missed_dimension = 0  # the largest dimension of a variety that has about n points or fewer
             for n, sweep in pairs:
                 dimension = len(self.over) - 1
                 while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (

@@ -1,10 +1,10 @@
-"""The search for integrable members of a family of maps: components of parameter space where degrees grow more slowly.
+"""The search for integrable members of a family of maps: components of parameter space on which degrees are smaller.
 
-All members with parameters in GF(p) are tried for several small primes p (`sweep`). Members with smaller degrees than a
-generic member are special. Special members with the same degrees form a class, which is decomposed into components
-modulo each prime (`modular_components`). Components that appear modulo all primes are lifted to conditions over Q
-(`lift`). A condition is *found modulo* these primes. It is *confirmed* if random members on it, modulo large primes,
-have the same degrees, computed as by `degrees`. None of this is a proof. The growth is that of one rational member.
+For several small primes p, the degrees of the iterates of all members with parameters in GF(p) are measured (`sweep`).
+Members with smaller degrees than a generic member are special. Special members with the same degrees form a class,
+which is decomposed into components modulo each prime (`modular_components`). Components that appear modulo all primes
+are lifted to conditions over Q (`lift`). A condition is *confirmed* if random members that satisfy it modulo large
+primes have the same degrees (`members`). None of this is a proof. The growth is that of one member.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from kahanmaps.processes import processors
 
 Progress = Callable[[str], None]
 
-UNITS = 240e6  # of counted work at effort 1, mostly of the kernel, which runs on all processors
+UNITS = 240e6  # of counted work at effort 1, mostly for sweeps, which run on all processors
 MAX_PARAMETERS = 8
-# For each number of parameters the primes modulo which all members are tried: the preferred list, then lists for
-# families with expensive members. A cubic in one parameter has all its zeros in GF(p) for one prime in 6.
+# For each number of parameters, the primes modulo which all members are measured: the preferred list, then lists for
+# families with expensive members. (One parameter needs many primes: a cubic splits modulo one prime in 6.)
 _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     1: (
         tuple(p for p in range(307, 500) if fmpz(p).is_prime()),
@@ -53,31 +53,31 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
-# Further primes, as many as the budget allows, if the remaining members may be points over number fields.
+# Further primes, as many as the budget allows, for unassigned members that may be points over number fields.
 _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
-# The primes for members on random lines of parameter space. Each field Q(sqrt(d)) with |d| <= 10 splits modulo three of
-# them: a hypersurface that splits over such a field has points on lines only modulo primes that split.
+# The primes for members on random lines of parameter space. Three of them split in Q(sqrt(d)) for each |d| <= 10: a
+# hypersurface that is reducible over such a field has points on lines only modulo primes that split.
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
-_LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
-_LINE_FACTOR = 4  # by which the number of lines grows if hypersurfaces were missed
+_LINES = {2: (24, 12), 3: (32, 16)}  # by number of parameters: the preferred number of lines, and a smaller one
+_LINE_FACTOR = 4  # the number of lines is multiplied by this factor if hypersurfaces were missed
 _MANY_LINES = (150, 60)  # the same two numbers for more than 3 parameters
-# The number of random planes, which meet components that lines do not meet, and their primes.
+# The number of random planes, and their primes. Planes meet components of codimension 2, which lines do not meet.
 _PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
-_SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
-# The shares of the budget that are spent at the end of each stage; the last share is for analyses.
+_SWEEP_SHARE = 0.3  # the share of the budget for the measurement of all members on one line each
+# The shares of the budget that may be spent by the end of each stage; analyses use what remains.
 _SWEEPS_END, _CONDITIONS_END, _CONFIRMATION_END, _GROWTH_END = 0.6, 0.75, 0.85, 0.9
-# Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
+# Bounds of the numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
 _DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
-_MAX_LENGTH = 4096  # if the number of iterates is given as `terms`
-_TRIAL_PRIME = 8179  # so large that hardly any member is special
-_MAX_TERMS = 7  # iterates by default
-_CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
-_TRIES = 20  # attempts to find a rational member
-_GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member
-# For the growth without a rational member: the number of degrees that are measured, and a bound of the degrees.
+_MAX_LENGTH = 4096  # the bound if the number of iterates is given as `terms`
+_TRIAL_PRIME = 8179  # so large that random members are rarely special
+_MAX_TERMS = 7  # maximal default number of iterates
+_CONFIRMING_MEMBERS = 3  # number of random members measured to confirm a component
+_TRIES = 20  # maximal number of attempts to obtain a rational member
+_GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # budget and maximal number of attempts for the growth of a member
+# For the growth without a rational member: the number of measured degrees, and a bound of the degrees.
 _FITTED_TERMS, _MAX_FITTED_DEGREE = 26, 1000
 _COMPARED_DEGREE = 100  # degrees are compared at least up to this value
-# Kinds of growth that are measured on each component, also if components have the same degrees.
+# Kinds of growth that are measured on each component, even if its first degrees are those of another component.
 _MEASURED_ON_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
@@ -99,21 +99,21 @@ def scan(
     """Search for conditions on parameters under which the degrees of the iterates are smaller than generically.
 
     Args:
-        system: the family; its claims are ignored.
-        over: names of the parameters that vary; the others keep the values of the file. eps may be one of them.
+        system: the family: a system or map with parameters. The claims of its file are ignored.
+        over: names of the parameters that vary (eps may be one of them); the others have the values of the file.
         eps: half the time step (exact), or None for generic eps: the conditions then hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
-        terms: the number of iterates that are measured; by default at most 7, all of small degree.
-        primes: at least three primes; those chosen by default have some ten thousand members together.
+        terms: the number of iterates that are measured; by default at most 7, fewer if degrees are large.
+        primes: at least three primes; the default depends on the number of parameters and the budget.
         effort: an integer; each increase by 1 doubles the work limit. Stages that are skipped are reported.
         seed: the random seed.
-        jobs: the number of threads, which need numba; by default the number of processors.
-        analysis: the effort for an analysis of one member on each component whose degrees do not grow exponentially;
-            only one of several points with the same degrees is analyzed. None: no analyses.
+        jobs: the number of threads (threads need numba); by default the number of processors.
+        analysis: the effort of an analysis of a rational member on each component without exponential growth; of
+            several points with the same degrees only one is analyzed. None: no analyses.
         progress: called repeatedly with a message; a TimeOver that it raises, or a TimeLimit, ends the scan early.
 
     Returns:
-        A `Scan`. Conditions are found modulo primes and confirmed at members; this is evidence, not proof.
+        A `Scan`. Conditions are lifted from primes and confirmed at random members; this is evidence, not proof.
 
     Raises:
         InputError: for unknown parameters, unsuitable primes, or a map that is nowhere defined.
@@ -175,7 +175,7 @@ def scan(
     )
     run.omit(omitted_count, f"the confirmation of {counted(omitted_count, 'component')}")
     components.sort(key=lambda component: component.degrees[::-1])
-    # Growth measured on one component. Another component with the same degrees shares it if further degrees agree, too.
+    # Growth measured on one component; another component with the same degrees shares it if further degrees agree.
     shared_growths: dict[Degrees, DegreeGrowth] = {}
     components, omitted_count = run.apply(
         components,
@@ -190,7 +190,7 @@ def scan(
     }
     components.sort(key=lambda c: (GROWTHS_OF_DEGREES.index(growth_kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
-        analyzed_degrees: set[Degrees] = set()  # the degree sequences of points that were analyzed
+        analyzed_degrees: set[Degrees] = set()  # the degree sequences of analyzed points
 
         def add_verdict(component: Component, _: Callable[[], None]) -> Component:
             is_exponential = component.growth is None or component.growth.growth is Growth.EXPONENTIAL
@@ -235,7 +235,7 @@ class _ScanRun:
     """The state of one scan: its sweeps so far, its budget, and what was omitted."""
 
     family: ScannedFamily
-    seed_prefix: str  # of all random choices
+    seed_prefix: str  # the prefix of the seeds of all random choices
     sweep_options: dict[str, Any]
     budget: Budget
     cost: float  # units of work for one member
@@ -247,7 +247,7 @@ class _ScanRun:
     planned_members: int = 0
 
     def report(self, sentence: str) -> None:
-        """Report the current stage."""
+        """Report the current stage as progress. Raises TimeOver if the scan was interrupted."""
         self.stage = sentence
         if self.is_interrupted:
             raise TimeOver
@@ -268,12 +268,12 @@ class _ScanRun:
         return check
 
     def omit(self, count: int, text: str) -> None:
-        """Record `text`, a phrase on what was omitted, if `count` is not 0."""
+        """Record the phrase `text`, which names what was omitted, if `count` is not 0."""
         if count:
             self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
-        """Sweep modulo the primes of a plan, and drop sweeps with smaller generic degrees than other sweeps."""
+        """Sweep as planned; then drop all sweeps with smaller generic degrees than another sweep."""
         self.planned_members += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
@@ -306,10 +306,10 @@ class _ScanRun:
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def plan_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
-        """Plan random lines, all new and 4 times as many, if a hypersurface was probably missed on the lines so far.
+        """Plan 4 times as many random lines as before, if the lines so far probably missed a hypersurface.
 
         A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
-        plan is empty if none was missed, or if the plan would need more than `max_members` members.
+        plan replaces the earlier sweeps over lines. It is empty if none was missed, or if it is too long.
         """
         sweeps = [sweep for sweep in self.sweeps if sweep.on_lines]
         plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in sweeps]
@@ -322,7 +322,7 @@ class _ScanRun:
     def plan_primes(
         self, components: Sequence[Component], primes: Sequence[int] | None, max_members: float
     ) -> list[Choice]:
-        """Plan further primes if points were probably missed, with at most `max_members` members in total.
+        """Plan further primes, with at most `max_members` members in total, if points were probably missed.
 
         Points were probably missed if there are unassigned members, but fewer than a curve (on random lines: a
         hypersurface) has points. The plan is empty if no points were missed, or if the user gave the primes.
@@ -346,7 +346,7 @@ class _ScanRun:
         function: Callable[..., Any],
         fallback: Callable[[Any], Any] = lambda item: item,
     ) -> tuple[list[Any], int]:
-        """Apply `function` to each item until this share of the budget is spent, and then `fallback`.
+        """Apply `function` to each item until this share of the budget is spent; apply `fallback` to the other items.
 
         Returns the results and the number of items for which `fallback` was used.
         """
@@ -363,7 +363,7 @@ class _ScanRun:
         return results, fallback_count
 
     def components(self, rng: random.Random) -> tuple[list[Component], int]:
-        """Return the components, smaller degrees first, and the number of degree sequences that were not searched."""
+        """Return the components, sorted by degrees, and the number of degree sequences that were not searched."""
         names, classes = self.family.names, sorted({degrees for sweep in self.sweeps for degrees in sweep.classes})
         components, skipped_count = self.apply(
             classes,
@@ -375,9 +375,9 @@ class _ScanRun:
         return list(chain.from_iterable(components)), skipped_count
 
     def with_growth(self, component: Component, shared_growths: dict[Degrees, DegreeGrowth]) -> Component:
-        """Add the growth at a rational member; if there is none, or it is special, the growth of `_fit_growth`.
+        """Add the growth of a rational member; if there is none, or its degrees differ, that of `_fit_growth`.
 
-        Nothing is added if the component shares the growth of another one, or if an iterate is nowhere defined.
+        Nothing is added if the component shares the growth of another component, or if an iterate is nowhere defined.
         """
         family = self.family
         if component.degrees[-1] < 0 or _continues_as(component, shared_growths.get(component.degrees), family):
@@ -385,7 +385,7 @@ class _ScanRun:
         growth = None
         if component.values is not None:
             member, eps_of_member = family.member(component.values)
-            for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps that may be special
+            for attempt in range(_GROWTH_ATTEMPTS):  # singularities depend on a random eps: retry
                 growth = degree_growth(
                     member.map,
                     eps_of_member,
@@ -406,7 +406,7 @@ class _ScanRun:
 def _fit_growth(
     component: Component, family: ScannedFamily, max_degree: int = _MAX_FITTED_DEGREE
 ) -> DegreeGrowth | None:
-    """Return the growth fitted to up to 26 degrees, measured modulo a prime; None if no member was found."""
+    """Return the growth fitted to up to 26 degrees of a random member modulo a prime; None without such a member."""
     expected_degrees = [component.degrees[-1]] * _FITTED_TERMS
     degrees = family.degrees_on(component.equations, expected_degrees, random.Random(family.seed), max_degree)
     if degrees is None:
@@ -416,7 +416,7 @@ def _fit_growth(
 
 
 def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: ScannedFamily) -> bool:
-    """Return whether further degrees agree with the growth on another component with the same first degrees."""
+    """Return whether further degrees agree with those of another component that has the same first degrees."""
     if other_growth is None:
         return False
     growth = _fit_growth(component, family, max(_COMPARED_DEGREE, 2 * component.degrees[-1]))
@@ -428,9 +428,9 @@ def _agree(degrees: Degrees, other_degrees: Degrees) -> bool:
 
 
 def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members: float) -> list[Choice]:
-    """Choose primes, each with a number of random lines or planes in parameter space, or with None for all members.
+    """Choose primes, each with a number and the dimension of random lines or planes, or with None for all members.
 
-    Returns the largest plan that needs at most `max_members` members.
+    Returns the first of several plans that needs at most `max_members` members, or else the last one.
     """
     plans: list[list[Choice]]
     on_lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(parameter_count, _MANY_LINES)]
@@ -452,9 +452,9 @@ def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members
 def _choose_terms(
     map_: MapFamily, parameter_count: int, eps: fmpq | None, terms: int | None, rng: random.Random
 ) -> tuple[int, int, float]:
-    """Return how many iterates are measured, a bound of the lengths of polynomials, and the units per member.
+    """Return the number of iterates to measure, a bound of the lengths of polynomials, and the work per member.
 
-    These numbers are determined from a few members modulo a larger prime.
+    These numbers are determined from the degrees of a few members modulo a larger prime.
     """
     import numpy as np
 
@@ -473,7 +473,7 @@ def _choose_terms(
     if term_count == 0 or (terms is not None and term_count < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
     max_length = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: term_count - 1]])
-    # Compile the kernel now, since Ctrl-C during the compilation loses no results.
+    # Compile the kernel now, when there are no results that Ctrl-C during the compilation could lose.
     family.degrees(np.resize(members, (LONG, parameter_count)), eps, 1, max_length, random.Random(0))
     return term_count, max_length, family.units([1, *degrees[:term_count]])
 
@@ -485,7 +485,7 @@ def _confirm(
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> Component:
-    """Measure random members on a component, and search for a rational member outside of smaller components."""
+    """Measure random members on a component, and search for a rational member outside smaller components."""
     degree_sequences, names = [], family.names
     for _ in range(_CONFIRMING_MEMBERS):
         check()
@@ -505,7 +505,7 @@ def _confirm(
 
 
 def _count_unassigned(sweep: Sweep, components: Sequence[Component]) -> int:
-    """Count the special members modulo a prime that are on no component with their degrees."""
+    """Return the number of special members modulo the prime of a sweep that lie on no component with their degrees."""
     return sum(
         len(points_outside(points, [c for c in components if c.degrees == degrees], sweep.prime))
         for degrees, points in sweep.classes.items()

@@ -1,8 +1,8 @@
-"""Degree sequences of the members of a family modulo a small prime, and the special members with smaller degrees.
+"""The degrees of the iterates of the members of a family modulo a small prime, and the members with smaller degrees.
 
-The degrees of any member are at most the degrees of a generic member. So the largest degrees at each step are the
-generic sequence, and a member with another sequence is *special*. On a line in special position a generic member looks
-special, too. So special members are measured on further lines until none of them turns out to be generic.
+The degrees of any member are at most those of a generic member. So the largest degree at each step gives the generic
+sequence of degrees, and a member with another sequence is *special*. A generic member looks special if its random line
+is in special position. So special members are measured on further lines until none of them turns out to be generic.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from kahanmaps.maps.implicit import MapFamily
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
-Choice = tuple[int, int | None, int]  # a prime, the number of affine subspaces (None: all members), their dimension
+Choice = tuple[int, int | None, int]  # prime, number of random affine subspaces (None: all members), dimension
 
-_BATCH_SIZE = 512  # members
-_MIN_LINES, _MAX_LINES = 3, 12  # the numbers of lines on which a special member is measured
+_BATCH_SIZE = 512  # members measured together
+_MIN_LINES, _MAX_LINES = 3, 12  # bounds for the number of lines on which a special member is measured
 
 
 class TimeOver(Exception):
@@ -33,11 +33,11 @@ class TimeOver(Exception):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The special members modulo one prime: `classes` maps degrees to points.
+    """The special members modulo one prime: `classes` maps degrees d_1, d_2, ... to lists of points.
 
-    `measured` is the number of measured members, and `generic` are the degrees of those that are not special. If not
-    `complete`, only members on random affine subspaces of dimension `width` were measured. `false_alarms` counts
-    generic members that looked special on their first line.
+    `measured` is the number of measured members, and `generic` are the degrees of the generic ones. If not `complete`,
+    only members on random affine subspaces of dimension `width` were measured. `false_alarms` is the number of generic
+    members that looked special on their first line.
     """
 
     prime: int
@@ -55,12 +55,12 @@ class Sweep:
 
     @property
     def special(self) -> dict[Point, Degrees]:
-        """The degrees of each special member."""
+        """A dict that maps each special member (a point) to its degrees."""
         return {point: degrees for degrees, points in self.classes.items() for point in points}
 
 
 def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.Random) -> Iterator[Point]:
-    """Yield all points of GF(p)^count; if `on` = (number, dimension) is given, those of random affine subspaces."""
+    """Yield all points of GF(p)^count, or, if `on` = (number, dimension), the points of random affine subspaces."""
     if on is None:
         yield from product(range(prime), repeat=count)
         return
@@ -89,21 +89,21 @@ def sweep(
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sweep:
-    """Search for the special members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
+    """Search for the special members of a family modulo a prime below 2^13, by the degrees of their iterates.
 
     Args:
         map_: the family; its symbols are the parameters that vary.
         count: the number of parameters that vary. If it is one more than the number of symbols, eps is the last
             parameter, with values other than 0.
         prime: the prime.
-        eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
-        terms: the number of degrees.
-        max_length: as for `Family.degrees`.
+        eps: half the time step (exact), or None for generic eps; eps is then a random element of GF(p^2).
+        terms: the number of iterates whose degrees are measured.
+        max_length: the largest number of coefficients of a polynomial, as in `Family.degrees`.
         on: number and dimension of the random affine subspaces whose members are measured; None for all members.
         units: the units of work that are counted for one member.
         seed: the random seed.
-        jobs: as for `Family.degrees`.
-        check: called repeatedly; may raise TimeOver.
+        jobs: the number of threads, as in `Family.degrees`.
+        check: called repeatedly; it may raise TimeOver.
         progress: called with the number of measured members and the number of all members.
 
     Raises:
@@ -138,7 +138,7 @@ def sweep(
     for line_count in range(1, _MAX_LINES):
         if not len(special_indices):
             break
-        # The degree of an iterate is the largest degree on all lines; a line in special position can only lower it.
+        # The degree of an iterate is the maximum over all lines, since a line in special position can only lower it.
         earlier_degrees, new_degrees = degrees[special_indices], measure([points[i] for i in special_indices])
         degrees[special_indices] = np.maximum(earlier_degrees, new_degrees)
         remaining_indices = special_indices[(degrees[special_indices] != generic_degrees).any(axis=1)]

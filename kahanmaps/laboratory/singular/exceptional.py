@@ -1,16 +1,16 @@
-"""The exceptional hypersurfaces of a map, represented by points and curves through these points, without polynomials.
+"""The exceptional hypersurfaces of a map, represented by points on them and curves through these points.
 
-Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
-contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or
-infinity Z = 0, or a zero of det M'(F(X)). Only det M, det M' and their factors over Q are expanded; they are short. The
-zeros of all forms on a random line modulo a prime are points. Points with the same multiplicities at all steps are
-taken to represent one hypersurface.
+Let M and M' be the matrices of the equations of a map F and of its inverse, both linear in the point X. The image of a
+hypersurface that F contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole (a factor of
+det M(X) is 0), or infinity (Z = 0), or det M'(F(X)) is 0 on it. Only det M, det M' and their factors over Q are
+expanded, since they are short. On a random line modulo a prime, the zeros of these forms are points. Points with the
+same multiplicities at all steps are taken to represent one hypersurface.
 
-Along a curve only the orders of forms are known, and each form is a product of powers of equations of hypersurfaces.
-The exponents are the orders of the form at the points of the hypersurfaces. So linear equations give the multiplicities
-and degrees of the hypersurfaces. If these equations do not suffice, because several hypersurfaces are zeros of one form
-over Q, the forms are factored on surfaces through the curves. On a generic ruled surface an irreducible factor of a
-form stays irreducible and keeps its degree (Bertini). So only polynomials of two variables are factored.
+Along a curve only the orders of forms are known. Each form is a product of powers of equations of hypersurfaces, and
+the exponents are the orders of the form at points of the hypersurfaces. So linear equations give the multiplicities and
+degrees of the hypersurfaces. These equations do not suffice if several hypersurfaces are zeros of one form over Q. Then
+the forms are factored on surfaces through the curves. On a generic ruled surface an irreducible factor of a form stays
+irreducible and keeps its degree (Bertini), so that only polynomials of two variables are factored.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINT
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
-Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
+Kind = tuple[tuple[int, ...], int]  # of a component: its exponents in the forms, and its degree
 
 
 @dataclass(frozen=True)
 class HypersurfaceComponent:
-    """A component of the zeros of forms: its exponents in the forms, its degree and its equation on the surface (t, u).
+    """A component of the zeros of forms on a surface (t, u): its equation, and the `exponents` of this in the forms.
 
-    `order` is the order of the equation along the curve u = 0; None if the component contains the curve.
+    `degree` is the degree of the equation in u, `order` its order in t at u = 0 (None if it vanishes for u = 0).
     """
 
     exponents: tuple[int, ...]
@@ -53,11 +53,11 @@ class HypersurfaceComponent:
 
     @property
     def kind(self) -> Kind:
-        """The exponents and the degree, by which components are distinguished."""
+        """The exponents and the degree; components are distinguished by them."""
         return self.exponents, self.degree
 
     def roots(self, t: int) -> list[int]:
-        """The coordinates u in GF(p) of the points of the hypersurface with this t."""
+        """Return the u in GF(p) for which the point (t, u) lies on the component."""
         p = int(self.equation.context().modulus())
         coefficients = [0] * (self.degree + 1)
         for (i, j), c in self.equation.terms():
@@ -68,10 +68,10 @@ class HypersurfaceComponent:
 def components(
     equation: Equation, forms: Sequence[tuple[Any, bool]], curve: Sequence[nmod_poly], direction: Sequence[int]
 ) -> list[HypersurfaceComponent]:
-    """Return the components of the zeros of forms on the surface curve(t) + u direction, in P^n over GF(p).
+    """Return the components of the zeros of forms on the surface (t, u) -> curve(t) + u direction, over GF(p).
 
-    Each form over Q comes with a flag: whether it is evaluated at the image of the point under the map of the equation.
-    `direction` is random, so that components have the degrees of hypersurfaces. Exact on the surface. Raises BadPrime.
+    `forms` are pairs (form over Q, whether it is evaluated at the image of the point under the map of the equation). If
+    `direction` is random, components have the degrees of hypersurfaces. Exact on the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)
     ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
@@ -101,25 +101,25 @@ def components(
     ]
 
 
-_MIN_LINES, _MAX_LINES = 8, 24  # each modulo its own prime, until two have points of every hypersurface
-_MIN_EQUAL_RESULTS = 4  # equal multiplicities for the same orders of forms, after which they are not computed again
-_DISTINGUISHING_STEPS = 12  # the number of first steps by which hypersurfaces are distinguished
-_MAX_DIGITS = 1000  # in forms that are factored
-_TRIES = 16  # the number of lines on a surface that are searched for a point of a component
-_PRECISION = 8  # of the series for the orders before the first step
-_BITS = 31  # of primes; for larger primes python-flint does not order the factors of multivariate polynomials
+_MIN_LINES, _MAX_LINES = 8, 24  # of lines, each modulo its own prime; two must have points of each hypersurface
+_MIN_EQUAL_RESULTS = 4  # after so many equal multiplicities for the same orders of forms, they are reused
+_DISTINGUISHING_STEPS = 12  # hypersurfaces are distinguished by the multiplicities at so many first steps
+_MAX_DIGITS = 1000  # maximal number of digits of the map if its forms are factored
+_TRIES = 16  # maximal number of lines t = const on a surface that are searched for a point of a component
+_PRECISION = 8  # number of terms of series for the orders before the first step
+_BITS = 31  # bits of primes; for larger primes the factors from python-flint have no fixed order
 
 
-Key = tuple[Any, ...]  # of a hypersurface: contracted or not; orders in the poles, in Z and in all forms; first rows
+Key = tuple[Any, ...]  # of a hypersurface: contracted or not; orders of the poles, Z and all forms; first rows
 
 
 class OrbitDataUnknown(ArithmeticError):
-    """Raised if the multiplicities along the hypersurfaces cannot be determined."""
+    """Raised if the multiplicities of hypersurfaces along orbits cannot be determined."""
 
 
 @dataclass(frozen=True)
 class _Forms:
-    """Z, the factors of det M, and those of det M' at the image: M is the matrix of the map, M' that of its inverse."""
+    """The form Z, the factors of det M, and those of det M', for the matrices M of the map and M' of its inverse."""
 
     poles: tuple[Any, ...]
     images: tuple[Any, ...]
@@ -127,18 +127,18 @@ class _Forms:
 
     @property
     def all(self) -> list[tuple[Any, bool]]:
-        """Pairs of a form and whether it is evaluated at the image, in the order of columns; a form may occur twice."""
+        """Pairs (form, whether it is evaluated at the image), in the order of the columns; a form may occur twice."""
         poles = [(form, False) for form in self.poles]
         return [*poles, *((form, True) for form in self.images), (self.infinity, False)]
 
 
 @dataclass(frozen=True)
 class _Curve:
-    """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
+    """A curve through a point at which a form vanishes, and the functions whose orders are tracked along the curve.
 
-    `transversal` is a random vector that spans surfaces through the curve. `common_exponents` are the exponents of the
-    forms in the common factor of the minors of the equation, which is not part of the map. `limits` bound the number of
-    steps.
+    The curve is the line point + t direction. The random vector `transversal` spans surfaces through the curve. The
+    minors of the equation have a common factor, which is not part of the map; `common_exponents` are the exponents of
+    the forms in it. `limits` bound the number of steps.
     """
 
     equation: Equation
@@ -152,7 +152,7 @@ class _Curve:
     limits: StepLimits
 
     def test_curve(self, tracked: AlongCurves) -> TestCurve:
-        """The curve with the functions tracked along it."""
+        """Return this curve as a TestCurve, along which the functions of `tracked` are tracked."""
         return TestCurve([self.equation], self.point, self.direction, self.limits, tracked)
 
     @property
@@ -167,12 +167,12 @@ class _Curve:
 
     @cached_property
     def initial_orders(self) -> tuple[int, ...]:
-        """The orders of the forms along the curve before the first step."""
+        """The orders of the functions along the curve before the first step."""
         return tuple(function(self.line, _PRECISION) or 0 for function in self.functions)
 
     @cached_property
     def key(self) -> Key:
-        """The key of the hypersurface: whether it is contracted, which forms vanish on it, and the first `rows`.
+        """The key of the hypersurface through the point: whether it is contracted, orders of forms on it, first `rows`.
 
         Raises OrbitDataUnknown if the first step cannot be computed.
         """
@@ -191,12 +191,12 @@ class _Curve:
         )
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `OrbitData` for all steps but the last, with orders of forms instead of hypersurfaces."""
+        """Return the rows of `OrbitData` for all steps but the last, with orders of forms instead of hypersurfaces."""
         powers = divided_powers(run, self.initial_orders, self.common_exponents)
         return tuple((mu, *orders) for mu, orders in zip(powers, self.form_orders(run)[1:], strict=False))
 
     def form_orders(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
-        """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
+        """Return the orders of the poles, of the factors of det M'(F(X)), and of Z, before each step of `run`."""
         size, form_orders = len(self.forms.poles), []
         run_orders = [self.initial_orders, *(step.orders for step in run)]
         powers = divided_powers(run, self.initial_orders, self.common_exponents)
@@ -206,11 +206,11 @@ class _Curve:
         return form_orders
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
-        """Return the components of the forms on the surface that `transversal` spans through `curve`."""
+        """Return the components of the zeros of the forms on the surface that `transversal` spans through `curve`."""
         return components(self.equation, self.forms.all, curve, self.transversal)
 
     def curve_through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return this curve, moved to a point of a component on the surface of `curve`. Raises OrbitDataUnknown."""
+        """Return this curve, moved to a point of a component on a surface through `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple(
@@ -221,7 +221,7 @@ class _Curve:
 
     @cached_property
     def components_with_points(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
-        """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
+        """All components on a plane, each with a curve through one of its points; empty if a component has no point."""
         try:
             return [(component, self.curve_through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:
@@ -230,12 +230,12 @@ class _Curve:
 
 @dataclass(frozen=True)
 class _Orders:
-    """The rows of `OrbitData`: the orders of hypersurfaces along a curve, computed from the orders of forms.
+    """The orders of hypersurfaces along a curve (the rows of `OrbitData`), computed from the orders of forms.
 
-    `exponents` is the matrix of the exponents of hypersurfaces in the forms. Its `left_inverse` turns orders of forms
-    into orders of hypersurfaces (and these are checked). If there is none (None), forms are factored on surfaces:
-    `keys_of_kind` has the keys of the hypersurfaces with components of a kind, `keys` all keys in the order of the
-    hypersurfaces, and `multiplicities` the orders of hypersurfaces by the number of steps.
+    The matrix `exponents` has a row for each form and a column for each hypersurface. Its `left_inverse` maps orders of
+    forms to orders of hypersurfaces, which are then checked. If the columns are dependent, it is None, and forms are
+    factored on surfaces: `keys_of_kind` has the keys of the hypersurfaces with components of a kind. `keys` are all
+    keys, in the order of the columns, and `multiplicities` caches the orders of hypersurfaces by step.
     """
 
     curve: _Curve
@@ -247,11 +247,11 @@ class _Orders:
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """The functions tracked along the curve."""
+        """The functions whose orders are tracked along the curve."""
         return self.curve.functions
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the rows of all steps except the last. Raises OrbitDataUnknown."""
+        """Return the rows (mu, orders of hypersurfaces) of all steps except the last. Raises OrbitDataUnknown."""
         rows, powers = [], divided_powers(run, self.curve.initial_orders, self.curve.common_exponents)
         for t, (mu, orders_of_forms) in enumerate(zip(powers, self.curve.form_orders(run)[1:], strict=False)):
             column = fmpq_mat(len(orders_of_forms), 1, list(orders_of_forms))
@@ -268,11 +268,11 @@ class _Orders:
         return tuple(rows)
 
     def _orders_on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
-        """Return orders of hypersurfaces along a curve, from factors of forms on a surface. Raises OrbitDataUnknown."""
+        """Return orders of hypersurfaces along a curve, from components on a surface. Raises OrbitDataUnknown."""
         nu, max_order = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
         if max_order == 0:
             return nu
-        # Equal orders of forms often have the same multiplicities. If not, take the fewest terms that suffice.
+        # Equal orders of forms often come from equal multiplicities. Otherwise try the fewest terms first.
         columns = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
         if len(columns) >= _MIN_EQUAL_RESULTS and all(column == columns[0] for column in columns):
             return columns[0]
@@ -304,9 +304,9 @@ def exceptional_hypersurfaces(
 ) -> tuple[int, list[Hypersurface]]:
     """Return the degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
-    Hypersurfaces with the same orders count as one. The equations of the map and of its inverse must be linear in the
-    point. Points modulo random primes are followed. If the forms do not distinguish the hypersurfaces, the degrees are
-    set to 0, and orders of forms replace orders of hypersurfaces. Raises OrbitDataUnknown.
+    Hypersurfaces with the same orders of forms at the first steps count as one. The equations of the map and of its
+    inverse must be linear in the point. Orbits of points modulo random primes are computed. If forms do not distinguish
+    the hypersurfaces, all degrees are 0, and orders of forms replace orders of hypersurfaces. Raises OrbitDataUnknown.
     """
     map_at_eps = map_.at(eps)
 
@@ -330,13 +330,13 @@ def exceptional_hypersurfaces(
         degree, zeros, curves = _search_line(map_at_prime.factors[0], forms, functions, limits, rng)
         for curve in curves:
             curves_by_key.setdefault(curve.key, []).append(curve)
-        # A hypersurface that splits over an extension of Q has points in GF(p) for some primes p only.
+        # A hypersurface that splits over an extension of Q may have points in GF(p) only for some primes p.
         if i >= _MIN_LINES and all(len({curve.prime for curve in group}) > 1 for group in curves_by_key.values()):
-            curves_by_key = dict(sorted(curves_by_key.items()))  # an order that does not depend on random choices
+            curves_by_key = dict(sorted(curves_by_key.items()))  # the order must not depend on random choices
             try:
                 return degree, _find_patterns(curves_by_key, forms, degree, zeros)
             except OrbitDataUnknown:
-                continue  # some hypersurface has no points modulo the primes so far
+                continue  # some hypersurface may have no points modulo the primes so far
     if limits.budget.is_spent or any(len({curve.prime for curve in group}) < 2 for group in curves_by_key.values()):
         raise OrbitDataUnknown("the exceptional hypersurfaces could not be distinguished by random points")
     curves_with_functions: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
@@ -348,7 +348,7 @@ def exceptional_hypersurfaces(
 def _find_patterns(
     curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int
 ) -> list[Hypersurface]:
-    """Return the exceptional hypersurfaces. Raises OrbitDataUnknown, also if the sum of all degrees is not `zeros`."""
+    """Return the exceptional hypersurfaces. Raises OrbitDataUnknown, e.g. if the sum of all degrees is not `zeros`."""
     keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     form_degrees = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
@@ -373,7 +373,7 @@ def _find_patterns(
                 pairs[curve.key].append((curve, _Orders(curve, exponents, None, keys, keys_of_kind)))
     if exponents * degrees != total_degrees or sum(degrees.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
-    # Orders in hypersurfaces that are not contracted are not needed.
+    # Only the orders of contracted hypersurfaces are needed.
     columns = [k for k, key in enumerate(keys) if key[0]]
     return _follow(pairs, [int(degree) for degree in degrees.entries()], columns)
 
@@ -381,7 +381,7 @@ def _find_patterns(
 def _follow(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], degrees: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
-    """Return the exceptional hypersurfaces with these columns of their patterns, modulo two primes."""
+    """Return the exceptional hypersurfaces; their patterns have these columns, and must agree modulo two primes."""
     hypersurfaces = []
     for degree, (key, curves_with_functions) in zip(degrees, curves.items(), strict=True):
         if key[0]:
@@ -409,9 +409,9 @@ def _follow(
 def _search_line(
     map_: ElementaryMap, forms: _Forms, functions: tuple[Function, ...], limits: StepLimits, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
-    """Return the degree of the map on a random line, and the number of zeros of the forms over the closure of GF(p).
+    """Return (degree of the image of a random line, number of zeros of the forms on the line, curves).
 
-    Also returns the zeros in GF(p), each with the line as a curve through it.
+    Zeros are counted over the algebraic closure of GF(p). For each zero in GF(p) there is a curve.
     """
     equation, p = map_.equation, map_.field.characteristic
     base, direction, transversal = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
@@ -423,7 +423,7 @@ def _search_line(
     degree = max(int(entry.degree()) for entry in image)
     values = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
     image_values = [evaluate(form, map_.field, image) for form in forms.images]
-    point_exponents = []  # the exponent of each form in the common factor
+    point_exponents = []  # the exponent of each form in the common factor of the minors
     for value in values:
         quotient, exponent = common_factor, 0
         while value.degree() > 0 and (quotient % value).is_zero():

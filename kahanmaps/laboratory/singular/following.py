@@ -1,8 +1,8 @@
-"""The singularity pattern of an exceptional hypersurface: the multiplicities along its images after 1, 2, ... steps.
+"""The singularity pattern of an exceptional hypersurface: multiplicities at its images after 1, 2, ... steps.
 
-A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out:
-its exponent mu is the multiplicity of the indeterminacy locus at the image. The multiplicities nu of the critical
-hypersurfaces are the orders of their forms along the image. Series are computed until the pattern has settled.
+A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out.
+Its exponent mu is the multiplicity of the indeterminacy locus at the image. The multiplicities nu of the critical
+hypersurfaces are the orders in t of their forms along the image. Steps are computed until the pattern settles.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from kahanmaps.laboratory.singular.jets import (
 )
 from kahanmaps.maps.equation import Equation
 
-_MAX_PRECISION = 4096  # terms of a series
-# Numbers of terms of long series: the work of a step is at least proportional to the number.
+_MAX_PRECISION = 4096  # maximal number of terms of a series
+# Limits for the number of terms of series, the second one for patterns that need more terms than the first allows.
 _FIRST_PRECISION, _LONG_PRECISION = 512, 2048
-_MIN_ROWS = 8  # at least so many last rows must be zero, or so many rows satisfy a recurrence
-_CONFIRMING_ORDERS = 4  # orders that must satisfy a recurrence, beyond the orders that determine it
-_STEPS_AFTER_FIRST = 100  # steps for which a confined hypersurface is followed after the first steps
-_SHOWN_EVENTS = 6  # in a sentence
+_MIN_ROWS = 8  # a pattern settles if at least so many last rows are zero, or so many rows satisfy a recurrence
+_CONFIRMING_ORDERS = 4  # number of terms that must satisfy a recurrence, beyond those that determine it
+_STEPS_AFTER_FIRST = 100  # number of steps, after the first steps, for which a confined hypersurface is followed
+_SHOWN_EVENTS = 6  # maximal number of events in a sentence
 
 Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
 @dataclass(frozen=True)
 class OrbitData:
-    """A singularity pattern: for steps 1, 2, ... the power mu of t divided out and the orders nu_k of hypersurfaces.
+    """A singularity pattern: for each step the power mu of t that is divided out and the orders nu_k of hypersurfaces.
 
-    If `is_settled`, the rows (mu, nu_1, ...) are known for all steps. Either the columns satisfy the `recurrences`,
-    given by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th
-    hypersurface, whose pattern continues this one. Or all later rows up to the step `followed` are zero, except for
-    unknown multiplicities in the hypersurfaces of `eventually_in`, in which the images lie again and again.
+    If `is_settled`, the rows (mu, nu_1, ...) are known for all steps. Either the columns satisfy `recurrences`, given
+    by characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the hypersurface j (from 0),
+    whose pattern continues this one. Or all later rows up to the step `followed` are zero, except for unknown
+    multiplicities of the hypersurfaces `eventually_in`, in which images lie again and again.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -60,19 +60,19 @@ class OrbitData:
 
     @property
     def compared(self) -> tuple[object, ...]:
-        """The rows and other data that must agree for two points on one hypersurface."""
+        """The rows and other data that must agree for two points of the same hypersurface."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property
     def settled_at(self) -> int:
-        """The step after which all rows follow from earlier ones."""
+        """The step after which all later rows follow from earlier ones."""
         if self.recurrences:
             return max(int(characteristic.degree()) for characteristic in self.recurrences)
         return len(self.rows)
 
     @property
     def sentences(self) -> list[str]:
-        """Two phrases: on steps at which the degree drops, and on exceptional hypersurfaces in which images lie."""
+        """Two phrases: on steps at which the degree drops; on the exceptional hypersurfaces in which images lie."""
         rows = self.rows[: self.settled_at]
         drops = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
         incidences = [
@@ -88,7 +88,7 @@ class OrbitData:
         return [drops_text, f"its image lies in {_shorten(incidences) or 'no exceptional hypersurface'}"]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "degree_drops": [row[0] for row in self.rows],
             "incidences": [list(row[1:]) for row in self.rows],
@@ -101,13 +101,13 @@ class OrbitData:
         }
 
     def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
-        """Return the data with the columns of these hypersurfaces only."""
-        columns = [0, *(1 + k for k in hypersurfaces)]  # mu, and nu for each of the hypersurfaces
+        """Return the data with mu and the columns of these hypersurfaces only."""
+        columns = [0, *(1 + k for k in hypersurfaces)]  # the columns of mu and of the given hypersurfaces
         rows = tuple(tuple(row[k] for k in columns) for row in self.rows)
         return replace(self, rows=rows, recurrences=tuple(self.recurrences[k] for k in columns if self.recurrences))
 
     def generating_function(self, column: int) -> Fraction:
-        """Return the generating function of a column (entries times z, z^2, ...); any `continues_as` is ignored.
+        """Return the generating function of a column (the entries times z, z^2, ...), without a continuation.
 
         >>> OrbitData(((1,), (2,), (4,)), (fmpz_poly([-2, 1]),)).generating_function(0)
         (x, (-2)*x + 1)
@@ -130,23 +130,23 @@ NO_ORBIT_DATA = OrbitData(())
 
 
 class AlongCurves(Protocol):
-    """Functions whose orders are measured along a curve, and the rows of `OrbitData` that follow from these orders."""
+    """Functions whose orders are measured along a curve, and the rows of `OrbitData` computed from these orders."""
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """The functions in the form that `images_of_curve` takes."""
+        """The functions, as arguments of `images_of_curve`."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the power of t that is divided out and the orders of hypersurfaces, for all or the first steps."""
+        """Return rows (power of t that is divided out, orders of hypersurfaces) for all steps, or all but the last."""
 
 
 @dataclass(frozen=True)
 class TrackedFunctions:
-    """The functions whose orders are measured along curves through a hypersurface.
+    """Functions whose orders are measured along curves through a hypersurface.
 
-    `common_exponents` are the exponents of the functions in the common factor of the minors of the equation, which is
-    not part of the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
-    first `critical` functions belong to exceptional hypersurfaces.
+    The minors of the equation of the map have a common factor, which is not part of the map; `common_exponents` are the
+    exponents of the functions in this factor. `initial_orders` are the orders on the hypersurface: 1 for its own form,
+    0 for others. The first `critical` functions are forms of exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
@@ -155,7 +155,7 @@ class TrackedFunctions:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the rows of `OrbitData`; without functions, `common` and `denominator` of each step instead."""
+        """Return the rows of `OrbitData`; without functions, return `common` and `denominator` of each step instead."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided_powers(run, self.initial_orders, self.common_exponents), run, strict=True)
@@ -163,10 +163,10 @@ class TrackedFunctions:
 
 
 def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], common_exponents: Sequence[int]) -> list[int]:
-    """Return for each step the power of t that the map divides out, not counting the common factor of minors.
+    """Return, for each step, the power of t that is divided out, without that in the common factor of the minors.
 
-    The common factor of the minors of the equation is a product of the functions whose orders are measured, with the
-    `common_exponents`; it is not part of the map. `initial_orders` are the orders before the first step.
+    This factor is not part of the map. It is a product of the functions whose orders are measured; their exponents are
+    `common_exponents`. `initial_orders` are the orders of the functions before the first step.
     """
     orders_before = [initial_orders, *(step.orders for step in run)]
     return [
@@ -180,12 +180,12 @@ NOTHING_TRACKED = TrackedFunctions()
 
 @dataclass(frozen=True)
 class StepLimits:
-    """The number of steps for which hypersurfaces are followed: `first_steps` along series, and `max_steps` in all.
+    """Limits for the number of steps: `first_steps` steps with series at the beginning, and `max_steps` steps in all.
 
-    A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
-    point of the image is followed, which is fast. If this point reaches the locus, slow series are computed, for at
-    most `series_steps` steps. If multiplicities repeat and every step uses up terms, the series must be long, and the
-    limit is `repeating_steps`. The computation stops when the `budget` is spent.
+    A singularity can be confined only where the image lies in the indeterminacy locus. After the first steps only the
+    orbit of a point of the image is computed, which is fast. If this point reaches the locus, series are computed
+    again, which is slow, for at most `series_steps` steps. If multiplicities repeat and every step loses terms of the
+    series, the limit is `repeating_steps`. The computation stops when the `budget` is spent.
     """
 
     first_steps: int
@@ -197,7 +197,7 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class TestCurve:
-    """The curve point + t direction over GF(p), with the equations of the map and the functions tracked along it."""
+    """The curve point + t direction over GF(p), the equations of a map, and the functions tracked along its images."""
 
     equations: Sequence[Equation]
     point: Sequence[int]
@@ -213,9 +213,9 @@ class TestCurve:
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), max_precision: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """Return steps along series of sufficient length, and whether budget and precision allowed all `count` of them.
+        """Return (steps, whether all `count` steps were possible within budget and precision); series are long enough.
 
-        If tangents are given, no function is tracked.
+        If `tangents` are given, no function is tracked.
         """
         precision = 8
         functions = () if tangents else self.tracked.functions
@@ -234,16 +234,16 @@ class TestCurve:
                 precision = min(max_precision, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
     def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
-        """Return `count` steps. Raises PrecisionTooLow if fewer are possible."""
+        """Return `count` steps. Raises PrecisionTooLow if only fewer steps are possible within budget and precision."""
         run, is_complete = self.steps(count, tangents)
         if not is_complete:
             raise PrecisionTooLow
         return tuple(run)
 
     def orbit_data_until_return(self, return_step: int) -> OrbitData:
-        """Return the orders along a curve whose image is a hypersurface again after the step `return_step`.
+        """Return the orbit data along a curve; its hypersurface has a hypersurface as image at step `return_step`.
 
-        If the image is a critical hypersurface after some step, the pattern of the latter gives the later orders.
+        If an image is a critical hypersurface, later orders are those of the pattern of this hypersurface.
         """
         step_count = self.limits.first_steps
         max_steps = min(self.limits.max_steps, step_count + _STEPS_AFTER_FIRST)
@@ -256,15 +256,15 @@ class TestCurve:
                         raise NotGeneric("a point on several critical hypersurfaces")
                     return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
             event, last_step = self._next_event(run[-1].limit, len(run), max_steps)
-            if event is None or not self.tracked.functions:  # no orders are needed beyond the next indeterminacy point
+            if event is None or not self.tracked.functions:  # no orders are needed after the return
                 return OrbitData(rows[:return_step], (), last_step, True)
             step_count = event
 
     def orbit_data(self, first_steps: int) -> OrbitData:
-        """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
+        """Return the orbit data along the curve; steps are added until the data are settled or a limit is reached.
 
-        `first_steps` is the number of steps to begin with. The image may move on a critical hypersurface for many steps
-        before it meets another one, so a recurrence is accepted only if it holds for as long as curves are followed.
+        The computation begins with `first_steps` steps. The image may stay in a critical hypersurface for many steps
+        before it meets another one; so a recurrence is accepted only if it holds for all steps that the limits allow.
         """
         step_count, limits, max_precision = first_steps, self.limits, _FIRST_PRECISION
         while True:
@@ -281,7 +281,7 @@ class TestCurve:
                 recurrence is not None and len(rows) >= max(_MIN_ROWS, 2 * recurrence.order + _CONFIRMING_ORDERS)
                 for recurrence in recurrences
             )
-            is_cut = not is_complete and not limits.budget.is_spent  # the largest precision did not suffice
+            is_cut = not is_complete and not limits.budget.is_spent  # the maximal precision did not suffice
             is_long = len(run) >= min(limits.max_steps, limits.series_steps)
             if (
                 rows
@@ -307,10 +307,10 @@ class TestCurve:
             step_count = step_limit
 
     def _find_incidences(self, point: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the critical hypersurfaces that the orbit of a point meets, or None if the orbit is not periodic.
+        """Return the indices of the critical hypersurfaces that a periodic orbit meets; None if it is not periodic.
 
-        Also returns None if a point of the orbit is an indeterminacy point, where a power of t would be divided out.
-        The map is evaluated along lines in the direction of the curve.
+        Also returns None if the orbit contains an indeterminacy point, where a power of t would be divided out. To
+        detect such points, the map is evaluated along lines in the direction of the curve.
         """
         tracked, p = self.tracked, self.prime
         if not isinstance(tracked, TrackedFunctions) or isinstance(self.equations, MapSequence):
@@ -333,9 +333,9 @@ class TestCurve:
         return None
 
     def _next_event(self, limit: Sequence[int], first_step: int, max_step: int) -> tuple[int | None, int]:
-        """Follow a point to the next step at which the map is undefined or a tracked function is zero.
+        """Iterate a point until the next step at which the map is undefined or a tracked function is zero.
 
-        Returns this step (None if there is no such step) and the step up to which the point was followed.
+        Returns this step (None if it is not reached) and the last computed step, at most `max_step`.
         """
         point: Sequence[int] = limit
         for step in range(first_step + 1, max_step + 1):
@@ -352,6 +352,6 @@ class TestCurve:
 
 
 def _normalize_point(point: Sequence[int], p: int) -> tuple[int, ...]:
-    """Return the coordinates of a point, divided by the first nonzero coordinate."""
+    """Return the homogeneous coordinates of a point, divided by the first nonzero one."""
     inverse = pow(next(x for x in point if x), -1, p)
     return tuple(x * inverse % p for x in point)

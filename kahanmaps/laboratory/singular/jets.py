@@ -1,8 +1,8 @@
-"""Images of curves in projective space, with their tangent directions, under a map over GF(p)((t)).
+"""Images of curves in projective space, and of tangent directions along them, under a map over GF(p)((t)).
 
-Coordinates are power series in t, known up to a power of t. They are homogeneous, so that only common powers of t are
-divided out. The differential is computed from neighbours of the curve, which are shifted by t^N in tangent directions:
-t^N acts like a number whose square is 0, and the terms from t^N to t^2N give the derivative.
+Homogeneous coordinates are power series in t, known up to a power of t; common powers of t are divided out. The
+differential is computed from neighbours of the curve: the curve plus t^N times a tangent direction. Modulo t^2N the
+square of t^N is 0, so the terms from t^N on of the image of a neighbour give the derivative.
 """
 
 from __future__ import annotations
@@ -20,42 +20,42 @@ from kahanmaps.algebra.polynomial_work import product_units, roots_units, series
 from kahanmaps.algebra.work import count_work
 from kahanmaps.maps.equation import Equation
 
-# Returns the order in t of a function along a curve with these coordinates; None if it is at least the precision.
+# (coordinates of a curve, precision) -> order in t of a function along the curve; None if it is not below the precision
 Function = Callable[[Sequence[nmod_poly], int], int | None]
 
 
-Pivot = tuple[int, int, int]  # an exponent of t, a row and a column
-_MIN_ELIMINATION_DIMENSION = 4  # the least dimension in which elimination needs fewer operations than minors
-_LOW_PRECISION = 4  # terms that usually suffice to see the order of a function
+Pivot = tuple[int, int, int]  # exponent of t, row and column of the entry
+_MIN_ELIMINATION_DIMENSION = 4  # from this dimension on elimination needs fewer operations than minors
+_LOW_PRECISION = 4  # number of terms that usually determine the order of a function
 
 
 class PrecisionTooLow(ArithmeticError):
-    """Raised if the series have too few terms; the caller starts again with a higher precision."""
+    """Raised if series have too few terms; the caller repeats the computation with more terms."""
 
 
 class NotGeneric(ArithmeticError):
-    """Raised if the point is in special position on its hypersurface; the caller takes another point."""
+    """Raised if a point is in special position on its hypersurface; the caller takes another point."""
 
 
 class MapSequence(tuple[Equation, ...]):
-    """The maps of a composition: equations that are applied periodically, one in each step.
+    """The equations of the factors of a composition, applied periodically, one in each step.
 
-    A function belongs to one of the maps. It is evaluated first after the number of steps given in `offsets`, and then
-    after every period of the composition.
+    Each tracked function belongs to one factor. It is evaluated at the steps offset, offset + k, offset + 2 k, ... for
+    k factors; `offsets` has the offset of each function.
     """
 
     offsets: tuple[int, ...] = ()
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of a step, counted from 1: one equation for `MapSequence`, otherwise all equations."""
+    """Return the equations of a step (counted from 1): one equation of a `MapSequence`, otherwise all equations."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, MapSequence) else equations
 
 
 def orders_of(
     equations: Sequence[Equation], functions: Sequence[Function], step: int, X: Sequence[nmod_poly], precision: int
 ) -> list[int | None]:
-    """Return the orders of functions along a curve after a step; 0 for a function that belongs to another map."""
+    """Return the orders of functions along a curve X after a step; 0 for functions that belong to another factor."""
     if isinstance(equations, MapSequence):
         are_due = [(step - offset) % len(equations) == 0 for offset in equations.offsets]
         return [function(X, precision) if is_due else 0 for function, is_due in zip(functions, are_due, strict=True)]
@@ -63,7 +63,7 @@ def orders_of(
 
 
 def valuation(series: nmod_poly, precision: int) -> int | None:
-    """Return the exponent of the first nonzero term below t^precision; None if all these terms are 0.
+    """Return the exponent of the first nonzero term of a series below t^precision; None if all these terms are 0.
 
     >>> valuation(nmod_poly([0, 0, 3], 7), 5)
     2
@@ -73,16 +73,16 @@ def valuation(series: nmod_poly, precision: int) -> int | None:
 
 @dataclass(frozen=True)
 class JetStep:
-    """The result of one step: valuations in t (None: at least the precision), and the rank of the differential.
+    """The result of a step of a curve: valuations in t (None: the precision or more), and the rank of the differential.
 
     Attributes:
-        common: the power of t divided out of all coordinates, or for several factors out of their composed minors.
-        pole: the valuation of Z at the image, where the least valuation of all coordinates is 0.
+        common: the power of t divided out of all coordinates (for several factors, of their composed minors).
+        pole: the valuation of the coordinate Z at the image; the least valuation of all coordinates is 0.
         denominator: the valuation of det(I - eps f') at the point before the step.
-        rank: the rank of the differential of the map from the hypersurface to the limits of its points.
-        limit: the limit of the point for t -> 0, after the step.
-        orders: the valuations of the requested functions at the image.
-        curve: the known terms of the image itself; empty if no functions were requested.
+        rank: the rank of the differential of the map from the hypersurface to the limits of the images of its points.
+        limit: the limit of the image of the curve for t -> 0.
+        orders: the valuations of the requested functions along the image.
+        curve: the known terms of the image of the curve; empty if no functions were requested.
     """
 
     common: int
@@ -102,13 +102,13 @@ def images_of_curve(
     tangents: Sequence[Sequence[int]] = (),
     functions: Sequence[Function] = (),
 ) -> Iterator[JetStep]:
-    """Yield all successive steps of the curve point + t direction, with its neighbours in the tangent directions.
+    """Yield the successive steps of the curve point + t direction and of its neighbours in tangent directions.
 
-    Exact. The equations of the map are over GF(p); points and vectors are residues (X : Z). Give either `tangents`, to
-    compute the rank, or `functions`, to compute their orders. Raises PrecisionTooLow and NotGeneric.
+    Exact. The equations of the map are over GF(p); points and vectors are coordinates (X : Z) in GF(p). Give either
+    `tangents`, to compute the rank, or `functions`, to compute their orders. Raises PrecisionTooLow and NotGeneric.
     """
     prime = equations[0].over.characteristic
-    shift = precision if tangents else 0  # N: neighbours differ by multiples of t^N
+    shift = precision if tangents else 0  # N: neighbours are curve + t^N tangent
     line = [nmod_poly([x, v], prime) for x, v in zip(point, direction, strict=True)]
     shift_power = nmod_poly([0] * shift + [1], prime)
     curves = [line, *([x + shift_power * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
@@ -123,7 +123,7 @@ def images_of_curve(
                 raise PrecisionTooLow
             precision -= common_power
             curves = [[entry.truncate(shift + precision) for entry in curve] for curve in images]
-            # The differences between the coordinates of the neighbours and of the curve.
+            # The coordinates of the neighbours minus those of the curve.
             differences = [b - a for neighbour in curves[1:] for a, b in zip(curves[0], neighbour, strict=True)]
             if not all(difference.truncate(shift).is_zero() for difference in differences):
                 raise NotGeneric("the valuation differs at neighbouring points")
@@ -135,7 +135,7 @@ def images_of_curve(
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
         rank = 0
-        if tangents:  # the rank at t = 0; in projective space tangent vectors are taken modulo the limit point
+        if tangents:  # the rank at t = 0; tangent vectors in projective space are vectors modulo the limit point
             entries = [*limit, *(int(difference[shift]) for difference in differences)]
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         valuations = tuple(order or 0 for order in orders)
@@ -148,10 +148,10 @@ def images_of_curve(
 def _image_of_curve(
     equation: Equation, X: Sequence[nmod_poly], precision: int, known_terms: int, pivots: list[Pivot]
 ) -> list[nmod_poly]:
-    """Return the image of a curve known below t^known_terms, divided by a common power of t.
+    """Return the image of a curve X known below t^known_terms, divided by a common power of t.
 
-    An empty list `pivots` is filled with the pivots that are used; they determine this power. For the neighbours of a
-    curve the pivots of the curve must be given. Raises PrecisionTooLow.
+    An empty list `pivots` is filled with the pivots that are used; they determine this power. For a neighbour of a
+    curve, `pivots` must be those of the curve. Raises PrecisionTooLow.
     """
     zero, units_per_product = X[0] * 0, product_units(known_terms, known_terms)
     count_work(row_units(equation, known_terms))
@@ -175,12 +175,12 @@ def kernel(
     pivots: list[Pivot],
     check: Callable[[], None] = lambda: None,
 ) -> list[nmod_poly]:
-    """Return the kernel of an n x (n + 1) matrix of series known below t^known_terms, without a common power of t.
+    """Return the kernel of an n x (n + 1) matrix of series known below t^known_terms, with no common power of t.
 
-    The minors are the kernel times t^s, with s the sum of the exponents of all `pivots`; missing pivots are chosen and
-    appended. A pivot has the least exponent of all remaining entries, so that only its power of t is divided out. Its
-    exponent must be below `precision`: neighbours of a curve, which differ from it only from t^precision on, then have
-    the same pivots. `check` is called before each row, and may raise. Raises PrecisionTooLow.
+    The minors are, up to a unit, the kernel times t^s, with s the sum of the exponents of all `pivots`. Missing pivots
+    are chosen and appended. A pivot has the least exponent of all remaining entries, so that only its power of t is
+    divided out. Its exponent must be below `precision`; then neighbours of a curve, which differ from it only from
+    t^precision on, have the same pivots. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
     units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
@@ -191,7 +191,7 @@ def kernel(
         power, i, j = pivots[k]
         free_rows.remove(i)
         free_columns.remove(j)
-        # The factor 2 counts the products for the kernel as well.
+        # The factor 2 includes the products of the back substitution.
         count_work(units_per_inversion + units_per_product * len(free_columns) * 2)
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known_terms - power)
         scaled_row = {c: rows[i][c].right_shift(power).mul_low(inverse, known_terms - power) for c in free_columns}
@@ -213,9 +213,9 @@ def kernel(
 def _search_pivot(
     rows: Sequence[Sequence[nmod_poly]], free_rows: Sequence[int], free_columns: Sequence[int], precision: int
 ) -> Pivot:
-    """Return the entry with the least exponent of t in these rows and columns. Raises PrecisionTooLow if all are 0."""
+    """Return the entry of least order in t in the free rows and columns. Raises PrecisionTooLow if all are 0."""
     pivot: Pivot | None = None
-    # Rows with few nonzero entries come first, since they create the fewest new nonzero entries.
+    # Rows with few nonzero entries come first: as pivot rows they create the fewest new nonzero entries.
     for i in sorted(free_rows, key=lambda i: sum(not rows[i][j].is_zero() for j in free_columns)):
         for j in free_columns:
             power = valuation(rows[i][j], precision)
@@ -231,8 +231,8 @@ def _search_pivot(
 def roots_modulo(polynomial: nmod_poly) -> list[int]:
     """Return the distinct roots in GF(p) of a nonconstant polynomial.
 
-    A gcd gives the product of the distinct linear factors, which is then factored: at high degrees a complete
-    factorization of the polynomial would take a hundred times as long.
+    The gcd with t^p - t is the product of the distinct linear factors; only this product is factored. At high degrees a
+    complete factorization of the polynomial would take a hundred times as long.
 
     >>> sorted(roots_modulo(nmod_poly([1, 0, 1], 5) * nmod_poly([2, 0, 1], 5)))
     [2, 3]
@@ -245,13 +245,13 @@ def roots_modulo(polynomial: nmod_poly) -> list[int]:
 
 
 def modulo(form: Any, field: PrimeField) -> nmod_mpoly:
-    """Return a form over Q modulo a prime. Raises BadPrime."""
+    """Return a form over Q, reduced modulo the prime of `field`. Raises BadPrime."""
     context = nmod_mpoly_ctx.get(form.context().names(), modulus=field.prime, ordering=Ordering.degrevlex)
     return context.from_dict({exponents: int(field.convert(c)) for exponents, c in form.terms()})
 
 
 def form_order(form: Any, field: PrimeField) -> Function:
-    """Return the function that gives the order of a form over Q in (X : Z) along curves modulo a prime.
+    """Return the function that computes the order of a form over Q, in (X : Z), along curves modulo a prime.
 
     Raises BadPrime.
     """
@@ -264,7 +264,7 @@ def form_order(form: Any, field: PrimeField) -> Function:
         count_work(2 + len(terms) / 5)
         if int(modular_form(*(int(entry[0]) for entry in X))):
             return 0
-        if precision > _LOW_PRECISION:  # most orders are so small that few terms suffice
+        if precision > _LOW_PRECISION:  # most orders are below 4, for which few terms suffice
             low_order = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
             if low_order is not None:
                 return low_order
@@ -284,12 +284,12 @@ def form_order(form: Any, field: PrimeField) -> Function:
 
 
 def row_units(equation: Equation, length: int) -> float:
-    """Return the units of work for the matrix of an equation at polynomials or series of this length."""
+    """Return the units of work to evaluate the matrix of an equation at polynomials or series of this length."""
     return 1 + sum(len(entry) for row in equation.terms for entry in row) * (0.5 + length / 100)
 
 
 def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] | None:
-    """Return the image of a point of projective space modulo p; None at an indeterminacy point."""
+    """Return the image of a point of projective space over GF(p); None at an indeterminacy point."""
     prime, X = equations[0].over.characteristic, list(point)
     for equation in equations:
         count_work(row_units(equation, 1) + equation.dim**2 / 2)

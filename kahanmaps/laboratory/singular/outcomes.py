@@ -1,12 +1,12 @@
-"""The images of a hypersurface under iterates of the map, along curves through points modulo large primes.
+"""The images of a hypersurface under the iterates of a map, along curves through points modulo large primes.
 
 Source: grammaticos-ramani-papageorgiou-1991.
 
 If the polynomials of hypersurfaces are too large to be expanded, their zeros on a random line give points of the
-hypersurfaces. For an equation M(x) x~ = r(x) that is linear in both points, det dPhi(x) is det M'(x~)/det M(x) up to
-its sign, where M' is the matrix of the inverse map. So away from poles and infinity the exceptional hypersurfaces are
-the zeros of E(X) = det M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one variable. Source:
-petrera-suris-2016, eq. (Jac).
+hypersurfaces. Let the equation M(x) x~ = r(x) of a map x~ = Phi(x) be linear in both points. Then det dPhi(x) is
+det M'(x~)/det M(x) up to sign, with the matrix M' of the inverse map. So away from poles and infinity the exceptional
+hypersurfaces are the zeros of E(X) = det M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one
+variable. Source: petrera-suris-2016, eq. (Jac).
 """
 
 from __future__ import annotations
@@ -49,19 +49,19 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapFamily
 
-_MAX_TANGENT_PRECISION = 1024  # terms of series with tangents
-_KEY_PRECISION = 64  # terms of the series by which points are distinguished
-_TRIES = 40  # random primes
-_MIN_LINES = 6  # lines that are searched for critical points; more lines as long as a multiplicity has no point
-_POINTS = 2  # of each hypersurface, modulo different primes
-MAX_CHARACTERS = 60  # characters of a polynomial in a sentence
+_MAX_TANGENT_PRECISION = 1024  # maximal number of terms of series with tangents
+_KEY_PRECISION = 64  # maximal number of terms of series for the orders by which points are distinguished
+_TRIES = 40  # maximal number of random primes
+_MIN_LINES = 6  # minimal number of lines with critical points; more are used while a multiplicity has no point
+_POINTS = 2  # number of points of each hypersurface, modulo different primes
+MAX_CHARACTERS = 60  # maximal number of characters of a polynomial in a sentence
 
-FIRST_STEPS = 12  # the number of steps that are printed
+FIRST_STEPS = 12  # number of steps that are printed
 
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p at which the differential degenerates, with its multiplicity as a zero of E and the gradient.
+    """A zero of E modulo p, with its multiplicity and the gradient of the squarefree part of E there (up to a factor).
 
     E is det M' at the image, M' the matrix of the inverse map; for a pole E is det M, for Kahan maps det(I - eps f').
     """
@@ -74,12 +74,12 @@ class CriticalPoint:
 def critical_points(
     equations: Sequence[Equation], inverses: Sequence[Equation] | None, rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """Return the critical points modulo p on a random line that are neither poles nor at infinity; exact.
+    """Return the critical points modulo p on a random line that are neither poles nor at infinity. Exact.
 
     `equations` are the equations of the factors of the map over GF(p), linear in the point, and `inverses` those of the
-    inverse maps. E is the product of det M' at the images, for the matrices M' of the inverse maps. Without inverses
-    det M replaces E, and the points are the poles that are not at infinity. Returns the points and, for each
-    multiplicity, the number of zeros over the closure of GF(p), which includes zeros outside GF(p).
+    inverses of the factors. E is the product of det M' at the images, for the matrices M' of the inverses. Without
+    `inverses`, det M replaces E, and the points are the poles that are not at infinity. Returns the points in GF(p)
+    and, for each multiplicity, the number of all zeros of E in the algebraic closure of GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
@@ -87,7 +87,7 @@ def critical_points(
     excluded_zeros = line[-1]
 
     def evaluate_E(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
-        """Return E or det M at X; on the line common factors of images are divided out, whose zeros do not count."""
+        """Return E or det M at X; on the line, common factors of images are divided out, and their zeros excluded."""
         nonlocal excluded_zeros
         product = X[0] * 0 + 1
         for k, equation in enumerate(equations):
@@ -116,8 +116,8 @@ def critical_points(
         degrees[power] = degrees.get(power, 0) + int(squarefree_factor.degree())
         for s in roots_modulo(squarefree_factor):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w the form E is
-            # (t F_v + d F_w)^power G + ... A power of t that is higher than all relevant ones replaces d.
+            # The gradient of F up to a factor, where E = F^power G: at x + t v + d w the leading terms of E are
+            # (t F_v + d F_w)^power G, with derivatives F_v, F_w. A power of t above all relevant ones replaces d.
             gap_order = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             t_to_gap = nmod_poly([0] * gap_order + [1], p)
@@ -136,7 +136,7 @@ def critical_points(
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-    """Return the last minor of the equation at X, a point with polynomial coordinates: det M up to its sign."""
+    """Return det M at X up to sign, the last minor of the equation; the coordinates of X are polynomials."""
     zero = X[0] * 0
     rows = equation.rows(equation.monomials(X, times), zero)
     minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
@@ -144,7 +144,7 @@ def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> 
 
 
 class SingularityOutcome(StrEnum):
-    """What happens to a hypersurface under the iterates of the map."""
+    """The outcome for a hypersurface under the iterates of a map."""
 
     CONFINED = "confined"
     NOT_CONFINED = "not confined"
@@ -162,17 +162,17 @@ POINTS_DIFFER = "its multiplicities along two curves modulo different primes dif
 class Hypersurface(ResultPart):
     """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
-    `divides_denominator` says whether it is a factor of det(I - eps f'(x)); `multiplicity` is its exponent in the
-    Jacobian determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at
-    infinity, and "?" if it is too large: `degree` is then the sum of the degrees of all components of this
-    multiplicity. The step `contracted_at` contracts the hypersurface, and after the step `confined_at` the image is a
-    hypersurface again (each is None if there is no such step). `steps` are the first steps, at the first of two points,
-    modulo the first of the `primes`.
+    `polynomial` is its polynomial as text: "Z" for the hyperplane at infinity, "?" if it is too large; in the latter
+    case `degree` is the sum of the degrees of all components of this multiplicity. `divides_denominator` says whether
+    it is a factor of det(I - eps f'(x)); `multiplicity` is its exponent in the Jacobian determinant of the homogeneous
+    map (None: not computed). The step `contracted_at` contracts the hypersurface, and after the step `confined_at` the
+    image is a hypersurface again (None: there is no such step). `steps` are the first steps, from a point modulo the
+    first of `primes`.
 
-    The hypersurface was followed for `followed` steps in all. `orbit_data` is its pattern. From the step `settled_at`
-    on the pattern follows from its earlier rows: it is zero, periodic, or given by a linear recurrence; `settled_at` is
-    None if it has not settled. In a composition that is followed map by map all steps are steps of single maps, and the
-    map with index `stage` (from 0) contracts; otherwise `stage` is None. `generic` is the polynomial over Q[eps].
+    Its images were computed for `followed` steps. `orbit_data` is its pattern. From the step `settled_at` on (None: it
+    has not settled) the pattern follows from earlier rows: it is zero, periodic, or given by a linear recurrence. If
+    the factors of a composition are followed one by one, all steps are steps of single factors, and the factor with
+    index `stage` (from 0) contracts; otherwise `stage` is None. `generic` is the polynomial over Q[eps] as text.
     """
 
     polynomial: str = "?"
@@ -193,13 +193,13 @@ class Hypersurface(ResultPart):
 
     @property
     def text(self) -> str:
-        """The polynomial and the outcome for the hypersurface."""
+        """The polynomial and the outcome of the hypersurface, as text."""
         return f"{self.polynomial} = 0: {self.status}"
 
     def sentence(self, at: str) -> str:
-        """Describe the pattern: where images lie, at which steps they lower the degree, and whether it is confined.
+        """Describe the pattern: where images lie, at which steps the degree drops, and whether it is confined.
 
-        `at` names the eps of the polynomial, for a polynomial that is not over Q[eps].
+        `at` is a phrase with the eps of the polynomial, which is added unless the polynomial over Q[eps] is known.
         """
         text, max_characters = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         head = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
@@ -219,7 +219,7 @@ class Hypersurface(ResultPart):
         return "; ".join([summary, *self.orbit_data.sentences])
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, without the first steps."""
+        """Return plain data, without the first steps."""
         names = (
             "polynomial",
             "degree",
@@ -235,9 +235,9 @@ class Hypersurface(ResultPart):
 
 @dataclass(frozen=True)
 class HypersurfaceForm:
-    """An irreducible form, whether it is a pole, and its exponent in the Jacobian determinant (None: unknown).
+    """An irreducible form, whether it is a pole, and its exponent in the Jacobian determinant of a map (None: unknown).
 
-    `minor_exponent` is its exponent in the common factor of the minors of an equation; `stage` is the index of its map.
+    `minor_exponent` is its exponent in the common factor of the minors of the equation of the map with index `stage`.
     """
 
     form: Any
@@ -249,11 +249,11 @@ class HypersurfaceForm:
 
 @dataclass(frozen=True)
 class Tracking:
-    """The forms whose orders are measured along curves.
+    """The forms whose orders are measured along curves through hypersurfaces.
 
     The map contracts the zeros of the `critical` forms; `of_minors` are the forms in the common factor of the minors of
-    an equation of the map. If the maps of a composition are followed one by one, `stage` is the index (from 0) of the
-    map that contracts, and steps are steps of single maps, which repeat after `period` steps.
+    an equation of the map. If the factors of a composition are followed one by one, a step is a step of one factor,
+    factors repeat after `period` steps, and `stage` is the index (from 0) of the contracting factor.
     """
 
     critical: Sequence[HypersurfaceForm] = ()
@@ -262,7 +262,7 @@ class Tracking:
     period: int = 1
 
     def equations(self, map_: MapFamily, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
-        """Return the equations of the map modulo a prime, from the stage on."""
+        """Return the equations of the map modulo a prime; for a composition, in the order from `stage` on."""
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
@@ -271,7 +271,7 @@ class Tracking:
         return map_sequence
 
     def along(self, form: Any, field: PrimeField) -> TrackedFunctions:
-        """Return the functions whose orders are measured along curves through the hypersurface of `form`."""
+        """Return the functions whose orders are measured along curves through the hypersurface `form` = 0."""
         forms, stage = [*self.critical, *self.of_minors], self.stage or 0
         return TrackedFunctions(
             tuple(form_order(tracked.form, field) for tracked in forms),
@@ -295,10 +295,10 @@ def outcome_of(
 ) -> Hypersurface:
     """Return the hypersurface of a form over Q with its singularity pattern, at one exact eps (half the time step).
 
-    The form is irreducible, in the variables (X : Z), and `text` is its text in output. Two points of the hypersurface,
-    modulo two random primes, are followed. Source: grammaticos-ramani-papageorgiou-1991.
+    The form is irreducible, in the variables (X : Z), and `text` is its name in output. The images of two points of the
+    hypersurface, modulo two random primes, are computed. Source: grammaticos-ramani-papageorgiou-1991.
     """
-    outcomes: dict[int, Hypersurface] = {}  # by the primes
+    outcomes: dict[int, Hypersurface] = {}  # by prime
     outcome, note = _UNDECIDED_OUTCOME, BUDGET_SPENT
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.budget.is_spent:
@@ -330,7 +330,7 @@ def outcome_of(
             (h.status, h.contracted_at, h.confined_at, h.orbit_data.compared) for h in outcomes.values()
         )
         outcome, note = next(iter(outcomes.values())), ""
-        if data != other_data:  # a reason may be that the budget was spent
+        if data != other_data:  # the budget may have been spent at the second point
             outcome, note = Hypersurface(steps=outcome.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
     hypersurface = replace(
         outcome,
@@ -343,7 +343,7 @@ def outcome_of(
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits) -> list[Hypersurface]:
-    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `outcomes_of_points`."""
+    """Return the outcomes of all exceptional hypersurfaces, poles and infinity, from points without polynomials."""
     hypersurfaces = outcomes_of_points(map_, eps, rng, limits, poles=True) + outcomes_of_points(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
@@ -363,16 +363,16 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: S
 def outcomes_of_points(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits, poles: bool = False
 ) -> list[Hypersurface]:
-    """Return hypersurfaces without polynomials, distinguished by the multiplicities and outcomes of random points.
+    """Return hypersurfaces without polynomials; they are distinguished by multiplicities and outcomes of random points.
 
-    At one exact `eps` (half the time step), on lines modulo random primes. If `poles` is True, the poles are returned,
-    otherwise all exceptional hypersurfaces except poles and infinity. If no point with some multiplicity was found, a
-    hypersurface of this multiplicity is returned as undecided. Source: zander-2021.
+    The points lie on lines modulo random primes, at one exact `eps` (half the time step). If `poles` is True, the poles
+    are returned, otherwise all exceptional hypersurfaces except poles and infinity. If a multiplicity has no point in
+    GF(p), a hypersurface of this multiplicity is returned as undecided. Source: zander-2021.
     """
     hypersurfaces: dict[tuple[Any, ...], Hypersurface] = {}
     keys_by_orders: dict[
         tuple[Any, ...], list[tuple[Any, ...]]
-    ] = {}  # the keys in `hypersurfaces` of points with the same orders
+    ] = {}  # keys in `hypersurfaces` of points, by their orders
     degrees: dict[int, int] = {}
     for line_count in range(4 * _MIN_LINES):
         if limits.budget.is_spent or (line_count >= _MIN_LINES and set(degrees) <= {key[0] for key in hypersurfaces}):
@@ -395,7 +395,7 @@ def outcomes_of_points(
             )
             orders = critical_point.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             keys = keys_by_orders.setdefault(orders, [])
-            if len(keys) >= _POINTS and len(set(keys)) == 1:  # a third point would give no new information
+            if len(keys) >= _POINTS and len(set(keys)) == 1:  # two such points suffice
                 primes = dict.fromkeys((*hypersurfaces[keys[0]].primes, field.prime))
                 hypersurfaces[keys[0]] = replace(hypersurfaces[keys[0]], primes=tuple(primes))
                 continue
@@ -414,7 +414,7 @@ def outcomes_of_points(
                 multiplicity=key[0],
                 primes=(field.prime,),
             )
-            if key in hypersurfaces:  # of two points with the same outcome, the smaller number of steps counts
+            if key in hypersurfaces:  # of points with the same outcome, the smaller number of steps counts
                 earlier_hypersurface = hypersurfaces[key]
                 settled_steps = [k for k in (earlier_hypersurface.settled_at, hypersurface.settled_at) if k is not None]
                 hypersurfaces[key] = replace(
@@ -431,7 +431,7 @@ def outcomes_of_points(
 
 
 def _outcome_by_ranks(ranks: Sequence[int], full_rank: int) -> tuple[SingularityOutcome, int | None, int | None]:
-    """Return the outcome, the step that contracts the hypersurface, and the step after which it is confined."""
+    """Return (outcome, contracted_at, confined_at), as in `Hypersurface`, from the ranks of the steps 1, 2, ..."""
     contracted_at = next((k for k, rank in enumerate(ranks, 1) if rank < full_rank), None)
     if contracted_at is None:
         return NOT_CONTRACTED, None, None
@@ -447,7 +447,7 @@ def _outcome_at(
     limits: StepLimits,
     tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
-    """Return the outcome and the singularity pattern of the hypersurface with these tangent vectors at a point."""
+    """Return outcome and singularity pattern of a hypersurface, given by a point and tangent vectors at it."""
     full_rank = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     curve = TestCurve(equations, point, direction, limits, tracked)
@@ -460,13 +460,13 @@ def _outcome_at(
     data = NO_ORBIT_DATA
     if confined_at is None:
         data = curve.orbit_data(limits.first_steps)
-        # After the steps that are shown the image may be another hypersurface, whose pattern continues this pattern.
+        # After these steps the image may be another hypersurface, whose pattern then continues this one.
         step_limit = min(limits.series_steps, limits.max_steps)
         while confined_at is None and is_complete and not data.is_settled and len(run) < step_limit:
             run, is_complete = curve.steps(min(2 * len(run), step_limit), tangents, _MAX_TANGENT_PRECISION)
             status, contracted_at, confined_at = _outcome_by_ranks([step.rank for step in run], full_rank)
     if confined_at is None:
-        # At a superattracting point the multiplicities grow too fast for the precision, and yet satisfy a recurrence.
+        # At a superattracting point multiplicities grow too fast for the precision, but may satisfy a recurrence.
         if not is_complete and not data.is_settled:
             raise PrecisionTooLow
     else:
@@ -475,7 +475,7 @@ def _outcome_at(
         run = list(curve.all_steps(data.settled_at + 2, tangents))
         status, contracted_at, confined_at = _outcome_by_ranks([step.rank for step in run], full_rank)
     settled_at = max(confined_at or 0, data.settled_at) if data.is_settled else None
-    if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
+    if len(equations) > 1 and not tracked.functions:  # rows of det M suffice for a single map only
         data = replace(NO_ORBIT_DATA, followed=data.followed)
     return Hypersurface(
         status=status,
@@ -493,7 +493,7 @@ def _tangent_vectors(point: Sequence[int], gradient: Sequence[int], field: Prime
     p, indices = field.prime, range(len(point))
     pivot = next(k for k in indices if gradient[k])
     inverse = pow(gradient[pivot], -1, p)
-    # The point is itself a tangent vector of the cone, so a basis vector that occurs in it is left out.
+    # The point itself is a tangent vector of the affine cone, so a basis vector that occurs in it is omitted.
     second_pivot = next((k for k in indices if k != pivot and point[k]), None)
     free_indices = [k for k in indices if k not in (pivot, second_pivot)]
     basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in indices] for k in free_indices]

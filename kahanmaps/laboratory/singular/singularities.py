@@ -1,11 +1,11 @@
-"""Singularity confinement: the images of the exceptional hypersurfaces (contracted by the map) and of the poles.
+"""Singularity confinement: the images of poles and of exceptional hypersurfaces (which the map contracts).
 
-A hypersurface on which the differential of the map degenerates may be contracted: its image has a lower dimension, and
-the image of a point no longer determines the point. The singularity is confined if, along curves through the
-hypersurface, a later image is a hypersurface again. Degrees of iterates drop below their maximum only where images of
-exceptional hypersurfaces lie in the indeterminacy locus. The hypersurfaces are computed exactly over Q, for an exact
-eps. Their images are computed at random points modulo large primes, which is evidence and no proof. Source:
-grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
+A hypersurface on which the differential of the map degenerates may be contracted: its image has lower dimension, and
+the image of a point no longer determines the point. The singularity is confined if a later image, computed along curves
+through the hypersurface, is a hypersurface again. The degrees of iterates drop below powers of the degree of the map
+only if images of exceptional hypersurfaces lie in the indeterminacy locus. The hypersurfaces are computed exactly over
+Q, for an exact eps. Their images are computed at random points modulo large primes, which is evidence but no proof.
+Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
 """
 
 from __future__ import annotations
@@ -65,36 +65,36 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
-MAX_DIGITS = 10_000  # of the numbers in eps and the system
+MAX_DIGITS = 10_000  # maximal number of digits of eps and of the coefficients of the system
 _DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # units of work, by dimension
-_MIN_DIGITS = 50  # the least limit of digits, for any budget
+_MIN_DIGITS = 50  # this number of digits is allowed for any budget
 _DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
 _LEAST_STEPS = 100  # in dimension 5 and 6
-_SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimension
+_SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # number of steps with series, by dimension
 _LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
-_REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
-_MAX_FIRST_STEPS = 200  # steps along series before only points are followed
-_MAX_EPS_PAIRS = 2  # pairs of eps that are tried, as an eps may be special
-WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; they are slow in higher ones
-_POINTS = 3  # random points at which det dPhi is evaluated
-_MAX_DEGREE = 20_000  # of a composition
+_REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted if series get too long
+_MAX_FIRST_STEPS = 200  # maximal number of steps with series before only points are iterated
+_MAX_EPS_PAIRS = 2  # maximal number of pairs of eps, since an eps may be special
+WRITTEN_DIMENSION = 4  # the largest dimension in which `patterns` uses polynomials; above it they are slow
+_POINTS = 3  # number of random points at which det dPhi is evaluated
+_MAX_DEGREE = 20_000  # maximal degree of a composition
 _STOPPED = "work limit reached before all singularities were traced; raise --effort"
 _DIFFERENT = "the singularities at the two values of eps differ; choose one with --eps"
 
 
 class TooLongFormula(InputError):
-    """Raised if a composition is too long for its singularities to be followed."""
+    """Raised if the formulas of a composition are too long to compute its singularity patterns."""
 
 
 @dataclass(frozen=True)
 class SingularityRun(PrintableResult):
-    """The singularities of a Kahan map at one exact eps, half the time step.
+    """The singularities of a map at one exact eps (half the time step).
 
-    `denominator` is det(I - eps f'(x)) as text, or "?" for a composition if it is too large. `critical_degree` is the
-    degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is too large to expand, and
-    exceptional hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
-    not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` describes the maps of a
-    composition that is followed map by map; the steps of hypersurfaces are then steps of single maps.
+    `denominator` is the denominator of the map as text, det(I - eps f'(x)) for a Kahan map, or "?" if it is too large.
+    `critical_degree` is the degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is
+    too large to expand, and random points then represent the exceptional hypersurfaces. If the determinant vanishes
+    identically, the map is not dominant, and no patterns are computed. If the factors of a composition are followed one
+    by one, `word` describes these factors, and the steps of hypersurfaces are steps of single factors.
     """
 
     _parts, _noun = "hypersurfaces", ("hypersurface", "hypersurfaces")
@@ -110,20 +110,20 @@ class SingularityRun(PrintableResult):
     word: Word | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each hypersurface, for example for `pandas.DataFrame(run.rows())`."""
+        """Return a row for each hypersurface, for example for `pandas.DataFrame(run.rows())`."""
         names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
         return [attributes(hypersurface, *names) for hypersurface in self.hypersurfaces]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return all_fields(self)
 
     @property
     def verdict(self) -> str:
-        """The verdict on all hypersurfaces together.
+        """The combined verdict on all hypersurfaces.
 
-        It is "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided", or
-        for a map that is not birational at this eps "singular everywhere" or "not dominant".
+        It is "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; for
+        a map that is not birational at this eps it is "singular everywhere" (defined nowhere) or "not dominant".
         """
         if self.is_undefined:
             return "singular everywhere"
@@ -140,13 +140,13 @@ class SingularityRun(PrintableResult):
 
     @property
     def followed(self) -> int | None:
-        """The number of steps for which all unconfined hypersurfaces were followed; None if all are confined."""
+        """The number of steps for which every unconfined hypersurface was followed; None if all are confined."""
         steps = [h.followed for h in self.hypersurfaces if h.status == NOT_CONFINED]
         return min(steps, default=None)
 
     @property
     def text(self) -> str:
-        """The verdict, with the number of steps searched for confinement."""
+        """The verdict, with the number of steps that were searched for confinement."""
         if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
             return self.verdict
         others_text = ", others not" if self.verdict == "some confined" else ""
@@ -154,12 +154,12 @@ class SingularityRun(PrintableResult):
 
     @property
     def unit(self) -> str:
-        """The unit of `steps` of hypersurfaces: steps of the map, or steps of single maps of a composition."""
+        """The name of the unit of steps of hypersurfaces: "step" of the map, or "single map" of a composition."""
         return "step" if self.word is None else "single map"
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """The data that are the same for all generic eps: degrees, kinds and patterns."""
+        """The data that are equal at all generic eps: degrees, multiplicities and outcomes of hypersurfaces."""
         patterns = sorted(
             (h.degree, h.divides_denominator, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
@@ -178,22 +178,22 @@ def singularities(
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
-    """Compute the exceptional hypersurfaces and poles of a Kahan map at one exact eps, and their singularity patterns.
+    """Compute the exceptional hypersurfaces and poles of a map at one exact eps, and their singularity patterns.
 
     Args:
         system: a map, or a system, which stands for its Kahan map; of dimension at most 6.
-        eps: half the time step, an exact number; None: two values are used, and their patterns must agree.
+        eps: half the time step, an exact number; None: two values are used, at which the patterns must agree.
         time_step, h: the time step 2 eps, instead of eps.
-        steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
-            3, 250 in dimension 4 and 100 above; fewer if all steps need power series.
+        steps: the number of images of each hypersurface: by default 1000 in dimension 1 and 2, 500 in dimension 3, 250
+            in dimension 4 and 100 above; fewer if all steps need power series.
         seed: the random seed.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message for each hypersurface.
 
     Returns:
-        A `SingularityRun`; if eps is None, for the first of the two values. Hypersurfaces are exact; their outcome is
-        measured at two random points modulo two random primes, and "not confined" refers to `steps`. A TimeLimit ends
-        the computation early; if `effort` is a Budget, it is raised again.
+        A `SingularityRun`; if eps is None, that for the first of the two values. Hypersurfaces are exact; their outcome
+        is measured at two random points modulo two random primes. "Not confined" means: not within `steps` steps. A
+        TimeLimit ends the computation early; if `effort` is a Budget, the TimeLimit is raised again.
 
     Raises:
         InputError: for dimensions above 6, a number of steps out of range, numbers too long for the budget, and
@@ -233,7 +233,7 @@ def singularities(
             raise TooLarge("forms that would take long to expand, too long for their determinant")
         map_form = homogeneous_map(map_at_eps)
         count_work(3 * sum(map(len, map_form.forms)))
-    except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
+    except TooLarge:  # for a composition, follow its factors one by one, or use random points
         try:
             line = Line(reduce_map(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
@@ -252,7 +252,7 @@ def singularities(
         random_hypersurfaces = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=random_hypersurfaces, stopped=limits.budget.is_spent)
     denominator = map_form.denominator
-    # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
+    # The minors have signs: the last minor of each factor is (-1)^n det(I - eps f'(x)) at Z = 1.
     run = SingularityRun(
         exact_eps, affine(denominator * (-1) ** (map_.dim * len(map_at_eps.factors)), map_), map_form.degree
     )
@@ -277,7 +277,7 @@ def singularities(
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # a stage of a larger computation, which must end as well
+            if isinstance(effort, Budget):  # the computation that contains this one must end as well
                 raise
             is_stopped = True
             break
@@ -297,7 +297,7 @@ def singularities(
 def _follow_map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: StepLimits, progress: Callable[[str], None]
 ) -> SingularityRun | None:
-    """Return the run for a composition whose maps are followed one by one; None if one of the maps is too large."""
+    """Return the run for a composition whose factors are followed one by one; None if a factor is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     result = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
@@ -305,16 +305,16 @@ def _follow_map_by_map(
 
 @dataclass(frozen=True)
 class Patterns:
-    """The singularity patterns of a map, and the degrees that follow from them.
+    """The singularity patterns of a map, and the degrees of its iterates that are derived from them.
 
-    Degrees drop below powers of the first one only where images of exceptional hypersurfaces lie in the indeterminacy
-    locus; so a recurrence may change until the last pattern has settled. `lengths` are the different numbers of steps
-    after which patterns have settled; `searched` is the number of steps for which unconfined hypersurfaces were
-    followed (None if all are confined); `some_confined` says whether other hypersurfaces are confined (None: unknown).
-    `running` is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the
-    numerator and the denominator of the generating function of the degrees; it is empty if the patterns do not give
-    them. `exceptional` are the exceptional hypersurfaces, `at` one of the eps that were tried. Steps are steps of the
-    map, except for hypersurfaces of a composition that is followed map by map (`word`).
+    The degrees drop below powers of d_1 only if images of exceptional hypersurfaces lie in the indeterminacy locus. So
+    a recurrence of the degrees may fail until the last pattern has settled. `lengths` are the distinct numbers of steps
+    after which patterns have settled. `searched` is the number of steps for which all unconfined hypersurfaces were
+    followed (None: all are confined); `some_confined` says whether a hypersurface is confined (None: unknown).
+    `running` is empty, or the reason why patterns are not known for all steps. `series` has the coefficients of
+    numerator and denominator of the generating function of the degrees; it is empty if the patterns do not determine
+    the degrees. `exceptional` are the exceptional hypersurfaces at the eps `at`. If `word` is given, their steps are
+    steps of the single factors of a composition.
     """
 
     lengths: tuple[int, ...]
@@ -327,16 +327,16 @@ class Patterns:
     word: Word | None = field(default=None, compare=False)
 
     def terms_needed(self, order: int) -> int:
-        """The number of terms, including d_0, that determine a recurrence of this order.
+        """Return the number of terms, including d_0, that determine a recurrence of this order.
 
-        Two rational generating functions of degrees r and R are equal if they agree in r + R + 1 terms. Here r is
-        `order`, and R is at most 1 more than the sum of the `lengths`, in which equal patterns count once.
+        Two rational generating functions of degrees r and R are equal if their first r + R + 1 terms agree. Here r is
+        `order` (of the fitted recurrence). The degree R of the true generating function is at most 1 + sum(lengths).
         """
         return order + sum(self.lengths) + 2
 
     @property
     def fraction(self) -> Fraction:
-        """The numerator and denominator of the generating function of the degrees, which must be known."""
+        """The numerator and the denominator of the generating function of the degrees; `series` must not be empty."""
         numerator, denominator = self.series
         return fmpz_poly(list(numerator)), fmpz_poly(list(denominator))
 
@@ -356,25 +356,25 @@ class Patterns:
 
     @property
     def sentences(self) -> list[str]:
-        """A sentence on the singularity pattern of each exceptional hypersurface, if the degrees are derived."""
+        """A sentence on the singularity pattern of each exceptional hypersurface; empty if `series` is empty."""
         eps_text = f" at eps = {self.at}" if self.at else ""
         return [f"C{k}: {h.sentence(eps_text)}" for k, h in enumerate(self.exceptional, 1) if self.series]
 
     @property
     def word_text(self) -> str:
-        """A note on the unit of steps in `sentences`; empty unless they are steps of single maps."""
+        """A note on the unit of steps in `sentences`; empty unless the steps are those of single factors."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property
     def limit(self) -> str:
-        """The number of steps searched for confinement; empty if everything is confined."""
+        """The number of steps searched for confinement, as a phrase; empty if all singularities are confined."""
         if self.searched is None:
             return ""
         return f"{'no other' if self.some_confined else 'no'} confinement within {counted(self.searched, 'step')}"
 
     @property
     def text(self) -> str:
-        """A line with the longest pattern and the number of steps for which unconfined ones were followed."""
+        """The length of the longest pattern and the number of steps searched for confinement, as one line of text."""
         if self.running:
             return self.running
         longest = max(self.lengths, default=0)
@@ -382,7 +382,7 @@ class Patterns:
         return f"{sentence}; {self.limit}" if self.limit else sentence
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         data = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in coefficients] for name, coefficients in zip(names, self.series, strict=False)}
@@ -397,7 +397,7 @@ class Patterns:
 
 
 def patterns_of(runs: Sequence[SingularityRun], has_eps: bool = True) -> Patterns:
-    """Combine the patterns of runs at one eps, or at two that represent every eps; `has_eps`: the map depends on it."""
+    """Combine the patterns of `runs` at one eps or at two, which must agree; `has_eps`: whether the map has an eps."""
     results = set()
     for run in runs:
         if not run.is_dominant:
@@ -420,10 +420,10 @@ def patterns(
     seed: int = 0,
     effort: int | Budget = 1,
 ) -> Patterns:
-    """Return the patterns of a map at one exact eps (half the time step) or, if `eps` is None, at two.
+    """Return the patterns of a map at one exact eps (half the time step) or, if `eps` is None, at two values of eps.
 
-    Up to dimension 4 they are the patterns of `singularities`. In higher dimensions, and for an eps with too many
-    digits for formulas, random points represent hypersurfaces.
+    Up to dimension 4 they are computed by `singularities`. In higher dimensions, and if eps has too many digits for
+    formulas, random points represent the hypersurfaces.
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
@@ -433,7 +433,7 @@ def patterns(
             break
         values = default_eps(map_, seed + attempt) if eps is None else (eps,)
         budgets = budget.share([1] * len(values))
-        # Random points can be attributed to hypersurfaces only if the equations are linear in both points.
+        # Random points can represent hypersurfaces only if the equations are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
         if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
@@ -468,12 +468,12 @@ def _count_digits(map_: MapFamily, eps: fmpq) -> int:
 
 
 def _max_digits(dim: int, budget: Budget) -> int:
-    """Return the largest number of digits for which the budget allows formulas, at least 50."""
+    """Return the maximal number of digits of coefficients for which the budget allows formulas, at least 50."""
     return max(_MIN_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
-    """Return whether the dimension and the number of digits of map and eps are small enough for `singularities`."""
+    """Return whether the dimension and the numbers of digits in map and eps are small enough for `singularities`."""
     map_ = as_map(system)
     return map_.dim <= MAX_DIMENSION and _count_digits(map_, eps) <= _max_digits(map_.dim, budget)
 
@@ -490,7 +490,7 @@ def _merge_patterns(
     map_degree: int, hypersurfaces: Sequence[Hypersurface], eps_text: str = "", word: Word | None = None
 ) -> Patterns:
     maps_per_step = 1 if word is None else word.length
-    # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
+    # A pole with exponent 0 in the Jacobian determinant is not critical: its images lower no degree.
     exceptional = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
     for h in exceptional:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
@@ -529,7 +529,7 @@ def _merge_patterns(
 
 
 def steps_by_default(dim: int) -> int:
-    """The default number of steps for which hypersurfaces are followed in this dimension."""
+    """Return the default number of images of a hypersurface that are computed in this dimension."""
     return _DEFAULT_STEPS.get(dim, _LEAST_STEPS)
 
 
@@ -540,9 +540,9 @@ def _step_limits(dim: int, steps: int | None, budget: Budget) -> StepLimits:
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
-    """Return the irreducible factors in Q[x, eps], with multiplicities, of det M (M = I - eps f' for Kahan maps).
+    """Return the irreducible factors of det M in Q[x, eps], with exponents; M is I - eps f' for Kahan maps.
 
-    Exact. None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
+    Exact. Returns None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]
@@ -558,7 +558,7 @@ def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str,
 
 
 def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, ...]:
-    """Return two rational eps of small height, which depend on map and seed only; one for a map without eps."""
+    """Return two rational eps of small height, which depend on map and seed only; (1,) for a map without eps."""
     if unsupported_reason := as_map(system).unsupported_reason:
         raise InputError(unsupported_reason)
     if not as_map(system).has_eps:
@@ -569,13 +569,13 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
 
 
 def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
-    """Whether det dPhi is not 0 at one of a few random points.
+    """Return whether the map is dominant: det dPhi is not 0 at one of a few random points modulo primes.
 
-    True is proved. False is wrong only if the determinant vanishes at all these points but not identically.
+    The answer True is proved. False is wrong if the determinant vanishes at all these points, but not identically.
     """
     rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):
-        field = GF(random_prime(rng))  # a number that is not 0 modulo p is not 0 over Q
+        field = GF(random_prime(rng))  # if det dPhi is not 0 modulo p, it is not 0 over Q
         try:
             if det(map_.at(eps, field).jacobian([rng.randrange(field.prime) for _ in range(map_.dim)])) != 0:
                 return True

@@ -1,11 +1,11 @@
-"""The polynomials of the hypersurfaces that a map, or a map of a composition, may contract.
+"""The polynomials of the hypersurfaces that a map, or a factor of a composition, may contract.
 
-The exceptional hypersurfaces of a composition are preimages, under the maps applied before, of the exceptional
-hypersurfaces of its maps, and have long polynomials. The polynomials for single maps are short. So each step applies
-one map of the composition to a curve through a hypersurface, first the map that contracts the hypersurface.
+An exceptional hypersurface of a composition is the preimage, under the factors applied first, of an exceptional
+hypersurface of the next factor. Its polynomial is long, but that for the factor is short. So a curve through the latter
+hypersurface is used, and each step applies one factor, beginning with the one that contracts the hypersurface.
 
-For generic eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
-Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that they give the factors at one eps.
+For generic eps the Jacobian determinant of the homogeneous map is factored over Q as a polynomial in the point and eps.
+By Hilbert's irreducibility theorem its factors stay irreducible at most eps, so that they are the factors there.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
-_MAX_TERMS = 6_000  # of the Jacobian determinant; larger ones are not expanded
-_MAX_PRODUCTS = 300_000  # of terms, to expand the Jacobian determinant of the affine map
+_MAX_TERMS = 6_000  # maximal number of terms of an expanded Jacobian determinant
+_MAX_PRODUCTS = 300_000  # maximal number of products of terms to expand the Jacobian determinant of the affine map
 
 
 @dataclass(frozen=True)
 class Word:
-    """The maps of a composition: the degrees of the maps of one period, and the number of periods."""
+    """The factors of a composition: the `degrees` of the factors of one period, and the number `power` of periods."""
 
     degrees: tuple[int, ...]
     power: int
 
     @property
     def length(self) -> int:
-        """The number of maps in one step of the composition."""
+        """The number of factors of the composition."""
         return len(self.degrees) * self.power
 
     @property
     def text(self) -> str:
-        """A note on the steps of single maps."""
+        """A note that steps are steps of single factors."""
         return (
             f"{counted(self.length, 'map')} make one iterate and are followed one by one: these steps are single maps"
         )
 
 
 def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
-    """Return the poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
+    """Return (poles of a map and irreducible factors of its Jacobian determinant, degree of this determinant). Exact.
 
-    If the determinant is too large, the degree is None, and the list has only the poles and infinity.
+    If the determinant is too large, the degree is None, and the list contains only the poles and infinity.
     """
     forms, _, denominator = map_
     forms_by_text: dict[str, HypersurfaceForm] = {}
@@ -83,7 +83,7 @@ def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceF
 def followed_forms(
     map_: HomogeneousMap, forms: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
-    """Return the forms whose zeros a map contracts, and the forms in the common factor of minors of its equation."""
+    """Return the forms whose zeros a map may contract, and the forms in the common factor of its minors."""
     contracted_forms = [replace(form, stage=stage) for form in forms if form.multiplicity]
     minor_factors = [] if map_.factor.is_constant() else factored(map_.factor)
     return contracted_forms, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in minor_factors]
@@ -92,10 +92,10 @@ def followed_forms(
 def followed_map_by_map(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: StepLimits, progress: Callable[[str], None]
 ) -> tuple[Word, list[Hypersurface]] | None:
-    """Return the hypersurfaces that the maps of a composition contract at one exact eps, and the `Word` of these maps.
+    """Return the `Word` of the factors of a composition, and the hypersurfaces that factors contract at one exact eps.
 
-    Steps and limits count single maps, except for the `steps` of hypersurfaces, which count compositions. Hypersurfaces
-    for which the budget did not suffice are left out. None if the polynomials of one of the maps are too large.
+    Steps and limits count single factors. Hypersurfaces for which the budget did not suffice are omitted. Returns None
+    if the polynomials of a factor are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
@@ -124,28 +124,28 @@ def followed_map_by_map(
 
 
 def is_long(map_: Map) -> bool:
-    """Return whether the Jacobian determinant of a composition is too large to expand, unless degrees drop."""
+    """Return whether the Jacobian determinant of a composition is too large to expand, if no degree drops."""
     degree = prod(equation.image_degree for equation in map_.equations)
     size = map_.dim + 1
     return len(map_.equations) > 1 and not _is_short(size, size * (degree - 1))
 
 
 def _is_short(size: int, degree: int) -> bool:
-    """Return whether a form of degree `degree` in `size` variables has few enough terms to be expanded."""
+    """Return whether forms of degree `degree` in `size` variables have few enough terms to be expanded."""
     return comb(degree + size - 1, size - 1) <= _MAX_TERMS
 
 
 def period_of(equations: tuple[Equation, ...]) -> int:
-    """Return the period of a list of maps, a divisor of its length."""
+    """Return the least period of a list of equations that divides its length."""
     maps = [(equation.exponents, equation.terms) for equation in equations]
     size = len(maps)
     return next(k for k in range(1, size + 1) if size % k == 0 and maps[k:] == maps[: size - k])
 
 
 def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | None:
-    """Return the irreducible factors of the Jacobian determinant of forms with multiplicities; None for too large ones.
+    """Return the irreducible factors of the Jacobian determinant of forms, with exponents; None if it is too large.
 
-    The determinant is not zero and has degree `degree`. In the ring of the forms symbols may follow Z.
+    The determinant must be nonzero, of degree `degree`. The ring of the forms may contain symbols after Z.
     """
     size, context = len(forms), forms[0].context()
     zero, infinity = context.constant(0), context.gen(size - 1)
@@ -165,11 +165,11 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
 
 
 def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
-    """Return the factors of the Jacobian determinant of forms at Z = 1, with multiplicities; None if it is too large.
+    """Return the factors of the Jacobian determinant of forms at Z = 1, with exponents; None if it is too large.
 
     At Z = 1 the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where
-    y_i = F_i/F_0, by Euler's relation. Denominators and contents of the rows of dy/dx are factors that need not be
-    expanded. In the ring of the forms symbols may follow Z.
+    y_i = F_i/F_0, by Euler's relation. Denominators and contents of the rows of dy/dx are split off as factors before
+    the expansion. The ring of the forms may contain symbols after Z.
     """
     n, context = len(forms) - 1, forms[0].context()
     affine_point = [context.constant(1) if k == n else x for k, x in enumerate(context.gens())]
@@ -202,8 +202,8 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
-        # Shortest rows first, since minors of the first rows occur in all further products. The order changes only the
-        # sign of the determinant, which does not matter for its factors.
+        # Shortest rows first, since minors of the first rows occur in all further products. Another order of rows
+        # changes only the sign of the determinant.
         rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
         determinant = kernel_minors(rows, counted_product, require_few)[-1]
     except TooLarge:
@@ -215,12 +215,12 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
 
 
 def is_infinity(factor: Any) -> bool:
-    """Whether a form is Z."""
+    """Return whether an irreducible form is Z (up to a factor), the form of infinity."""
     return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
 
 
 def affine(form: Any, map_: MapFamily) -> str:
-    """Return the form at Z = 1 in the variables of the system, as text."""
+    """Return a form at Z = 1, in the variables of the map, as text."""
     context = ring(map_.variables)
     return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))
 
@@ -231,12 +231,12 @@ def name_of(form: Any, map_: MapFamily) -> str:
 
 
 def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
-    """Add polynomials over Q[eps], if they are found, to hypersurfaces that a map contracts at one eps.
+    """Add polynomials over Q[eps] (`generic`), if they are known, to hypersurfaces that a map contracts at one eps.
 
-    Exact: the value of such a polynomial at this eps is a multiple of the polynomial of the hypersurface. None is found
-    for expanded compositions, if forms are too large, and if the value at this eps is reducible.
+    Exact: at this eps, such a polynomial is a multiple of the polynomial of the hypersurface. It is unknown for
+    expanded compositions, if forms are too large, and if its value at this eps is reducible.
     """
-    polynomials: dict[int | None, dict[str, str]] = {}  # keys: the stage, then the polynomial at this eps
+    polynomials: dict[int | None, dict[str, str]] = {}  # by stage, then by polynomial at this eps
     result = []
     for hypersurface in hypersurfaces:
         if hypersurface.stage not in polynomials:
@@ -247,7 +247,7 @@ def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) 
 
 
 def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
-    """Return the polynomials over Q[eps] of the hypersurfaces that a map may contract, by their values at one eps."""
+    """Return a dict: values at one eps -> polynomials over Q[eps] of the hypersurfaces that a map may contract."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:
         return {}
@@ -265,7 +265,7 @@ def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[
     factors = (_critical_factors(forms, (n + 1) * reduced_degree) or []) if reduced_degree > 0 else []
     affine_ring, polynomials_by_name = ring((*variables, "eps")), {}
     for factor, _ in factors:
-        if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
+        if all(sum(m[:n]) == 0 for m in factor.monoms()):  # skip infinity and powers of eps
             continue
         value = factor.compose(*ring_at_eps.gens(), ring_at_eps.constant(eps), ctx=ring_at_eps)
         factors_at_eps = factored(value)
@@ -276,9 +276,9 @@ def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[
 
 
 def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None) -> list[fmpq_mpoly]:
-    """Return the forms in (X : Z) over Q[eps], or at one eps, of the map with these rows of polynomials in x and eps.
+    """Return the forms in (X : Z), over Q[eps] or at one eps, of the map whose equation has these rows of polynomials.
 
-    The forms have no common factor; their last variables are Z and eps.
+    `rows` are polynomials in x and eps. The forms have no common factor; their last variables are Z and eps.
     """
     n = len(rows)
     context = ring((*(f"x{k + 1}" for k in range(n)), "Z", "eps"))
