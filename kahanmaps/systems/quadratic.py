@@ -32,8 +32,8 @@ LONG_COEFFICIENTS = 2_000  # digits; equations with longer coefficients are not 
 class QuadraticSystem(PolynomialField, LatexDisplay):
     """A quadratic system x' = f(x).
 
-    `rhs` are polynomials over Q in the variables, of degree at most 2, and in `symbols`, symbolic constants that may
-    include eps. Raises InputError for a wrong number of right-hand sides, and for a degree above 2.
+    `rhs` are polynomials over Q in the variables and `symbols` (symbolic constants, possibly eps), of degree at most 2
+    in the variables. Raises InputError for a wrong number of right-hand sides, and for a degree above 2.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y - x", "1/2*x^2"])
     >>> system.Q[0]
@@ -180,7 +180,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @cached_property
     def digits(self) -> int:
-        """Approximate number of decimal digits of the longest coefficient, all written over a common denominator."""
+        """The approximate number of digits of the longest coefficient, if all have a common denominator."""
         return digits_of(self.rhs)
 
     def __repr__(self) -> str:
@@ -193,7 +193,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
 @dataclass(frozen=True, eq=False)
 class SystemOver:
-    """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's.
+    """A quadratic system with coefficients in `field`; points are sequences of field elements, matrices are FLINT's.
 
     `tensor` is f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k. If `B` and `c` are
     None, the system is homogeneous.
