@@ -1,8 +1,8 @@
 """Planes over Q in integers: primitive triples, and the bad primes.
 
 h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
-factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
-numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level), the content of
+factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k. Its content must be removed: otherwise the
+numbers would double their length with every step. Up to primes that divide 6 disc(h) den(level), the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
 lifts of `tau`. Single steps remove the content by gcds; they are used for short orbits, and on singular cubics, where
 numbers hardly grow.
@@ -93,13 +93,13 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer whose prime factors are the primes for which the rule for the content fails; disc(h) != 0."""
+        """An integer divisible by all primes where the rule for the content may fail (see above); disc(h) != 0."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad`, whose exponents are rarely exceeded in the numbers that occur."""
+        """A power of `bad` which most numbers that occur do not exceed in the exponents of their bad primes."""
         return self.bad**3
 
     @cached_property

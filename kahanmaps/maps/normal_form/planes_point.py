@@ -40,12 +40,12 @@ class _Coordinate:
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
     denominator: fmpz
-    fixed_number: fmpz  # contains the fixed primes that numerator and denominator may have in common
+    fixed_number: fmpz  # divisible by the fixed primes that numerator and denominator may have in common
     divisor_planes: tuple[int, ...]  # the planes in which the form alpha U + beta V divides h
 
 
 class Assembly:
-    """The conversion of triples to points x = sum of R (u, v), given the blocks and the matrix R of each block."""
+    """The conversion of triples to points x, the sum over the blocks of R (u, v) with the matrix R of each block."""
 
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
@@ -114,12 +114,12 @@ class PlanesPoint:
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
-        """Return for each plane the numerators of the coordinates, their denominator, and primes that may cancel."""
+        """Return for each plane the numerators of the coordinates, their denominator, and a number of other primes."""
         return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
     def height(self) -> int:
-        """The bit length of the largest integer over the least common denominator; computing it takes a gcd.
+        """The bit length of the largest integer if x has its least common denominator; computing it takes a gcd.
 
         `bits` differs by a few bits, but is much too large if denominators of planes have common factors.
         """
@@ -227,7 +227,7 @@ def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
 
 
 class NormalSteps:
-    """Steps of Phi(., eps) over Q in a normal form; the time step is 2 eps.
+    """Orbits of Phi(., eps) over Q in a normal form; the time step is 2 eps.
 
     >>> from itertools import islice
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
@@ -244,7 +244,7 @@ class NormalSteps:
         self._eps = eps
 
     def blocks(self, start: Sequence[Any]) -> tuple[list[Block], Assembly]:
-        """Return the planes, the triples of the initial point, and the conversion to x."""
+        """Return the blocks of the planes, with the initial point in each, and the conversion of triples to x."""
         planes, scale = self.splitting.planes, 2 * self._eps
         blocks: list[Block] = []
         triples = self.splitting.triples([QQ.convert(entry) for entry in start])

@@ -27,7 +27,7 @@ class _Divisor(Exception):
 
 
 class _TorsionPoints:
-    """Points (X, y Y) of y^2 = c = x^3 + A x + B with X and Y modulo f."""
+    """Points (X, y Y) of y^2 = c = x^3 + A x + B, where X and Y are polynomials in x modulo f."""
 
     def __init__(self, f: Poly, c: Poly, A: Any) -> None:
         self.f, self.c, self.A = f, c % f, A
@@ -58,7 +58,7 @@ class _TorsionPoints:
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
-    """Return (t, M): the trace t of y^2 = x^3 + a2 x^2 + a4 x + a6 modulo M, where M = 2 3 5 7 ... is at least `bound`.
+    """Return (t mod M, M): the trace t of Frobenius of y^2 = x^3 + a2 x^2 + a4 x + a6, M = 2 3 5 7 ... >= `bound`.
 
     The field has characteristic at least 5.
 
