@@ -30,7 +30,7 @@ from kahanmaps.version import __version__
 # An npz file pads exact numbers to the length of the longest; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
 _CHUNK_SIZE = 1 << 18  # numbers copied in one operation
-_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file: from here on pyarrow is loaded; rows in one call
+_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file from which on pyarrow is used; rows in one call of it
 _FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
 _TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
@@ -72,7 +72,7 @@ class Writer(ABC):
 
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
-        # Flushed regularly, so that a killed process loses little, and always before steps that may take long:
+        # Flush regularly, so that a killed process loses little; a long line is flushed before the next long step.
         self._unflushed += len(text)
         if self._unflushed > _FLUSH_AFTER:
             self.stream.flush()

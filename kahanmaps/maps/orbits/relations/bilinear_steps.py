@@ -29,20 +29,20 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
 Pairs = Sequence[tuple[int, int]]  # indices i, j of products X_i Y_j of coordinates
 
-_MAX_PRIMES = 50  # number of primes from which the coefficients are computed
-_MAX_DIMENSION = 12  # in this dimension the search for forms, with 169 products, takes some seconds
+_MAX_PRIMES = 50  # maximal number of primes from which the coefficients are computed
+_MAX_DIMENSION = 12  # largest dimension, in which the search for forms, with 169 products, takes some seconds
 _EXTRA_POINTS = 8  # points beyond the number of unknowns; wrong forms pass at each with probability 2^-60
 
 
 class BilinearForms:
-    """The forms B_ij for the last j: one row of coefficients for each i, one column for each product."""
+    """The forms B_ij for the last j: one row of coefficients for each i, one column for each of `products`."""
 
     name = "bilinear forms along the orbit"
 
     def __init__(self, steps: IntegerSteps, lag: int, products: Pairs, coefficients: fmpz_mat) -> None:
         self.lag, self.products, self.coefficients = lag, products, coefficients
         self._steps = steps
-        # Only B_ij for the last j are known, so f_n may have a denominator; this is a multiple of all so far.
+        # Only B_ij for the last j are known, so f_n may have a denominator; this is a multiple of those so far.
         self._multiple = fmpz(1)
 
     def may_skip(self, number: int) -> bool:

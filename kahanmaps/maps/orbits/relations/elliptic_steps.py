@@ -18,7 +18,7 @@ from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.sections import exponents
 from kahanmaps.maps.somos import Terms
 
-_PRIME = 2**61 - 1  # modulo which skipped points are shown to exist
+_PRIME = 2**61 - 1  # the prime modulo which skipped points are shown to exist
 
 
 class EllipticSteps:
@@ -114,7 +114,7 @@ class EllipticSteps:
 
 
 class Coordinates:
-    """A group of coordinates on one curve; `forms` has one row for each coordinate, the last row is the denominator."""
+    """A group of coordinates on one curve; `forms` has a row for each numerator, and a last row for the denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
         self.W, self.degree, self._U, self._primes = W, degree, U, primes
