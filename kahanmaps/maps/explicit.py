@@ -33,7 +33,7 @@ def explicit_map(
         inverse: the functions of the inverse map, if known; they are not verified here.
 
     Returns:
-        The map, exact. Without `inverse`, the inverse is computed by elimination when it is needed, if it exists.
+        The map, exact. Without `inverse`, the inverse is computed by elimination when it is first needed.
 
     Raises:
         InputError: if the number of functions is not n, or they contain other names.

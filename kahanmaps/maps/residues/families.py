@@ -24,10 +24,10 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 
-MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
+MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, also multiplied by nu, stay below 2^53
 MAX_DIMENSION = 6  # largest number of variables of a map
 NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
-_CHUNK_SIZE = 128  # members measured in one call of the kernel
+_CHUNK_SIZE = 128  # number of members measured in one call of the kernel
 LONG = 200  # number of members from which on compiling saves time
 
 Members = NDArray[np.int64]
@@ -112,7 +112,7 @@ class Family:
         return degrees
 
     def units(self, degrees: Sequence[int]) -> float:
-        """Return the work, in units (algebra/work.py), for one member whose iterates have these degrees, from the 0th.
+        """Return the work, in units (algebra/work.py), for one member whose iterates 0, 1, ... have these degrees.
 
         The units were fitted to the compiled kernel in dimensions 2 to 5; the slower kernel counts the same units.
         """
