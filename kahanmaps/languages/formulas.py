@@ -60,7 +60,7 @@ class Formulas:
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
         self.integrals: Mapping[str, RationalFunction] = file.integrals
         self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H
-        if self.symbols:  # parse the claims again, with these names
+        if self.symbols:  # parse the integrals, the density and H again: they contain the symbols now
             constants = {name: value for name, value in file.parameters.items() if name not in self.symbols}
             document = file.document
 
@@ -80,7 +80,7 @@ class Formulas:
 
     @cached_property
     def forms(self) -> dict[str, fmpq_mat]:
-        """The matrices M_k = J (A^T)^k, k < m, by name: a member (A, H) has the integrals x^T M_k x~/eps of its map."""
+        """The matrices M_k = J (A^T)^k, k < m, by name; for a member (A, H), each x^T M_k x~/eps is an integral."""
         member = self.file.member
         if member is None:
             return {}
@@ -138,7 +138,7 @@ class Formulas:
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError if they are too large; this takes at most about a second unless coefficients are long.
+        Raises InputError if they are too large. The computation takes about a second unless the coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load

@@ -49,7 +49,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with a rational number near the root as value of its symbol. Raises InputError for a nonreal root."""
+        """The map whose symbol has a rational value near the root. Raises InputError if the root is not real."""
         return self._at_number(self.root.real_approximation())
 
     @property

@@ -46,7 +46,7 @@ class MapFactor:
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
-        """Return the map over a field. Raises BadPrime; raises InputError if the value of a symbol has a pole."""
+        """Return the map over a field. If the value of a symbol has a pole, raises BadPrime, over Q InputError."""
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:
@@ -86,7 +86,7 @@ class ComposedMap(MapFamily):
 
     @property
     def _elementary_factors(self) -> list[tuple[Any, int]]:
-        """The factors, and those of nested compositions, as pairs (data, `time_steps`), negative for an inverse."""
+        """The elementary factors, nested ones included: pairs (data, `time_steps`, which is < 0 for an inverse)."""
         elementary_factors: list[tuple[Any, int]] = []
         for map_factor in self.parts:
             factors = [(map_factor.map_and_values, map_factor.map.time_steps)]
@@ -119,7 +119,7 @@ class ComposedMap(MapFamily):
 
     @property
     def multiplied_out(self) -> ImplicitMap:
-        """The map by its expanded formulas, without an inverse. Raises TooLarge, an InputError, if it is too large."""
+        """The expanded map, without an inverse. Raises TooLarge (an InputError) if its formulas are too long."""
         if self._multiplied_out is None:
             raise TooLarge(_too_large_message(self.parts))
         return self._multiplied_out
@@ -255,7 +255,7 @@ def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 
 def is_involution(map_: MapFamily) -> bool:
-    """Return whether x = Phi(Phi(x)) for the map Phi at 3 random points mod primes; True is wrong with p < 2^-40."""
+    """Test Phi(Phi(x)) = x for the map Phi at 3 random points modulo primes; True is wrong with probability < 2^-40."""
     rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)

@@ -74,7 +74,7 @@ class Equation:
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
         """Return the image of (X_1 : ... : X_n : Z) over any ring, as a vector in the kernel of L.
 
-        The entries of this vector may have a common factor. They are the values of `explicit`, or else the minors of L.
+        The entries may have a common factor. They are the values of the forms `explicit`, if any, or the minors of L.
         """
         if self.explicit is None:
             minors = kernel_minors(self.rows(self.monomials(X, times), None), times)

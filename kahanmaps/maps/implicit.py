@@ -220,7 +220,7 @@ class Map(LatexDisplay):
             yield factor, x
 
     def determinant(self, point: Sequence[Any]) -> Any:
-        """Return det M(x); for several factors, the product of their det M, each at the point before the factor."""
+        """Return det M(x); for several factors, the product of their det M, each at the point that the factor maps."""
         first_determinant, *other_determinants = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
             return reduce(mul, other_determinants, first_determinant)
@@ -471,7 +471,7 @@ class ImplicitMap(MapFamily):
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
     inverse map, if known. Otherwise the inverse is computed: by exchanging x and x~ if M and r have degree 1 in the
     variables, else by elimination. `title` is the kind of map in one or two words. `time_steps` is 1 if a step
-    approximates a flow for the time 2 eps, otherwise 0. `of_field` is the field of this flow in the first variables.
+    approximates a flow for the time 2 eps, else 0. `of_field` is the vector field of this flow in the first variables.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")

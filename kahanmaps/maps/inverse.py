@@ -118,7 +118,7 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
     """Return a random prime field, and a list over it: a random point (x, x~) of the graph, the symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
-    while True:  # the loop ends: finitely many primes are bad, and the matrix is singular on a hypersurface only
+    while True:  # the loop ends: finitely many primes are bad, and M is singular on a hypersurface only
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         arguments = [field.random(rng) for _ in names]
         try:

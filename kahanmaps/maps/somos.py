@@ -21,7 +21,7 @@ _MAX_DIRECT_INDEX = 8  # up to this n, quotients of s(n) are computed from s(n);
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
     """Return the lists of W(1) to W(4) and U(1) to U(4), with W(1) = U(1) = U(2) = 1, W(2) = H and W(3) = H^3.
 
-    U is a sequence at Q + n T: H U(n)^2/(U(n + 1) U(n - 1)) is y for n = 2, z for n = 3. ZeroDivisionError for 0.
+    U is a sequence at Q + n T: H U(n)^2/(U(n + 1) U(n - 1)) is y for n = 2, z for n = 3. Raises ZeroDivisionError.
     """
     one = H / H
     a = H / y
@@ -62,7 +62,7 @@ class Integers:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return (integer, scale) of a nonzero value. ArithmeticError if its denominator has a prime not in `power`."""
+        """Return (integer, scale), value != 0. Raises ArithmeticError if its denominator has a prime not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)

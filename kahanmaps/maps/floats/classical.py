@@ -1,10 +1,10 @@
-"""One-step methods for quadratic vector fields in floating point, for comparison with Kahan's; time step h = 2 eps.
+"""One-step methods for quadratic vector fields in floating point, to compare with Kahan's method; time step h = 2 eps.
 
 The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
 numpy code, or compiled. The equations of implicit methods are quadratic. Newton's method solves them, starting at the
 step of Kahan's method. After an iteration with the corrections d_j of the stages, the residual of stage i is exactly
 h sum_j a_ij Q(d_j, d_j) (Q: quadratic part of f; (a_ij): matrix of the method). The test of convergence uses its size.
-The fast step takes two iterations. If the test fails, the careful step takes eight; if it fails again, the orbit ends.
+The fast step takes two iterations. If the test fails, the careful step takes eight; without convergence the orbit ends.
 Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
@@ -31,7 +31,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROUNDING = 2.0**-52  # relative size of a residual below which the equations count as solved
 _STALLED = 1e-10  # relative size below which the last correction of a careful step counts as round-off
-_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # of Newton's method, in the fast and in the careful step
+_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # numbers of Newton iterations in the fast and in the careful step
 
 
 class Method(NamedTuple):

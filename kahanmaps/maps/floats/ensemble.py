@@ -251,8 +251,8 @@ class FloatEnsemble(AttributeHints):
     def statistics(self) -> dict[str, dict[str, float]]:
         """Return distributions over the orbits: of the largest drift of each integral, and of the escape steps.
 
-        The former are over the orbits that completed their steps, by the name of the integral. If a radius is given,
-        "escape step" is the distribution of `escaped_at` over the orbits that escaped. See `distribution`.
+        The drift distributions (keys: the names of the integrals) are over the orbits that completed their steps.
+        With a radius, "escape step" is the distribution of `escaped_at` over the escaped orbits. See `distribution`.
         """
         is_complete = self._batch.status == RUNNING
         results = {drift.name: distribution(drift.largest[is_complete]) for drift in self.drift}

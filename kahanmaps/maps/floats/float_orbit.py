@@ -143,7 +143,7 @@ class FloatOrbit:
                     return
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """Yield pairs (step reached, array (count, dim) of the points to be yielded since the previous portion)."""
+        """Yield pairs (step reached, array (count, dim) of the points at multiples of `every` since the last pair)."""
         if (
             self.end is not None or self._ensemble.step
         ):  # create a new ensemble: the old one would continue the previous iteration

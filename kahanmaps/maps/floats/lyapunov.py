@@ -143,7 +143,7 @@ def lyapunov_exponents(
         progress: a function that is called with a message for each portion.
 
     Returns:
-        The exponents (Lyapunov). If a TimeLimit is raised, they are over the counted steps completed before it.
+        A `Lyapunov` object. If a TimeLimit is raised, its exponents are over the counted steps completed before.
 
     Raises:
         InputError: for eps = 0, for fewer than 2 steps, and for initial points of a wrong shape.

@@ -172,7 +172,7 @@ class MachineCode:
             return "\n".join(lines), [name(x) for x in code.outputs]
 
         def repeat_for_rows(*lines: str) -> str:
-            """Repeat lines for each row i; `fast` and `careful` are the names of its images in these two steps."""
+            """Repeat lines for each row i of a state; {fast} and {careful} stand for its images in these two steps."""
             return "\n".join(
                 line.format(i=i, fast=fast_image[i], careful=careful_image[i]) for i in rows for line in lines
             )
@@ -220,7 +220,7 @@ class MachineCode:
     def advance(
         self, batch: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
     ) -> None:
-        """Advance the orbits low, ..., high - 1 by `steps` steps from step `first`; `tables` are at most two."""
+        """Advance the orbits low, ..., high - 1 by `steps` steps from step `first`, with at most two tables."""
         records: list[Any] = []
         for interval, states in tables:
             records += [states.ctypes.data, interval, interval - first % interval]

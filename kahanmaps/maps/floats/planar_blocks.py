@@ -2,7 +2,7 @@
 
 At a root r of chi the Kahan map of a member is a map of the plane (u, v), given by a binary cubic h_r (see
 kahanmaps/family/planar.py). Let (U, V) = 2 eps (u, v) and h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3. Half the second
-derivatives of h are A = a U + b V, B = b U + c V and C = c U + d V. Then the map is Cramer's rule for two equations:
+derivatives of h are A = a U + b V, B = b U + c V and C = c U + d V. Cramer's rule for two equations gives the map:
 
     U~ = ((1 + B) U + C V)/w,     V~ = ((1 - B) V - A U)/w,     w = (1 + B)(1 - B) + A C = 1 + eps^2 D.
 

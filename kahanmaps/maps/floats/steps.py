@@ -6,7 +6,7 @@ blocks (planar_blocks.py), and the same equation splits into blocks of two rows.
 small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular* if a
 pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
 
-With one kernel, results agree to the last bit for any number of orbits and threads, however the steps are divided.
+With one kernel, results agree to the last bit for any number of orbits and threads, and for any portions of steps.
 """
 
 from __future__ import annotations

@@ -358,7 +358,7 @@ def solve(rows: Sequence[Sequence[Any]], entry_bound: Callable[[], Any], checks:
 
 
 def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
-    """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
+    """Write the operations that solve two equations by Cramer's rule; entries may be complex (`ComplexPair`)."""
     # The bound for the pivot a d - b c grows with b c: digits are lost if a d and b c cancel, however large they are.
     (a, b, r), (c, d, s) = rows
     bc = b * c

@@ -19,17 +19,17 @@ from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.fields import RR
 
-_SCALE = 10**15  # the inverse of the accuracy of rotation numbers
+_SCALE = 10**15  # rotation numbers have errors of at most 1/_SCALE
 _MIN_EXCLUDED_SIZE = 10  # if relations with coefficients up to this size are possible, the answer is "undecided"
 _MAX_PRIME = 4000  # largest prime modulo which curves are compared
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Whether an orbit is dense in the components that it visits: True and False are proved, None is undecided.
+    """Whether an orbit is dense in the components that it visits: True and False are proved, None is not proved.
 
-    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if density
-    is not decided. If `prime` is given, no two level curves are isogenous modulo this prime (proved); then the orbit is
+    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved); it is given
+    for None only. If `prime` is given, no two level curves are isogenous modulo this prime (proved); then the orbit is
     Zariski dense and all integrals are constant on the level set. None: no such prime was found or needed.
     """
 
@@ -91,7 +91,7 @@ def separating_prime(gamma_polynomial: fmpq_poly) -> int | None:
     """Return a prime where the curves of all roots of `gamma_polynomial` have good reduction, no two isogenous.
 
     All roots must lie in GF(p). Two curves are not isogenous over any extension of GF(p) if the product of the
-    discriminants a^2 - 4p of their Frobenius maps is not a square. Returns None if no prime below 4000 shows this.
+    discriminants a^2 - 4p of their Frobenius maps (a: trace) is not a square. None if no prime below 4000 shows this.
 
     >>> separating_prime(fmpq_poly([6, -5, 1])), separating_prime(fmpq_poly([9, -6, 1]))
     (7, None)

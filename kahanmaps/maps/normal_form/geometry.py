@@ -47,13 +47,13 @@ _MAX_GAMMA_BITS = 4000  # largest number of bits of gamma for which a height is 
 class Rotation:
     """The rotation of an orbit on its level curve at one real root, or at one pair of complex roots, of chi.
 
-    `number` is the rotation number in (0, 1/2], up to sign: one application rotates the circle by this part of a turn.
-    It belongs to the iterate of `steps` steps of the map. `steps` is 2 if the level curve has two real components that
-    the map exchanges, otherwise 1. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are
-    the coordinates of the translation in a reduced basis of the periods. `flow` is the rotation number of the flow for
-    the time 2 eps. `phase_error` is `number` minus `flow`, the error of the phase in one step;
-    None if the level of the initial point is singular at some smaller eps. `component` is the component of the closed
-    level curve that contains the initial point, "oval" or "unbounded", if the curve has two.
+    `number` is the rotation number in (0, 1/2], up to sign: `steps` steps of the map rotate the circle by this part of
+    a turn. `steps` is 2 if the level curve has two real components that the map exchanges, otherwise 1. At complex
+    roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of the translation in a
+    reduced basis of the periods. `flow` is the rotation number of the flow for the time 2 eps. `phase_error` is
+    `number` minus `flow`, the error of the phase in one step; it is None if the level of the initial point is singular
+    at some smaller eps. If the closed level curve has two components, `component` says which of them contains the
+    initial point: "oval" or "unbounded".
     """
 
     root: str
@@ -179,7 +179,7 @@ class LevelGeometry(PrintableResult):
     def components(self) -> int | None:
         """The number of components of the real level set with its points at infinity; None if a level is singular.
 
-        If there are several, the orbit visits two of them alternately, since the map exchanges the two in a plane.
+        If there are several, the orbit visits two of them alternately: planes with two components exchange them.
         """
         if any(plane.kind is not PeriodKind.SMOOTH for plane in self.planes):
             return None
@@ -321,7 +321,7 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Yield tuples (plane, point of the start in it, kind of the level curve, gamma, rotations on a smooth level)."""
+    """Yield tuples (plane, initial point in it, kind of the level curve, gamma, rotations on a smooth level)."""
     form: Any = getattr(normal_form, "form", normal_form)
     splitting = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):

@@ -65,7 +65,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 
 
 def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int:
-    """Return some k > 0 with k T = 0; k T must be 0 for some k = `center` + m `modulus` with |m| <= `radius`.
+    """Return some k > 0 with k T = 0; some number `center` + m `modulus`, |m| <= `radius`, must annihilate T.
 
     m is written as i (2b + 1) - j, |j| <= b: there are b baby steps of `modulus` T, and a giant step is 2b + 1 of them.
     """
@@ -93,7 +93,7 @@ def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int
 
 
 class LevelCubic:
-    """A smooth level cubic denominator h - numerator W (W^2 + D), as a group with one of its points as zero.
+    """The smooth level cubic denominator h = numerator W (W^2 + D), as a group with one of its points as zero.
 
     Sums are computed from chords and tangents, without a Weierstrass equation. Points are triples, not normalized.
     """

@@ -349,8 +349,8 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     """Compute the period over Q of the orbit of `start` under the Kahan map at `eps`, or prove that it is aperiodic.
 
     `eps` is half the time step, exact. Reduction modulo an unramified odd prime of good reduction is injective on
-    torsion points. So T has infinite order if its orders modulo two such primes differ; if all orders agree on n,
-    n T = 0 is tested over the field itself.
+    torsion points. So T has infinite order if its orders modulo two such primes differ. If T has the same order n
+    modulo all primes tried, the equation n T = 0 is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form

@@ -31,7 +31,7 @@ from kahanmaps.algebra.integers import (
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
-_MAX_LENGTH_RATIO = 1 << 20  # a value is short if its bad part, and the ratio of its lengths at two roots, is smaller
+_MAX_LENGTH_RATIO = 1 << 20  # a value is short if its bad part and the ratios of its lengths at the roots are smaller
 _MIN_RELATIVE_LENGTH = arb(2) ** -50  # smallest length at a root that is used, relative to the largest
 
 
@@ -58,7 +58,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> ShortElements:
-        """The representation of the values of tau functions."""
+        """The object that represents values of tau functions by short elements."""
         return ShortElements(self.algebra, self.bad)
 
     @cached_property
@@ -86,7 +86,7 @@ class AlgebraBlock(LevelBlock):
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Return numerators of the coefficients of U/W and V/W, their denominator, and a number of exceptional primes.
+        """Return numerators of the coefficients of U/W and V/W, their denominator, and a third number (see below).
 
         If a prime divides the denominator, but neither `bad` nor the third number, exactly one prime ideal above it
         divides W, and this ideal has degree 1. If W is not rational, the level of the initial point must be defined.
@@ -226,7 +226,7 @@ class ShortElements:
         return (value, self._algebra.one) if value == 0 else self.split(value)
 
     def lifts(self, points: Sequence[Triple]) -> tuple[fmpz_mat, fmpz]:
-        """Return the integer matrix c M and c, where M maps the coefficients of (a_1, a_2, a_3) to sum a_i P_i."""
+        """Return (c M, c), c an integer: M maps the coefficients of a_1, a_2, a_3 to sum a_i P_i, P_i in `points`."""
         degree = self._algebra.degree
         blocks = [[point[i].matrix.tolist() for point in points] for i in range(3)]
         rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]

@@ -1,10 +1,10 @@
 """Planes over Q in integers: primitive triples, and the bad primes.
 
 h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
-factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k. Its content must be removed: otherwise the
-numbers would double their length with every step. Up to primes that divide 6 disc(h) den(level), the content of
+factor; the scale contains eps. Psi is quadratic, so the content of Psi(P_k) must be removed: otherwise the numbers
+would double their length with every step. Up to primes that divide 6 disc(h) den(level), the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
-lifts of `tau`. Single steps remove the content by gcds; they are used for short orbits, and on singular cubics, where
+lifts of `tau`. Single steps remove the content by gcds. They are used for short orbits, and on singular cubics, where
 numbers hardly grow.
 """
 
@@ -68,7 +68,7 @@ class LevelBlock(ABC):
     @staticmethod
     @abstractmethod
     def shortest(triple: Triple) -> Triple:
-        """Return the normalized triple of the same point."""
+        """Return the normalized triple of the point with this triple."""
 
 
 class IntegerBlock(LevelBlock):
@@ -93,13 +93,13 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer divisible by all primes where the rule for the content may fail (see above); disc(h) != 0."""
+        """An integer with all primes at which the content rule (module docstring) may fail; requires disc(h) != 0."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad` which most numbers that occur do not exceed in the exponents of their bad primes."""
+        """A power of `bad` that is divisible by the bad parts of most numbers."""
         return self.bad**3
 
     @cached_property

@@ -56,8 +56,8 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     norm = abs(K.norm(resultant)).p
 
     def uncertain_part(Q: Any) -> fmpz:
-        """Return the part of the norm of R at the primes where doubling Q cancels factors; 1 if there are none."""
-        # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; `norm_of_denominator` gives norms of ideals.
+        """Return the part of the norm of `resultant` at the primes where doubling Q cancels factors; 1 if none."""
+        # The numerator of x(2Q) is a quartic form, the denominator 4 Y^2; `norm_of_denominator` gives norms of ideals.
         full_norm = abs(K.norm(4 * Q[1] * Q[1])) * norm_of_denominator(Q[0]) ** 4
         cancelled_norm = full_norm / norm_of_denominator(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
         return split_by_primes(norm, cancelled_norm.p)[1]

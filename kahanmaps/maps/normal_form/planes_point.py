@@ -114,12 +114,12 @@ class PlanesPoint:
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
-        """Return for each plane the numerators of the coordinates, their denominator, and a number of other primes."""
+        """Return the results of `fraction` for each plane: numerators of the coordinates, denominator, third number."""
         return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
     def height(self) -> int:
-        """The bit length of the largest integer if x has its least common denominator; computing it takes a gcd.
+        """The bit length of the largest integer, with x over its least common denominator; computing it takes a gcd.
 
         `bits` differs by a few bits, but is much too large if denominators of planes have common factors.
         """
@@ -257,7 +257,7 @@ class NormalSteps:
         return blocks, Assembly(blocks, [self.splitting.matrix(i) for i in range(len(planes))])
 
     def points(self, start: Sequence[Any]) -> Iterator[PlanesPoint]:
-        """Yield the orbit, as long as the map is defined."""
+        """Yield the points of the orbit of `start`, as long as the map is defined."""
         blocks, assembly = self.blocks(start)
         for triples_at_step in zip(*(triples(block) for block in blocks), strict=False):
             yield PlanesPoint(assembly, triples_at_step)

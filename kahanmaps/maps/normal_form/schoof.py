@@ -33,14 +33,14 @@ class _TorsionPoints:
         self.f, self.c, self.A = f, c % f, A
 
     def inverse(self, value: Poly) -> Poly:
-        """Return 1/value modulo f. Raises _Divisor."""
+        """Return 1/value modulo f. Raises _Divisor if there is no inverse."""
         common_factor, inverse, _ = value.xgcd(self.f)
         if common_factor.degree() > 0:
             raise _Divisor(common_factor)
         return inverse % self.f
 
     def add(self, P: Point, Q: Point) -> Point:
-        """Return P + Q. Raises _Divisor."""
+        """Return P + Q. Raises _Divisor if an element has no inverse modulo f."""
         if P is None or Q is None:
             return Q if P is None else P
         (X, Y), (Z, T), f = P, Q, self.f

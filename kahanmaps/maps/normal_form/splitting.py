@@ -188,7 +188,7 @@ def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], lis
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
-    """Return the monic irreducible factors over Q: linear factors by root, then the others by degree, coefficients."""
+    """Return the monic irreducible factors over Q: linear factors by root, then others by degree and coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 

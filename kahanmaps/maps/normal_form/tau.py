@@ -38,7 +38,7 @@ _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then hold
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    After P_n the terms of both sequences are kept from the index n/2 - 4 on.
+    After P_n, only the terms of both sequences from the index n/2 - 4 on are stored.
     """
     table = table_near(block)
     if table is None:
@@ -95,7 +95,7 @@ def _divide(triple: Triple, denominator: Any) -> Triple:
 
 
 def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
-    """Return chi_n for some n from -2 to 4, from natural lifts of the points around P_0."""
+    """Return {n: chi_n} for `indices` between -2 and 4, from natural lifts of the points around P_0."""
     rows = {-2: (-2, -1, 1), -1: (-2, 0, 1), 0: (-1, 0, 1), 1: (-1, 0, 2), 2: (-1, 1, 2), 3: (0, 1, 2), 4: (0, 1, 3)}
     values = {n: determinant(*(P[k] for k in rows[n])) for n in indices}
     return {n: value if n % 3 else 3 * value for n, value in values.items()}

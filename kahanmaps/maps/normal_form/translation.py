@@ -89,8 +89,8 @@ def iterate(
 def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     """Return r = W/s, s^2 = -D, at a start with delta = 0 and an image; None if D = 0 (P_n = P_0 + n (P_1 - P_0)).
 
-    A step decreases r by 1, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r if r is
-    a positive integer, and no pole otherwise. r is a rational function of the values of r^2 at the start and its image.
+    A step decreases r by 1. The image has W' = W^2 - s^2, which is 0 for r = 1 or r = -1. So the orbit meets a pole at
+    step r if r is a positive integer, and no pole otherwise. r is computed from r^2 at the start and at its image.
     """
 
     def squared_ratio(point: Triple) -> Any:

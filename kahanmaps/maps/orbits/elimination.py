@@ -28,7 +28,7 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     """
     n = matrix.nrows()
     rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous_pivot = fmpz(1)  # the previous pivot; 1 after a pivot that need not divide the entries
+    previous_pivot = fmpz(1)  # 1 at the beginning, and after a pivot that need not divide the entries
     for k in range(0, n - 1, 2):
         a, b, rows_below, m = rows[k], rows[k + 1], rows[k + 2 :], n - k - 2
         # Replace each entry of the other rows by its minor of order 3 with the pivot rows, divided by `previous_pivot`.

@@ -1,6 +1,6 @@
 """Forward substitution for maps with a triangular equation, such as explicit maps, on points given by fractions.
 
-Each row of M x~ = r contains one unknown that does not occur in the rows solved before it. Let x_k = p_k/q_k in lowest
+Each row of M x~ = r contains exactly one unknown that is not in the rows solved before it. Let x_k = p_k/q_k in lowest
 terms. The entries of a row are homogenized in each pair (p_k, q_k) separately. The resulting integers are shorter than
 integers over a common denominator of all coordinates, since only the coordinates that occur in the row enter.
 """

@@ -131,7 +131,7 @@ class Orbit(HtmlDisplay):
         max_digits: the largest number of decimal digits of the numerators and their common denominator (over Q).
         normal_form: if given (family.system_normal_form), steps are taken in the normal form: over Q plane by plane;
             over balls each point directly from the initial point, so that balls do not widen from step to step.
-        is_requested: returns whether a step is requested; steps for which it returns False may be skipped.
+        is_requested: a function that returns whether a step is requested; other steps may be skipped.
 
     `first` is the list of the first points, `last` the last point yielded so far.
 

@@ -50,7 +50,7 @@ _MAX_SINGLE_STEPS = 10**13  # more single steps would take years
 _MAX_STEPS_WITHOUT_SEARCH = {"exact": 20, "float": 3, "ball": 3, "mod": DOUBLING_FROM["mod"] - 1}
 _LONG_INPUT_BITS = 4000  # if eps or the initial point has more bits, no normal form is searched for up to 24 steps
 _MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
-_FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
+_FALLBACK_BITS = 4096  # precision of the balls if no precision that was tried suffices
 _BITS_PER_DIGIT = 3.3219281
 
 
@@ -140,7 +140,7 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    if is_float:  # an initial point or eps in floats is accepted, and converted exactly
+    if is_float:  # an initial point in floats is accepted, and converted exactly
         start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
             if isinstance(x, float) and not math.isfinite(x):

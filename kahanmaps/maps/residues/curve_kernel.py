@@ -1,4 +1,4 @@
-"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in integers of 64 bits.
+"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in doubles that are integers.
 
 An element a + b w of GF(p^2), with w^2 = nu not a square modulo p, is a pair of doubles that are integers in [0, p); a
 polynomial is an array (2, length). By the choice of p and of the largest length, sums of products stay below 2^53, so

@@ -72,7 +72,7 @@ class OrbitCurve(PrintableResult):
 
     @cached_property
     def height(self) -> arb | None:
-        """The canonical height of the point."""
+        """The canonical height of `point`."""
         if self.curve is None or self.point is None:
             return None
         return canonical_height(self.curve, self.point) if self.order is None else arb(0)
@@ -103,7 +103,7 @@ class OrbitCurve(PrintableResult):
 
     @property
     def steps(self) -> int:
-        """1; or 2 if the iterate exchanges two real components, and `rotation` belongs to the square of the iterate."""
+        """1, or 2 if the iterate exchanges two real components; then `rotation` belongs to the iterate's square."""
         return self._rotation[1]
 
     @cached_property
@@ -280,7 +280,7 @@ def _on_elliptic_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
     a2, a3 = W3 / W2**2, W2
     a1 = (W4 / a3**4 + a3) / a2
     curve, T = EllipticCurve(a2 + a1 * a1 / 4, a1 * a3 / 2, a3 * a3 / 4), (fmpq(0), a3 / 2)
-    # T belongs to `stride` steps of factors; `factor_steps` is a multiple of `stride` and a number of whole map steps.
+    # T belongs to `stride` steps of factors; `factor_steps` is the least common multiple of `stride`, `factor_count`.
     factor_count = len(map_over.factors)
     factor_steps = math.lcm(factor_count, steps.stride)
     iterate = factor_steps // factor_count
@@ -323,7 +323,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return points up to the first return, enough for a period or a rational curve; None follows if no point does."""
+    """Return enough points to show a period or a rational curve; they end at a return, or with None for no point."""
     dim = map_over.dim
     map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
