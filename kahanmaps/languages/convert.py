@@ -30,7 +30,7 @@ PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "d
 
 _MAX_LINE = 100  # maximal number of characters in a line of an expression
 _MAX_SUM = 100  # maximal number of terms of a sum: longer sums are grouped by brackets, as parsers recurse over terms
-_MAX_INTEGER = 2**31  # in C and Fortran, integers of at least this absolute value are written as floats
+_MAX_INTEGER = 2**31  # in C, Fortran and NumPy, integers of at least this absolute value are written as floats
 # Names that have no other meaning in any language: a lower-case letter with digits (except i, which may be the
 # imaginary unit, and e), and words with an underscore (except those of GP's debugger). Other words may be functions.
 _SAFE_NAME = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")

@@ -138,7 +138,7 @@ class Formulas:
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError if they are too large. The computation takes about a second unless the coefficients are long.
+        Raises InputError if they are too large. Computing them takes at most a second unless coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load

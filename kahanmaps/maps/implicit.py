@@ -418,7 +418,7 @@ class MapFamily(LatexDisplay, ABC):
     @property
     @abstractmethod
     def digits(self) -> int:
-        """The approximate number of digits of the longest coefficient, if all have a common denominator."""
+        """The approximate number of decimal digits of the longest coefficient, with all over a common denominator."""
 
     @abstractmethod
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:

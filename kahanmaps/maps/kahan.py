@@ -1,6 +1,6 @@
 """The Kahan (Hirota-Kimura) map of a quadratic system, over any field.
 
-Throughout the library, eps is the paper's epsilon, the time step is 2 eps. For f(x) = Q(x, x) + B x + c, x~ solves
+Throughout the library, eps is the paper's epsilon and the time step is 2 eps. For f(x) = Q(x, x) + B x + c, x~ solves
 
     (x~ - x) / (2 eps) = Q(x, x~) + B (x + x~)/2 + c,
 

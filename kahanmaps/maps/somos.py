@@ -62,7 +62,7 @@ class Integers:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return (integer, scale), value != 0. Raises ArithmeticError if its denominator has a prime not in `power`."""
+        """Split a nonzero value as (integer, scale). ArithmeticError if a denominator has primes not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)

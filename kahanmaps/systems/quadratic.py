@@ -180,7 +180,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @cached_property
     def digits(self) -> int:
-        """The approximate number of digits of the longest coefficient, if all have a common denominator."""
+        """The approximate number of decimal digits of the longest coefficient, with all over a common denominator."""
         return digits_of(self.rhs)
 
     def __repr__(self) -> str:

@@ -228,7 +228,7 @@ def _sum(values: Any) -> Any:
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """Return the step x~ = x + sum_i w_i z_i, where w is `weights` and z_i = h sum_j A_ij f(x + z_j).
+    """Return the writer of the step x~ = x + sum_i w_i z_i, where w is `weights` and z_i = h sum_j A_ij f(x + z_j).
 
     Newton's method finds the z_i. Their initial values lie on a parabola given by f(x) and a step of Kahan's method.
     """

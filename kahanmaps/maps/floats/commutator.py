@@ -24,7 +24,7 @@ _ROUNDING = 1e-13  # a commutator below this, relative to the size of the points
 
 @dataclass(frozen=True)
 class Commutator:
-    """Measured |Phi_g Phi_f^n x - Phi_f^n Phi_g x|/max(1, largest coordinate of Phi_f^n x and Phi_f^n Phi_g x).
+    """The size |Phi_g Phi_f^n x - Phi_f^n Phi_g x|/max(1, largest coordinate of Phi_f^n x, Phi_f^n Phi_g x), measured.
 
     `by_step` contains pairs (n, size) for n = 1, 2, 4, ... and the last n; `largest` is the largest size for any n.
     `by_eps` contains pairs (eps, size) at n = 1 for eps, eps/2, eps/4, ... `slope` is the slope of log size over log

@@ -4,7 +4,7 @@ The program of a step (straight_line_program.py) is translated to LLVM's interme
 orbits, inside a loop over the steps, and compiled in a fraction of a second. (Numba would take 10 to 20 seconds for the
 same loop, mostly for its analysis of Python code, and would need a cache on disk.) The loop advances a vector of
 orbits, or a single orbit, through all steps in registers. After each step it checks whether the fast step was valid in
-all orbits of the vector; the other orbits take the careful step, and their status is recorded. Without
+all orbits of the vector; orbits in which it was not valid take the careful step, and their status is recorded. Without
 fast-math flags no operation is contracted or reordered, so the results are equal to those of numpy.
 
 Machine code is called through ctypes, which releases the interpreter lock, so threads can work on ranges of orbits.

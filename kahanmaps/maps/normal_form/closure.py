@@ -28,9 +28,9 @@ _MAX_PRIME = 4000  # largest prime modulo which curves are compared
 class Closure:
     """Whether an orbit is dense in the components that it visits: True and False are proved, None is not proved.
 
-    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved); it is given
-    for None only. If `prime` is given, no two level curves are isogenous modulo this prime (proved); then the orbit is
-    Zariski dense and all integrals are constant on the level set. None: no such prime was found or needed.
+    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if
+    `is_dense` is None. If `prime` is given, no two level curves are isogenous modulo this prime (proved). Then the
+    orbit is Zariski dense and all integrals are constant on the level set. None: no such prime was found or needed.
     """
 
     is_dense: bool | None
@@ -88,7 +88,7 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
 
 
 def separating_prime(gamma_polynomial: fmpq_poly) -> int | None:
-    """Return a prime where the curves of all roots of `gamma_polynomial` have good reduction, no two isogenous.
+    """Return a prime modulo which all curves of roots of `gamma_polynomial` are good and no two are isogenous.
 
     All roots must lie in GF(p). Two curves are not isogenous over any extension of GF(p) if the product of the
     discriminants a^2 - 4p of their Frobenius maps (a: trace) is not a square. None if no prime below 4000 shows this.

@@ -106,7 +106,7 @@ class OrbitInPlanes:
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
         """Return (n, Phi^n(start), 0), or for a step over the budget (step, its point, its bits or None if unknown).
 
-        The point is None if it was not computed or if the step is a pole (then with 0 bits).
+        The point is None if it was not computed. For a pole at step k the result is (k, None, 0).
         """
         step = max(1, min(self._last_reachable_step, n - 1))
         target_step = n if self._numbers_stay_short else _halve_above(n, step)

@@ -80,7 +80,7 @@ class Family:
         """Return the degrees d_1, ..., d_terms of each member as a row, for one random line each.
 
         `members` are residues of the symbols, one row for each member; an additional column contains eps. Without this
-        column, `eps` is an exact number, or None for a random element of GF(p^2) each. `max_length` is the largest
+        column, `eps` is an exact number, or None: a random element of GF(p^2) per member. `max_length` is the largest
         number of coefficients of a polynomial before common factors are removed. A degree is -2 (TOO_LARGE) beyond this
         number, and -1 (NOWHERE) if the iterate is defined nowhere. `kernel`: "numpy" or "numba"; `jobs`: threads.
         """

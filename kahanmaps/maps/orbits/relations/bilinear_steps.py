@@ -42,7 +42,7 @@ class BilinearForms:
     def __init__(self, steps: IntegerSteps, lag: int, products: Pairs, coefficients: fmpz_mat) -> None:
         self.lag, self.products, self.coefficients = lag, products, coefficients
         self._steps = steps
-        # Only B_ij for the last j are known, so f_n may have a denominator; this is a multiple of those so far.
+        # Only B_ij for the last j are known, so f_n may have a denominator: `_multiple` is divisible by all so far.
         self._multiple = fmpz(1)
 
     def may_skip(self, number: int) -> bool:

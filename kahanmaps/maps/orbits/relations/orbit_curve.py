@@ -323,7 +323,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return enough points to show a period or a rational curve; they end at a return, or with None for no point."""
+    """Return enough points to show a period or a rational curve; None follows if the orbit ends or gets too long."""
     dim = map_over.dim
     map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
