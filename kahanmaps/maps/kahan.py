@@ -78,7 +78,7 @@ class KahanMap(ElementaryMap):
         time_step: Any = None,
         h: Any = None,
     ) -> None:
-        """`inside` is the eps in the coefficients, if not `eps`: an inverse map has -eps and the same coefficients."""
+        """`inside` is the eps in the coefficients (default `eps`); an inverse has -eps and the same coefficients."""
         if eps is None:
             eps = resolve_eps(eps, time_step, h)
         if not isinstance(system, QuadraticSystem | SystemOver):

@@ -120,7 +120,7 @@ class StraightLineProgram:
 
 
 class Value:
-    """A number or a truth value in a program; constants are floats and bools of Python."""
+    """A number or a truth value in a program; constants are represented by floats and bools of Python."""
 
     def __init__(self, code: StraightLineProgram, number: int) -> None:
         self.code, self.number = code, number

@@ -1,8 +1,8 @@
 """Writers of orbit files, one class for each format: text, json, jsonl, csv, npz and parquet.
 
 Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
-and parquet files are written at the end. Float orbits are passed to them in portions: the rows of an npz file go to a
-temporary file, and in a parquet file each portion is a row group.
+and parquet files are written at the end. Their writers receive float orbits in portions: the rows of an npz file go to
+a temporary file, and in a parquet file each portion is a row group.
 """
 
 from __future__ import annotations

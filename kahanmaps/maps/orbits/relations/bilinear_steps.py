@@ -110,8 +110,8 @@ class _Search:
             independent_columns = pivots(echelon(values, prime))
             self.products = [self.products[k] for k in independent_columns]
             values = [[row[k] for k in independent_columns] for row in values]
-        # f = f_n, for points with last coordinate 1: f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
-        # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
+        # With f = f_n and last coordinates 1, the functions f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
+        # columns, if g is a linear form whose divisor has no component in common with that of the last coordinate.
         unknown_count = len(values[0])
         zeros, rows = [0] * unknown_count, []
         for row, *outer_points in zip(values, images, earliest_points, strict=True):
