@@ -1,7 +1,7 @@
 """Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
 SymPy's code printers (the extra `[sympy]`) write the expressions in every language except PARI and LaTeX. The file
-languages.toml contains the code around them. Numbers stay exact in all languages except C, Fortran and NumPy (floats).
+languages.toml contains the code around the expressions. Numbers stay exact except in C, Fortran and NumPy (floats).
 """
 
 from __future__ import annotations

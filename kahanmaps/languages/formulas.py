@@ -90,8 +90,8 @@ class Formulas:
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
         """Yield the integrals of a Hamiltonian system in x and its image x~: triples (name, formula as text, function).
 
-        For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. They are
-        functions of the variables, the coordinates `new` of x~, the symbols and eps.
+        For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. The names in
+        these functions are the variables, the coordinates `new` of x~, the symbols and eps.
         """
         if self.H is None:
             return
@@ -132,13 +132,13 @@ class Formulas:
         return messages
 
     def inverse_form(self) -> list[RationalFunction]:
-        """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is not known."""
+        """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is unknown."""
         return self._solve([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError if they are too large. Computing them takes at most a second unless coefficients are long.
+        Raises InputError if they are too large. The computation takes at most a second unless coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load

@@ -46,7 +46,7 @@ class MapFactor:
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
-        """Return the map over a field. If a symbol's value has a pole: BadPrime, or InputError in characteristic 0."""
+        """Return the map over a field. A pole of a symbol's value raises BadPrime, in characteristic 0 InputError."""
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:

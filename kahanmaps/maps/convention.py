@@ -22,7 +22,7 @@ NO_EPS = "the map does not depend on eps"
 
 
 def either(hint: str = "", **arguments: Any) -> Any:
-    """Return the only value in `arguments` that is not None; None if all are None. Raises InputError for several."""
+    """Return the only value in `arguments` that is not None, or None. Raises InputError if several are not None."""
     given_values = {name: value for name, value in arguments.items() if value is not None}
     if len(given_values) > 1:
         raise InputError(f"found {' and '.join(given_values)}, expected one of them{hint}")

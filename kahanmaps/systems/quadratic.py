@@ -2,7 +2,7 @@
 
 Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in named variables and
 symbols; `SystemOver` is the system over another field, with the value, the Jacobian and the polarization that the Kahan
-map needs. It uses the constant tensor f'' instead of Q = f''/2, so that it is also defined modulo 2.
+map needs. `SystemOver` uses the constant tensor f'' instead of Q = f''/2, so that it is also defined modulo 2.
 """
 
 from __future__ import annotations

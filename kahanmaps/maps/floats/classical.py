@@ -3,7 +3,7 @@
 The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
 numpy code, or compiled. The equations of implicit methods are quadratic. Newton's method solves them, starting at the
 step of Kahan's method. After an iteration with the corrections d_j of the stages, the residual of stage i is exactly
-h sum_j a_ij Q(d_j, d_j) (Q: quadratic part of f; (a_ij): matrix of the method). The test of convergence uses its size.
+h sum_j a_ij Q(d_j, d_j) (Q: quadratic part of f; (a_ij): matrix of the method). Its size is the test of convergence.
 The fast step takes two iterations. If the test fails, the careful step takes eight; without convergence the orbit ends.
 Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """

@@ -100,7 +100,7 @@ class Lyapunov(ResultPart):
 
     @property
     def change(self) -> FloatArray:
-        """The absolute differences of the mean exponents over the first half of the steps and over all steps."""
+        """The absolute differences between the mean exponents over the first half of the steps and over all steps."""
         return np.abs(_statistic_over_orbits(np.mean, self.half) - self.mean)
 
     @property

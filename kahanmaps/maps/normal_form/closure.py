@@ -30,7 +30,7 @@ class Closure:
 
     `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if
     `is_dense` is None. If `prime` is given, no two level curves are isogenous modulo this prime (proved). Then the
-    orbit is Zariski dense and all integrals are constant on the level set. None: no such prime was found or needed.
+    orbit is Zariski dense and all integrals are constant on the level set. Otherwise `prime` is None.
     """
 
     is_dense: bool | None

@@ -168,7 +168,7 @@ class LevelGeometry(PrintableResult):
     """The geometry of the level set of the integrals through a point, and of the map on it.
 
     The n-th iterate has about `height_constant` n^2 bits for large n, if all levels are smooth. `closure` says whether
-    the orbit is dense in the real components that it visits; None if it is fixed or a level is singular.
+    the orbit is dense in the real components that it visits; None if the orbit is fixed or a level is singular.
     """
 
     planes: tuple[PlaneGeometry, ...]
@@ -179,7 +179,7 @@ class LevelGeometry(PrintableResult):
     def components(self) -> int | None:
         """The number of components of the real level set with its points at infinity; None if a level is singular.
 
-        If there are several, the orbit visits two of them alternately: planes with two components exchange them.
+        If there are several, the orbit alternates between two: the map exchanges the components in a plane with two.
         """
         if any(plane.kind is not PeriodKind.SMOOTH for plane in self.planes):
             return None

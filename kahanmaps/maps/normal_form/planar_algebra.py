@@ -44,7 +44,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer divisible by small primes, and by those modulo which the start or its image may be (0, 0, 0)."""
+        """An integer divisible by small primes and all primes modulo which the start or its image may be (0, 0, 0)."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant
@@ -113,7 +113,7 @@ class AlgebraBlock(LevelBlock):
         return [entry // common_factor for entry in numerators], norm.p // common_factor, coprime_content
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
-        """Return a number divisible by all primes that may divide form and its denominator; None if every prime may.
+        """Return a number divisible by all primes that may divide the form and its denominator; None if any prime may.
 
         The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K, since the elements of the basis
         dual to 1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).

@@ -14,7 +14,7 @@ on which Psi is a translation. Let delta = disc(h) level^2. On the Jacobian
 
     y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2,      gamma = 1 - delta,
 
-Psi is the translation by T = (0, 0); E is singular for delta = 0 and for gamma = 0, where it consists of three lines
+Psi is the translation by T = (0, 0). E is singular for delta = 0, and it consists of three lines for gamma = 0
 (docs/mathematics.md). Coefficients and coordinates may be from any field, or integers: only sums and products occur.
 """
 

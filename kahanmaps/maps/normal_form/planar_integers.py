@@ -68,7 +68,7 @@ class LevelBlock(ABC):
     @staticmethod
     @abstractmethod
     def shortest(triple: Triple) -> Triple:
-        """Return the normalized triple of the point with this triple."""
+        """Return the normalized triple that is proportional to `triple`."""
 
 
 class IntegerBlock(LevelBlock):
@@ -93,7 +93,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer with all primes at which the content rule (module docstring) may fail; requires disc(h) != 0."""
+        """An integer divisible by all primes at which the content rule (module docstring) may fail; disc(h) != 0."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 

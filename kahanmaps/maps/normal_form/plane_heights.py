@@ -109,7 +109,7 @@ def _is_integral(element: Any) -> bool:
 
 
 def _denominator(elements: Any) -> int:
-    """Return an integer whose products with all these elements of Q[t]/g are integral."""
+    """Return an integer whose products with all `elements` of Q[t]/g are integral."""
     denominator = fmpz(1)
     for element in elements:
         denominator = denominator.lcm(element.polynomial.denom())

@@ -1,7 +1,7 @@
 """Rational points stored as primitive triples in the planes; x is computed from the triples only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
-product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
+product of the W_i take a few multiplications. For fractions in lowest terms, three kinds of common factors must be
 removed. First, the gcds of the W_i with each other. Second, the primes of the fixed numbers, i.e. the denominators of
 alpha, beta and the level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V), hence
 h(beta, -alpha). Third, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.

@@ -1,9 +1,9 @@
 """The number of points of an elliptic curve modulo small primes, by Schoof's algorithm, over a field of any size.
 
 For a curve y^2 = c(x) over q elements with q + 1 - t points, the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
-F^2 - t F + q = 0. To find t modulo l, the equation is tested for t = 0, ..., l - 1 on the points of order l, whose x
-are the roots of the division polynomial f of degree (l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c. An
-element without inverse modulo f gives a divisor of f, which replaces f. FLINT's polynomials make this fast enough.
+F^2 - t F + q = 0. To find t modulo l, the equation is tested for t = 0, ..., l - 1 on the points of order l. Their
+x-coordinates are the roots of the division polynomial f of degree (l^2 - 1)/2: computations are modulo f and y^2 = c.
+An element without inverse modulo f gives a divisor of f, which replaces f. FLINT's polynomials make this fast enough.
 """
 
 from __future__ import annotations

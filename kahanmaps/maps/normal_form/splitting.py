@@ -101,7 +101,7 @@ class Splitting:
             return triples
 
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
-        """Return the point with these homogeneous coordinates. Raises SingularStep if W = 0 in a triple."""
+        """Return the point with the homogeneous coordinates `triples` in the planes. Raises SingularStep if W = 0."""
         with self.field.working():
             coordinates = [self.field.zero] * self.dim
             for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):

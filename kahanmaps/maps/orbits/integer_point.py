@@ -37,7 +37,7 @@ class IntegerPoint:
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit that was certainly reduced (no common factor)."""
         return self.bits
 
     @staticmethod
@@ -160,7 +160,7 @@ class UnreducedPoint(IntegerPoint):
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit that was certainly reduced (no common factor)."""
         return self._previous_state[1] if self.keeps_factors else self.bits
 
     def lowest_terms(self) -> list[Fraction]:

@@ -195,7 +195,7 @@ class Orbit(HtmlDisplay):
 
     @property
     def relations(self) -> str | None:
-        """The relations between points that are in use, and the first step that uses them; None if there are none."""
+        """The relations between points in use, with the first step that uses them, as text; None if there are none."""
         if self._rational_orbit is None or self._rational_orbit.relations is None:
             return None
         return f"{self._rational_orbit.relations.name} from step {self._rational_orbit.since} on"

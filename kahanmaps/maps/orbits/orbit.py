@@ -484,7 +484,7 @@ class Trajectory(HtmlDisplay):
         Args:
             dtype: by default float64, to which exact numbers are rounded; for residues int64, or object if int64 is too
                 small. `object` leaves the coordinates unchanged: fmpq, elements of a number field, balls, float, and
-                residues as int. An integer dtype contains them exactly.
+                residues as int. An integer dtype represents the coordinates exactly.
 
         Raises:
             InputError: if the dtype cannot represent the coordinates: for integers, numbers that are not integers or

@@ -95,7 +95,7 @@ class Text(Writer):
 
 
 class JsonLines(Writer):
-    """One JSON object per line; its "record" is "header", "point" or "end"."""
+    """One JSON object per line; the value of the key "record" is "header", "point" or "end"."""
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(json.dumps({"record": "header", **header}))

@@ -2,7 +2,7 @@
 
 An element a + b w of GF(p^2), with w^2 = nu not a square modulo p, is a pair of doubles that are integers in [0, p); a
 polynomial is an array (2, length). By the choice of p and of the largest length, sums of products stay below 2^53, so
-that they are exact. They are reduced by a product with 1/p: floor((x + 1/2)/p) is right if x/p < 2^36, since
+that they are exact. Sums are reduced modulo p by a product with 1/p: floor((x + 1/2)/p) is right if x/p < 2^36, since
 (x + 1/2)/p differs from every integer by at least 1/(2 p).
 
 The functions are ordinary Python until `kernel` replaces them by functions compiled by numba.

@@ -4,7 +4,7 @@ Cramer's rule gives the integers of the next point as determinants, several time
 orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation on it, then the homogeneous
 coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), all products
 X_i(n + 1) X_j(n - lag) and X_k(n) X_l(n + 1 - lag) are sections of one bundle. If the products X_k(n) X_l(n + 1 - lag)
-span its sections, then
+span all sections of this bundle, then
 
     f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
 

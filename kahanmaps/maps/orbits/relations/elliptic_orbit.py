@@ -1,7 +1,7 @@
 """Orbits on elliptic curves: their coordinates are forms in the terms of two Somos sequences, with a proof.
 
 If a map translates the points of an elliptic curve by T, the coordinates at step n are sections of a line bundle of
-degree d at P + n T. They are forms in terms, with indices near n, of the sequences W and U (see `elliptic_search`); the
+degree d at P + n T. They are forms in the terms near n of the sequences W and U (see `elliptic_search`); the
 forms have rational coefficients that do not depend on n. Such terms have 1/d of the length of a coordinate, so a step
 takes short products, and no gcds of long integers. The points of a composition of several maps may lie alternately on
 several curves: after `stride` steps of factors the orbit returns to the same curve, and T is the translation by these
@@ -241,7 +241,7 @@ class _ExactCurves:
             self._all_primes[key] = self._primes.lcm(common_number.p).lcm(common_number.q)
 
     def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
-        """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
+        """Return the steps of the orbit; the sequences begin at the point after `skipped` steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
         new_coordinates = {

@@ -1,4 +1,4 @@
-"""Orbits over Q: single steps until relations between the points are found, which make the later steps faster."""
+"""Orbits over Q: single steps until relations between the points are found; these make the later steps faster."""
 
 from __future__ import annotations
 
