@@ -1,6 +1,6 @@
-"""The formulas of a system that can be converted to another language, as exact polynomials.
+"""The formulas of a system, as exact polynomials, for the conversion to another language.
 
-Parameters of the system are numbers or symbols. Polynomials are in the variables, the symbols and, if needed, eps.
+Parameters of the system are numbers or symbols. Polynomials contain the variables, the symbols and, if needed, eps.
 """
 
 from __future__ import annotations

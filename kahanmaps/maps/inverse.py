@@ -2,8 +2,8 @@
 
 The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so each
 polynomial may be replaced by its irreducible factor that vanishes on the graph; a random point of the graph modulo a
-prime shows which factor this is. An unknown x_k that occurs with degree 1 is solved for and substituted into the other
-equations; if there is no such unknown, resultants eliminate one. The equation of the last unknown is its minimal
+prime shows which factor this is. An equation of degree 1 in an unknown x_k is solved for x_k, which is substituted into
+the others; without such an equation, resultants eliminate an unknown. The equation of the last unknown is its minimal
 polynomial over the field of functions of x~: degree 1 gives a coordinate of the inverse map, degree d > 1 means that a
 generic point of the image has at least d preimages.
 """

@@ -186,9 +186,9 @@ class Terms:
         return self._mixed_quotients[n]
 
     def forget(self, n: int) -> None:
-        """Discard the terms with index below n that terms near 2 n + 8 and later do not need, except the first ones.
+        """Discard terms with index below n, which the terms near 2 n + 8 and later do not need; the first terms remain.
 
-        To recompute the discarded products that are needed again takes a fifth of the time of the first computation.
+        Some discarded products are needed again. Recomputing them takes a fifth of the time of the first computation.
         """
         while self._computation_order and self._computation_order[0] < n:
             self._terms.pop(self._computation_order.popleft(), None)

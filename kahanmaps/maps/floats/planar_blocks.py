@@ -55,7 +55,7 @@ Frame = tuple[list[acb], list[acb]]
 class PlanarBlocks:
     """The planar maps of a normal form at one eps, in doubles.
 
-    The `reals` real blocks come first, by increasing root; then one block for each root with positive imaginary part.
+    The `reals` real blocks come first, sorted by root; then one block for each root with positive imaginary part.
     `coefficients` has a row (a, b, c, d) of complex numbers for each block. `x_to_state` is the 2m x 2m matrix that
     maps x to the rows of the blocks, and `state_to_x` is its inverse.
 

@@ -26,7 +26,7 @@ _MAX_PRIME = 4000  # largest prime modulo which curves are compared
 
 @dataclass(frozen=True)
 class Closure:
-    """Whether an orbit is dense in the components that it visits: True and False are proved, None is not proved.
+    """Whether an orbit is dense in the components that it visits: proved if True or False, not proved if None.
 
     `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if
     `is_dense` is None. If `prime` is given, no two level curves are isogenous modulo this prime (proved). Then the

@@ -76,7 +76,7 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
     def term(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """Return the product of the psi_k, k in `indices`, with all omitted cube roots of gamma but that of psi_n."""
+        """Return the product of the psi_k, k in `indices`, with the omitted cube roots of gamma, except psi_n's."""
         cube_root_count = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
         value = _GAMMA ** (cube_root_count // 3)
         for k in indices:

@@ -276,7 +276,7 @@ def period_of(
     """Compute the period of the orbit of `start`, a point in the coordinates of the system, modulo `prime` or over Q.
 
     `normal_form` is the normal form of the system (family.system_normal_form), or of a member in the same coordinates.
-    All other arguments (prime None: over Q) and results are as in `orbit_period` and `period_over_rationals`.
+    `prime` is None over Q. All other arguments and the results are as in `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form

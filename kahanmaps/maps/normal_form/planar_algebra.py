@@ -3,7 +3,7 @@
 The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes,
 natural lifts are integral, and so are psi and chi (of `tau`). But ideals need not be principal, and an element may be
 short at one root of g and long at another. So a value is multiplied by a short element of the lattice of all elements
-that cancel the bad part of the value. LLL finds such an element, with the lengths at the roots as weights. Any choice
+that cancel the bad part of the value. LLL finds such an element, with the lengths at the roots as weights. Any element
 is correct, since the product of value and scale is exact.
 
 A point (U : V : W) has the rational coordinates U W'/N and V W'/N, where N = W W' is the norm of W.

@@ -83,7 +83,7 @@ class Splitting:
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
-        """Return the rows of R, where x is the sum of R (u, v) over the planes; u, v have entries in the field of x."""
+        """Return the rows of R: x is the sum of R w over the planes, w the coefficients of u and v in x's field."""
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:

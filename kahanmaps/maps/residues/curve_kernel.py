@@ -222,8 +222,8 @@ def walk(
     """Write to degrees[m, s] the degree of the image of the line start[m] under s + 1 steps of map m.
 
     start[m, j] contains the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) are the coefficients of two linear combinations of the coordinates for each step. A
-    line ends before polynomials exceed `max_length`. A degree is -1 if the iterate is defined nowhere.
+    `weights` (steps, 2, 2, n + 1) are the coefficients of two linear combinations of the coordinates for each step. The
+    iteration ends before polynomials exceed `max_length`. A degree is -1 if the iterate is defined nowhere.
     """
     n = start.shape[1] - 1
     power = exponents[0].sum()

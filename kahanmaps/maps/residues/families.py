@@ -34,7 +34,7 @@ Members = NDArray[np.int64]
 
 
 class Family:
-    """A map with symbols modulo an odd prime p < 2^13; each coefficient is a table over monomials in symbols and eps.
+    """A map with symbols modulo an odd prime p < 2^13; a coefficient is a polynomial (table) in the symbols and eps.
 
     Raises InputError for values out of range, BadPrime if the prime divides a denominator.
     """

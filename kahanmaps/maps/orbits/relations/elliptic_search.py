@@ -8,7 +8,7 @@ where s is the sum of the zeros of a section,
 
     z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m))      for an integer k and a sequence r,
 
-so the cross ratios of z give quotients of W and U. Those of four consecutive points are 1 - y(2n + k - 1) with
+so cross ratios of z give quotients of W and U. The cross ratio at four consecutive points is 1 - y(2n + k - 1) with
 
     y(u) = H U(u)^2/(U(u + 1) U(u - 1)),      y(u + 1) y(u) (1 - y(u)) y(u - 1) = H,
 
