@@ -25,7 +25,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 # f'' has dim^3 entries: 10^6 for the largest dimension.
 MAX_DIMENSION = 100
-LONG_COEFFICIENTS = 2_000  # digits; equations with longer coefficients are not set up and solved
+LONG_COEFFICIENTS = 2_000  # number of digits; equations with longer coefficients are not set up and solved
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.maps.implicit import MapFamily
 
 _HALVINGS = 6  # number of values eps, eps/2, eps/4, ... at which the commutator is measured
-_ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, counts as rounding error
+_ROUNDING = 1e-13  # a size of the commutator (see `Commutator`) below this number counts as rounding error
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SAMPLE_INTERVAL = 1000  # default number of steps from one sample of the integrals to the next
-_MAX_SCALAR_ORBITS = 4  # up to this number, machine code advances one orbit after the other
+_MAX_SCALAR_ORBITS = 4  # up to this number of orbits, machine code advances one orbit after the other
 _CHUNKS_PER_THREAD = 8  # more than one, since a thread is slower while another program occupies its core
 _RECORDED_NUMBERS = 1_000_000  # number of coordinates in a portion of recorded points
 

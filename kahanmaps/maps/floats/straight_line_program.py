@@ -379,7 +379,7 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
 
     `entry_bound` returns an upper bound of the |entries| of the matrix; only the fast version needs it.
     """
-    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
+    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row of the matrix
     pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(pivots) < n:  # the matrix is singular at all points
         checks.pivot(0.0, MIN_PIVOT_RATIO)

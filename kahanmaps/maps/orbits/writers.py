@@ -29,9 +29,9 @@ from kahanmaps.version import __version__
 
 # An npz file pads exact numbers to the length of the longest; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
-_CHUNK_SIZE = 1 << 18  # numbers copied in one operation
+_CHUNK_SIZE = 1 << 18  # number of array entries copied in one operation
 _MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file from which on pyarrow is used; rows in one call of it
-_FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
+_FLUSH_AFTER = 4_000  # number of characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
 _TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
 
