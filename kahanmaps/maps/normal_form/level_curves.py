@@ -16,7 +16,7 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 
 _MAX_DIGIT = 2000  # largest prime l at which parts of l-power order are compared, by counting for each digit to base l
-_MAX_RADIUS = 1 << 32  # radius of the largest interval searched without Schoof's algorithm, with about 2^17 steps
+_MAX_RADIUS = 1 << 32  # radius of the largest interval searched without Schoof's algorithm, in about 2^17 steps
 
 
 class Jacobian(EllipticCurve):

@@ -177,7 +177,7 @@ def plane_period(
     if kind in _PERIOD_OF_KIND:
         return PlanePeriod(name, q, kind, *_PERIOD_OF_KIND[kind])
     if kind is PeriodKind.ADDITIVE:
-        # A step decreases W/s by 1, where s^2 = -D: is W/s an element of GF(p)?
+        # A step decreases W/s by 1, where s^2 = -D: the orbit meets a pole if and only if W/s is in GF(p).
         a, b, c = block.D
         (U, V, W), meets_pole = point, False
         if (D := a * U * U + b * U * V + c * V * V) != 0:

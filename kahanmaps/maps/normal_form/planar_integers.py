@@ -180,7 +180,7 @@ class PlaneIntegers(Integers):
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        # The divisor contains no bad prime.
+        # No bad prime divides `divisor`.
         U, V, W = divide_exactly(undivided_entries, common_part(undivided_entries[::-1], self.power) * divisor)
         return U, V, W
 

@@ -89,7 +89,7 @@ class Assembly:
         for row in self.rows:
             forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
-        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # all rows, over one denominator
+        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, with one denominator
         # The number of bits by which numerators may be longer than the products of triples that give them.
         largest = max(map(abs, table_rows))
         self.extra_bits = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
@@ -154,7 +154,7 @@ class PlanesPoint:
         """Return numerator and denominator of each coordinate in lowest terms, with positive denominators."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
         possible_primes = fmpz(1)  # divisible by all primes that divide two of the W_i
-        *denominators, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest W is only reduced
+        *denominators, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # `product` is first the longest W
         while denominators:
             longest = denominators.pop()
             possible_primes = possible_primes * longest.gcd(product % longest)

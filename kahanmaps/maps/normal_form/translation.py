@@ -126,7 +126,7 @@ def _point_along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any],
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
-    # Coordinates (x, y) stand for x P + y Q; two entries of the triples in which P, Q are independent determine them.
+    # Coordinates (x, y) stand for x P + y Q. Two entries in which P and Q are independent give (x, y).
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
     determinant = P[i] * Q[j] - P[j] * Q[i]
     (a, b), (c, d) = (

@@ -115,8 +115,8 @@ def _section_basis(points: Rows, sections: Sections, prime: int) -> Rows | None:
     count, lag, coordinates = sections.points, sections.lag, sections.coordinates
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
-    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. For g,
-    # two factors suffice: 1 (the last coordinate), and a linear form without zeros in common with the last coordinate.
+    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. Two
+    # factors of g suffice: 1 (the last coordinate), and a linear form without zeros in common with the last coordinate.
     all_products = _products_of_coordinates(points, coordinates, count, lag, prime)
     values = [[row[k] for k in sections.products] for row in all_products]
     product_matrix = matrix(values[: sections.rows], prime)
