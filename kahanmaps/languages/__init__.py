@@ -2,8 +2,8 @@
 
 formulas        the formulas of a system: right-hand sides, equation and closed form of the map, integrals, a density
 convert         the function `convert`, and the files in all languages except LaTeX
-languages.toml  syntax of functions and linear equations in these languages; SymPy's printers write expressions
+languages.toml  syntax of functions and linear equations in these languages (SymPy's printers write the expressions)
 latex           the document in LaTeX
 
-A new language needs a table in languages.toml and an entry in the lists of `convert` and of its command.
+To add a language, add its table to languages.toml and its name to the lists of `convert` and of the command convert.
 """

@@ -1,7 +1,7 @@
 """Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
-The code printers of SymPy (the extra `[sympy]`) write expressions, except for PARI; languages.toml contains the code
-around expressions. Numbers stay exact in all languages except C, Fortran and NumPy, which use floats.
+SymPy's code printers (the extra `[sympy]`) write the expressions in every language except PARI and LaTeX. The file
+languages.toml contains the code around the expressions. Numbers stay exact except in C, Fortran and NumPy (floats).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", 
 PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
 
 _MAX_LINE = 100  # maximal number of characters in a line of an expression
-_MAX_SUM = 100  # maximal number of terms of a sum: longer sums are split by brackets, as parsers recurse over sums
-_MAX_INTEGER = 2**31  # bound for integers in C and Fortran
+_MAX_SUM = 100  # maximal number of terms of a sum: longer sums are grouped by brackets, as parsers recurse over terms
+_MAX_INTEGER = 2**31  # in C, Fortran and NumPy, integers of at least this absolute value are written as floats
 # Names that have no other meaning in any language: a lower-case letter with digits (except i, which may be the
 # imaginary unit, and e), and words with an underscore (except those of GP's debugger). Other words may be functions.
 _SAFE_NAME = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
@@ -50,16 +50,16 @@ def convert(
     A system stands for its Kahan map.
 
     Args:
-        system: the system; its parameters are written as the numbers that the file gives.
+        system: the system; its parameters are replaced by their values in its file.
         language: one of `LANGUAGES`, such as "pari" or "latex".
         what: a list of `PARTS`; None for the system, the map, and the integrals and density if they are known.
         name: prefix of the names of all functions, so that one session can load two systems; ignored in LaTeX.
-        symbols: parameters that stay symbols (not in a [family] file); functions have them as arguments after eps.
+        symbols: names of parameters that stay symbols (not for a [family] file); they are arguments after eps.
         command: the command line that creates this file, for the initial comment.
 
     Returns:
-        The text of the file, which is reproducible. If the map depends on eps, its functions have the argument eps (the
-        time step is 2 eps, as stated in the initial comment).
+        The text of the file, the same for the same arguments. If the map depends on eps, its functions have eps as an
+        argument. The initial comment states that the time step is 2 eps.
 
     Raises:
         InputError: for an unknown language or part, an invalid name, integrals or a density that are not known, a
@@ -104,7 +104,7 @@ def convert(
 
 
 class _Writer:
-    """The writer of a file: it first chooses all names; a function is written after the functions that it calls."""
+    """The writer of one file: names are chosen first; each function is written after the functions that it calls."""
 
     def __init__(self, language: str, formulas: Formulas, prefix: str) -> None:
         tables = tomllib.loads(files(__package__).joinpath("languages.toml").read_text("utf-8"))
@@ -126,7 +126,7 @@ class _Writer:
         self.placeholders = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
         self.placeholders |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
         self.placeholders |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
-        # Names of variables and symbols in the file: unchanged unless a name has another meaning; all are distinct.
+        # Names of variables and symbols, all distinct; unchanged unless the language may give them another meaning.
         names = (*formulas.names, *formulas.new)
         unchanged = {name for name in names if _SAFE_NAME.fullmatch(name)}
         unchanged -= set() if self.language["underscores"] else {name for name in names if "_" in name}
@@ -242,7 +242,7 @@ class _Writer:
     ) -> None:
         """Write a function; `points` maps each argument that is a point to the names of its coordinates in the body.
 
-        Without `points` the function has one point as an argument, used as a vector.
+        Without `points`, the function has one point as its argument, and the body uses it as a vector.
         """
         numbers = [*(self.eps if eps else []), *self.symbols]
         coordinates = {
@@ -288,7 +288,7 @@ class _Writer:
             sums = [self.polynomial(side.context().from_dict(group), self.spelling) for group in groups]
             texts.append(sums[0] if len(sums) == 1 else " + ".join(f"({text})" for text in sums))
         expression = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
-        lines = [""]  # every line but the last ends with + or -: no language ends the statement there
+        lines = [""]  # every line but the last ends with + or -, since no language ends a statement there
         for piece in re.split(r"(?<= [+-] )", expression):
             if lines[-1] and len(lines[-1]) + len(piece) > _MAX_LINE:
                 lines.append("")
@@ -317,7 +317,7 @@ class _Writer:
         return Template(self.language[template]).substitute(self.placeholders | values)
 
     def _comment(self, line: str) -> str:
-        # A backslash at the end would continue a comment in C and Maple; the brackets end a comment in Mathematica.
+        # A backslash at the end of a line would continue a comment in C and Maple; *) would end one in Mathematica.
         spelling = re.sub(r"\\$", "/", line.replace("(*", "( *").replace("*)", "* )"))
         before, after = self.language["comment"]
         return f"{before}{spelling}{after}".rstrip()

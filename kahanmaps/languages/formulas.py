@@ -1,6 +1,6 @@
-"""The formulas of a system that can be converted to another language, as exact polynomials.
+"""The formulas of a system, as exact polynomials, for the conversion to another language.
 
-Parameters of the system are numbers or symbols. Polynomials are in the variables, the symbols and, if needed, eps.
+Parameters of the system are numbers or symbols. Polynomials contain the variables, the symbols and, if needed, eps.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
-# Limits for the closed form of the map (all components together) before common factors are removed.
+# Limits for the closed form of the map: terms of each intermediate polynomial, and of all final components together.
 MAX_TERMS = 4_000
 MAX_DIMENSION_OF_FORMULAS = 8  # maximal dimension of the map
 
@@ -34,9 +34,9 @@ MAX_DIMENSION_OF_FORMULAS = 8  # maximal dimension of the map
 class Formulas:
     """The formulas of a system file; the parameters `symbols` stay symbolic, all other parameters are numbers.
 
-    An algebraic number is also a symbol. `names` are the variables, then the symbols. `rhs`, its derivatives `jacobian`
-    and `H` are polynomials in these names; other formulas also contain eps. If the map is not Kahan's, `rhs` is empty.
-    `new` are names for the coordinates of the image x~ of a point.
+    An algebraic number is also a symbol. `names` are the variables, then the symbols. `rhs`, its matrix of derivatives
+    `jacobian`, and `H` are polynomials in these names. The other formulas also contain eps. `rhs` is empty if the map
+    is not Kahan's. `new` are the names of the coordinates of x~, the image of a point x.
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
@@ -60,7 +60,7 @@ class Formulas:
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
         self.integrals: Mapping[str, RationalFunction] = file.integrals
         self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H
-        if self.symbols:  # parse the claims again, with these names
+        if self.symbols:  # parse the integrals, the density and H again: they contain the symbols now
             constants = {name: value for name, value in file.parameters.items() if name not in self.symbols}
             document = file.document
 
@@ -80,7 +80,7 @@ class Formulas:
 
     @cached_property
     def forms(self) -> dict[str, fmpq_mat]:
-        """The matrices M = J (A^T)^k, k < m, of a member (A, H), for which x^T M x~/eps are integrals, by name."""
+        """The matrices M_k = J (A^T)^k, k < m, by name; for a member (A, H), each x^T M_k x~/eps is an integral."""
         member = self.file.member
         if member is None:
             return {}
@@ -88,10 +88,10 @@ class Formulas:
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
-        """Yield the integrals of a Hamiltonian system in x and its image x~ as triples: name, formula (text), function.
+        """Yield the integrals of a Hamiltonian system in x and its image x~: triples (name, formula as text, function).
 
-        For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. They are
-        functions of the variables, the coordinates `new` of x~, the symbols and eps.
+        For a member these are x^T M x~/eps for each M in `forms`, otherwise H(x) + grad H(x)^T (x~ - x)/3. The names in
+        these functions are the variables, the coordinates `new` of x~, the symbols and eps.
         """
         if self.H is None:
             return
@@ -115,7 +115,7 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """A message for "integrals" and for "density" if they are neither claimed in the file nor given by theorems."""
+        """The error messages for "integrals" and "density", if neither the file nor a theorem gives such functions."""
         if self.H is not None:  # the modified H and the density det(I - eps f'(x)) are known
             return {}
         messages = {}
@@ -132,13 +132,13 @@ class Formulas:
         return messages
 
     def inverse_form(self) -> list[RationalFunction]:
-        """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is not found."""
+        """Return the components of the inverse of a map other than Kahan's. Raises InputError if it is unknown."""
         return self._solve([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
         """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError if they are too large; this takes at most about a second unless coefficients are long.
+        Raises InputError if they are too large. The computation takes at most a second unless coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load
@@ -157,7 +157,7 @@ class Formulas:
                 raise _too_large(f"a polynomial of {len(product)} terms, expected at most {MAX_TERMS} in all")
             return product
 
-        # (x~, -1) is in the kernel of (M | r), hence proportional to its signed maximal minors, the last being -+det M.
+        # (x~, -1) is in the kernel of (M | r), hence proportional to the signed maximal minors (the last is -+det M).
         *numerators, denominator = kernel_minors(equation, times)
         components = []
         for minor in numerators:
@@ -169,7 +169,7 @@ class Formulas:
         return components
 
     def header(self, command: str, width: int = 100) -> list[str]:
-        """Return the lines of the initial comment: the system, eps, parameters, sources and the command."""
+        """Return the lines of the initial comment: the system, eps, the parameters, the sources and the command."""
         file = self.file
         title = file.catalog.get("title", "")
         lines = [f"{file.name}: {title}" if title else file.name]

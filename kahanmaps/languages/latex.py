@@ -52,7 +52,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
 
 
 def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
-    """Return the title of a part and the two sides of each of its equations."""
+    """Return the title of a part, and its equations as pairs (left-hand side, right-hand side)."""
     claim_note = "" if formulas.file.catalog else ", as the file claims"
     if part == "system":
         left = (rf"\dot{{{latex_name(name)}}}" for name in formulas.variables)
@@ -124,7 +124,7 @@ def _integral_label(name: str) -> str:
 
 
 def _quotient(left: str, function: RationalFunction) -> Rows:
-    """Return the row left = P/Q if it is short, otherwise separate rows for P and Q without fractions."""
+    """Return the row left = P/Q for the function P/Q if P/Q is short, otherwise also rows for integer P and Q."""
     quotient = latex_rational_function(function)
     if len(quotient) <= _MAX_WIDTH or function.is_polynomial:
         return [(left, quotient)]

@@ -104,7 +104,7 @@ def _file(file: SystemFile) -> Any:
 
 @sympy_form.register
 def _map(map_: Map) -> Any:
-    """Return the coordinates of the image x~ in lowest terms, from M(x) x~ = r(x) for each factor of a composition."""
+    """Return {symbol: coordinate of x~ in lowest terms}; M(x) x~ = r(x) is solved for each factor of a composition."""
     sympy = _sympy()
     if map_.field is not QQ or map_.dim > _MAX_DIMENSION:
         raise InputError(f"found {map_!r}, expected a map over QQ in at most {_MAX_DIMENSION} variables")

@@ -1,4 +1,4 @@
-"""A map whose coefficients contain an algebraic number: a map with a symbol, and the root as value of the symbol."""
+"""A map whose coefficients contain an algebraic number: a map with a symbol whose value is a root of a polynomial."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):
-    """The map `given`, with `root` as value of its only symbol (if any); g is the minimal polynomial of `root`.
+    """The map `given` with `root` as the value of its only symbol (if any); g is the minimal polynomial of `root`.
 
-    By default, `at` returns the map over Q[t]/g. `at_number` is a function that returns the map for a rational value of
+    By default, `at` returns the map over Q[t]/g. `at_number` returns the map for a rational value of the symbol.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
@@ -49,7 +49,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with a rational number near the root for its symbol. Raises InputError if the root is not real."""
+        """The map whose symbol has a rational value near the root. Raises InputError if the root is not real."""
         return self._at_number(self.root.real_approximation())
 
     @property
@@ -57,7 +57,7 @@ class AlgebraicMap(MapFamily):
         raise InputError(self.unsupported_reason)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """Return the map over a field that contains a root of g, the minimal polynomial of `root`. Raises BadPrime."""
+        """Return the map over a field that contains a root of g. Raises BadPrime if there is no reduction modulo p."""
         over = self.root.number_field if over is QQ else over
         if self._cached_root is None or self._cached_root[0] is not over:
             self._cached_root = over, self.root.over(over)

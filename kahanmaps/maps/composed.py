@@ -1,7 +1,7 @@
 """Compositions of maps and of their inverses, evaluated factor by factor.
 
 A composition is not defined at a point if one of its steps is not defined there, even if the expanded formulas of the
-composition are defined. Formulas are expanded only for output.
+composition have a value at this point. Formulas are expanded only for output.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class MapFactor:
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
-        """Return the map over a field. Raises BadPrime; raises InputError if the value of a symbol has a pole."""
+        """Return the map over a field. A pole of a symbol's value raises BadPrime, in characteristic 0 InputError."""
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:
@@ -80,13 +80,13 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum of the factors' `time_steps` if they are powers of one map; otherwise 0: they have no common flow."""
+        """The sum of the factors' `time_steps` if all factors are powers of one map, otherwise 0 (no common flow)."""
         factors = self._elementary_factors
         return sum(steps for _, steps in factors) if all(factor == factors[0][0] for factor, _ in factors) else 0
 
     @property
     def _elementary_factors(self) -> list[tuple[Any, int]]:
-        """The pairs (data of an elementary factor, its `time_steps`, negative for an inverse), nested ones included."""
+        """The elementary factors, nested ones included: pairs (data, `time_steps`, which is < 0 for an inverse)."""
         elementary_factors: list[tuple[Any, int]] = []
         for map_factor in self.parts:
             factors = [(map_factor.map_and_values, map_factor.map.time_steps)]
@@ -100,7 +100,7 @@ class ComposedMap(MapFamily):
         return sum(part.map.digits for part in self.parts)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """Return the map at eps over a field. InputError for eps = 0, BadPrime without reduction modulo the prime."""
+        """Return the map over a field. Raises InputError for eps = 0, BadPrime if it has no reduction modulo p."""
         eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._cache is None or values or self._cache[0] is not over or self._cache[1] is not eps_element:
             parts = [part.at(eps_element, over, values) for part in self.parts]
@@ -119,14 +119,14 @@ class ComposedMap(MapFamily):
 
     @property
     def multiplied_out(self) -> ImplicitMap:
-        """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if these are too long."""
+        """The expanded map, without an inverse. Raises TooLarge (an InputError) if its formulas are too long."""
         if self._multiplied_out is None:
             raise TooLarge(_too_large_message(self.parts))
         return self._multiplied_out
 
     @property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of `names`. Raises InputError if they are too long."""
+        """The coordinates of x~ as functions of `names`. Raises InputError if these functions are too long."""
         return self.multiplied_out.image
 
     @property
@@ -182,12 +182,12 @@ def composed_map(
 
     Args:
         maps: the maps in the order in which they are applied, or pairs (map, power) with any integer as power.
-        variables: names for the coordinates, by default those of the first map; other maps correspond by position.
+        variables: names for the coordinates, by default those of the first map; coordinates are matched by position.
         symbols: the symbols of the composition, by default those of all maps; equal names mean the same symbol.
-        values: for each map the values of its symbols, rational functions of `symbols`; by default each symbol itself.
+        values: for each map a dict {symbol: rational function of `symbols`}; by default each symbol is its own value.
 
     Returns:
-        The map, exact; its inverse is known if all the maps have one.
+        The map, exact; its inverse is known if each of `maps` has a known inverse.
 
     Raises:
         InputError: if the maps have different dimensions or the same variables in another order, and for a negative
@@ -242,7 +242,7 @@ def composed_map(
             orders_text = f"{', '.join(first_map.variables)} and {', '.join(factor.map.variables)}"
             raise InputError(f"the maps must have their variables in the same order: got {orders_text}")
         if factor.is_inverse:
-            _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # raises InputError if it is unknown
+            _ = factor.map.at(1, QQ, [QQ.one for _ in factor.values]).inverse  # InputError if the inverse is unknown
     variables = first_map.variables if variables is None else tuple(variables)
     if len(variables) != first_map.dim:
         raise InputError(f"found {len(variables)} variables for maps of dimension {first_map.dim}, expected as many")
@@ -255,7 +255,7 @@ def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 
 def is_involution(map_: MapFamily) -> bool:
-    """Return whether Phi(Phi(x)) = x at 3 random points modulo primes; True is wrong with probability below 2^-40."""
+    """Test Phi(Phi(x)) = x for the map Phi at 3 random points modulo primes; True is wrong with probability < 2^-40."""
     rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)

@@ -1,7 +1,7 @@
 """The convention for eps and the time step of a map, and the sentences that state it.
 
-A step of a map advances the flow that it approximates by the time `time_steps` * 2 eps: once 2 eps for a Kahan map,
-k times 2 eps for its k-th power. A composition of maps of different vector fields has no flow and no time step.
+A step of a map approximates the flow over the time `time_steps` * 2 eps, which is 2 eps for a Kahan map and k * 2 eps
+for its k-th power. A composition of maps of different vector fields has no flow and no time step.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NO_EPS = "the map does not depend on eps"
 
 
 def either(hint: str = "", **arguments: Any) -> Any:
-    """Return the one argument that is not None; None if all are None. Raises InputError if several are not None."""
+    """Return the only value in `arguments` that is not None, or None. Raises InputError if several are not None."""
     given_values = {name: value for name, value in arguments.items() if value is not None}
     if len(given_values) > 1:
         raise InputError(f"found {' and '.join(given_values)}, expected one of them{hint}")
@@ -41,12 +41,12 @@ def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False
 
 
 def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:
-    """Return the distinct nonzero numbers `time_steps` of the maps that depend on eps; [1] if no maps are given."""
+    """Return the distinct nonzero `time_steps` of those maps that depend on eps, sorted; [1] if no maps are given."""
     return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
 
 
 def time_step(eps: Any, *maps: MapFamily) -> Any:
-    """Return the time step at eps, a number or an element of a field; None unless all maps have the same time step."""
+    """Return the time step at `eps` (a number or an element of a field); None unless it is the same for all maps."""
     steps = _time_steps(maps)
     return 2 * steps[0] * eps if len(steps) == 1 else None
 

@@ -48,7 +48,7 @@ class Equation:
         return int(sum(self.exponents[0]))
 
     def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
-        """Return the values of the monomials at X = (X_1, ..., X_n, Z) over any ring; `times` is its product."""
+        """Return the values of the monomials at X = (X_1, ..., X_n, Z) over any ring; `times` is its multiplication."""
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
@@ -64,7 +64,7 @@ class Equation:
         return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
-        """Return the values of the entries of L, given those of the monomials; an entry without terms is `zero`."""
+        """Return the matrix L, given the values of the monomials; an entry of L without terms is `zero`."""
         return [
             [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
              for entry in row]
@@ -72,9 +72,9 @@ class Equation:
         ]  # fmt: skip
 
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
-        """Return the image of (X_1 : ... : X_n : Z) over any ring, a vector in the kernel of L.
+        """Return the image of (X_1 : ... : X_n : Z) over any ring, as a vector in the kernel of L.
 
-        Its entries, which may have a common factor, are the values of the forms of `explicit`, or else the minors of L.
+        The entries may have a common factor. They are the values of the forms `explicit`, if any, or the minors of L.
         """
         if self.explicit is None:
             minors = kernel_minors(self.rows(self.monomials(X, times), None), times)
@@ -91,8 +91,8 @@ class Equation:
     def explicit(self) -> Equation | None:
         """The numerators and the common denominator of an explicit map (rows Q_i x~_i = P_i), as a single row.
 
-        These forms have no common factor. The value is None if the map is not explicit, if the forms are long, and over
-        fields other than QQ and GF(p).
+        These forms have no common factor. The value is None if the map is not explicit, if the forms have more than
+        `_MAX_TERMS` terms or are constant, and over fields other than QQ and GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None
@@ -103,7 +103,7 @@ class Equation:
             return None
         denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
         forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
-        # If fractions are not in lowest terms, their common denominator may share a factor with all numerators.
+        # If some P_i/Q_i is not in lowest terms, the common denominator may share a factor with all numerators.
         common_factor = reduce(lambda P, Q: P.gcd(Q), forms)
         forms = [form / common_factor for form in forms]
         degree = forms[-1].total_degree()
@@ -132,7 +132,7 @@ class Equation:
         ]
 
     def transposed(self) -> Equation:
-        """Return the equation of the inverse map, with x and x~ exchanged (up to sign); only for degree 1."""
+        """Return the equation of the inverse map, where x and x~ are exchanged (up to sign); degree 1 is required."""
         if self.degree != 1:
             raise InputError(f"found an equation of degree {self.degree} in the point, expected degree 1")
         n = self.dim
@@ -148,7 +148,7 @@ class Equation:
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """Return the equation with the `rows` of (M | -r) over a field; `point` contains the values of symbols and eps.
+    """Return the equation with these `rows` of (M | -r) over a field; `point` gives the values of the symbols and eps.
 
     Raises BadPrime if a coefficient has no reduction modulo the prime.
     """
@@ -171,7 +171,7 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     else:
         monomials = dict.fromkeys(m for row in rows_by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in monomials]
-    is_exact = over is QQ or over.characteristic > 0  # the number in a ball that contains 0 need not be 0
+    is_exact = over is QQ or over.characteristic > 0  # a ball that contains 0 may represent a nonzero number
     index = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
         tuple(tuple((index[m], c) for m, c in entry.items() if not is_exact or c != 0) for entry in row)

@@ -33,10 +33,10 @@ def explicit_map(
         inverse: the functions of the inverse map, if known; they are not verified here.
 
     Returns:
-        The map, exact. Without `inverse`, the inverse is computed by elimination when it is needed, if it exists.
+        The map, exact. Without `inverse`, the inverse is computed by elimination when it is first needed.
 
     Raises:
-        InputError: if the number of functions is not n, or they contain other names.
+        InputError: if the number of functions is not n, or if a function contains other names.
 
     >>> explicit_map(["x", "y"], ["y", "(y + 2)/x"])([1, 3]), explicit_map({"x": "y", "y": "(y + 2)/x"})([1, 3])
     ((3, 5), (3, 5))

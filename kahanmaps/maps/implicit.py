@@ -4,15 +4,15 @@ M is a matrix and r a vector of polynomials. For Kahan's method and f(x) = Q(x, 
 (I + eps B) x + 2 eps c; for a map given by rational functions, M is the diagonal matrix of their denominators. Other
 discretizations that are linear in the new point have this form as well. There are three kinds of objects:
 
-* `MapFamily` is the map over Q, with eps as a parameter. Its subclass `ImplicitMap` is made from M and r: to add a
-  discretization, write a function that returns one.
+* `MapFamily` is the map over Q, with eps as a parameter. Its subclass `ImplicitMap` is made from M and r. To add a
+  discretization, write a function that returns an `ImplicitMap`.
 * `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
   (usually one), each an `ElementaryMap` with an equation.
-* `Equation` contains the coefficients of M and r over that field (equation.py), which all evaluators use; the generic
-  evaluator, over any field, is in this module.
+* `Equation` contains the coefficients of M and r over that field (equation.py). All evaluators use it. This module
+  contains the generic evaluator over any field.
 
 In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix L =
-(M | -r) of forms of one degree. If this degree is 1, exchanging the two points gives the inverse map.
+(M | -r) of forms of one degree. If this degree is 1, exchanging (X : Z) and (X~ : Z~) gives the inverse map.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 
 class Map(LatexDisplay):
-    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different eps.
+    """A composition of birational maps over a field, each at one eps; `eps` is None if the maps have different eps.
 
     For a map that does not depend on eps, `has_eps` is False and `eps` is arbitrary.
     """
@@ -87,7 +87,7 @@ class Map(LatexDisplay):
         return f"Map({', '.join(self.variables)}; {eps_text}{time_step_text}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
-        """Return the map as plain data: "eps" is None if the factors differ in eps, "time_step" if there is no flow."""
+        """Return plain data about the map; "eps" is None if factors differ in eps, "time_step" is None without flow."""
         eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
         return {"map": repr(self), "eps": eps, "time_step": step}
 
@@ -98,7 +98,7 @@ class Map(LatexDisplay):
 
     @property
     def is_bilinear(self) -> bool:
-        """Whether all equations are linear in the old point (all are linear in the new point)."""
+        """Whether the equations, which are linear in the new point x~, are also linear in the old point x."""
         return all(equation.degree == 1 for equation in self.equations)
 
     def denominator_name(self, backward: bool) -> str:
@@ -213,7 +213,7 @@ class Map(LatexDisplay):
         return self.inverse.step(point)
 
     def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
-        """Yield the pairs (factor, point to which this factor is applied). Raises SingularStep."""
+        """Yield the pairs (factor, point to which it is applied). Raises SingularStep if a factor is not defined."""
         x = self.point(point)
         for k, factor in enumerate(self.factors):
             x = self.factors[k - 1].step(x) if k else x
@@ -248,7 +248,7 @@ class ElementaryMap(Map):
     """The map of one equation M(x) x~ = r(x) over a field.
 
     `backward` is a function that returns the equation of the inverse. If it is None, the equation must have degree 1;
-    x and x~ are then exchanged. KahanMap overrides the methods for M, r and N(x, x~) by faster ones.
+    x and x~ are then exchanged. KahanMap has faster methods for M, r and N (see `numerator_matrix`).
     """
 
     def __init__(
@@ -381,7 +381,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def scales_with_eps(self) -> bool:
-        """Whether eps Phi(x, eps) is known to depend on eps x only, so that results at eps = 1 hold for every eps."""
+        """Whether eps Phi(x, eps), for the map Phi, is known to depend on eps x only: eps = 1 then covers every eps."""
         return False
 
     @property
@@ -407,7 +407,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def kind(self) -> str:
-        """The kind of map, with an article."""
+        """The kind of map as text, with an article."""
         return f"{'an' if self.title[0] in 'aeiou' else 'a'} {self.title}"
 
     @property
@@ -418,7 +418,7 @@ class MapFamily(LatexDisplay, ABC):
     @property
     @abstractmethod
     def digits(self) -> int:
-        """Approximate number of decimal digits of the longest coefficient, all written over a common denominator."""
+        """The approximate number of decimal digits of the longest coefficient, with all over a common denominator."""
 
     @abstractmethod
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
@@ -461,7 +461,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @abstractmethod
     def written(self) -> dict[str, Any]:
-        """Return the map as text, for records."""
+        """Return the map as plain data, for records."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -469,9 +469,9 @@ class ImplicitMap(MapFamily):
     """The map of an equation M(x, eps) x~ = r(x, eps), given by the `rows` of (M | -r).
 
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
-    inverse map, if known. Otherwise the inverse is computed: by exchanging the points if M and r have degree 1 in the
+    inverse map, if known. Otherwise the inverse is computed: by exchanging x and x~ if M and r have degree 1 in the
     variables, else by elimination. `title` is the kind of map in one or two words. `time_steps` is 1 if a step
-    approximates a flow for the time 2 eps, otherwise 0. `of_field` is its vector field in the first variables, or None.
+    approximates a flow for the time 2 eps, else 0. `of_field` is the vector field of this flow in the first variables.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -552,7 +552,7 @@ class ImplicitMap(MapFamily):
         return digits_of(entry for row in self.rows for entry in row)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
-        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime without reduction modulo p."""
+        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction mod p."""
         eps_element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for cached_field, cached_eps, map_at_eps in self._cached_maps:
             if cached_field is over and cached_eps is eps_element:
@@ -584,11 +584,11 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 
 
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
-    """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
+    """Return an error message for a map given by the user, tested at random points modulo primes; "" if all tests pass.
 
     The map must be defined and dominant, and a given inverse map must be its inverse. A wrong map passes the test at
-    each of the three points with probability below 2^-40. `root`, if given, is the value of the only symbol; the primes
-    are then those modulo which the root exists.
+    each of the three points with probability below 2^-40. `root`, if given, is the value of the only symbol; then only
+    primes are used modulo which the root exists.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     passed_count = 0

@@ -2,8 +2,8 @@
 
 The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so each
 polynomial may be replaced by its irreducible factor that vanishes on the graph; a random point of the graph modulo a
-prime shows which factor this is. An unknown x_k that occurs with degree 1 is solved for and substituted into the other
-equations; if there is no such unknown, resultants eliminate one. The equation of the last unknown is its minimal
+prime shows which factor this is. An equation of degree 1 in an unknown x_k is solved for x_k, which is substituted into
+the others; without such an equation, resultants eliminate an unknown. The equation of the last unknown is its minimal
 polynomial over the field of functions of x~: degree 1 gives a coordinate of the inverse map, degree d > 1 means that a
 generic point of the image has at least d preimages.
 """
@@ -28,9 +28,9 @@ Rows = tuple[tuple[fmpq_mpoly, ...], ...]
 Quotient = tuple[Any, Any]  # numerator and denominator, polynomials
 Solution = dict[int, Quotient]  # from the index of an unknown among the variables to the value of the unknown
 
-_MAX_TERMS = 3000  # largest number of terms of a polynomial
+_MAX_TERMS = 3000  # maximal number of terms of a polynomial in the elimination
 _PRIME_BITS = 30  # bits of primes: python-flint sorts factors by their coefficients, read as C integers
-_MAX_RESULTANT = 60_000  # of two polynomials: the largest product of their numbers of terms and the sum of degrees
+_MAX_RESULTANT = 60_000  # maximal product, for a resultant, of the two numbers of terms and the sum of the degrees
 
 
 class NotBirational(InputError):
@@ -84,7 +84,7 @@ def inverse_rows(rows: Rows) -> Rows:
 
 
 def why_not_birational(rows: Rows) -> str:
-    """Return why a map is not birational; empty if tests modulo primes at random eps and symbols show nothing."""
+    """Return why a map is not birational; "" if tests modulo primes at random eps and symbols give no reason."""
     n, names = len(rows), names_of(rows[0][-1])
     reasons = []
     for seed in range(2):
@@ -115,10 +115,10 @@ def why_not_birational(rows: Rows) -> str:
 
 
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
-    """Return a random prime field and over it, in one list, a random point (x, x~) of the graph, symbols and eps."""
+    """Return a random prime field, and a list over it: a random point (x, x~) of the graph, the symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
-    while True:  # this ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
+    while True:  # the loop ends: finitely many primes are bad, and M is singular on a hypersurface only
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         arguments = [field.random(rng) for _ in names]
         try:
@@ -141,7 +141,7 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
 
 
 def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], is_on_graph: Callable[[Any], bool]) -> Solution:
-    """Solve equations for the unknowns as functions of the other variables; `polynomials` vanish on the graph."""
+    """Solve the equations `polynomials` = 0 of the graph for the unknowns as functions of the other variables."""
     if not unknowns:
         return {}
     relations: list[Any] = []
@@ -199,7 +199,7 @@ def _coefficients_in(polynomial: Any, u: int) -> list[Any]:
 
 
 def _substitute_quotient(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
-    """Substitute numerator/denominator for the variable with index u; multiply by denominator^(degree in it)."""
+    """Substitute numerator/denominator for variable number u; multiply by denominator^(degree in this variable)."""
     *coefficients, total = _coefficients_in(polynomial, u)
     power = denominator**0
     for coefficient in reversed(coefficients):

@@ -1,6 +1,6 @@
 """The Kahan (Hirota-Kimura) map of a quadratic system, over any field.
 
-For the whole library: eps is the paper's epsilon, the time step is 2 eps. For f(x) = Q(x, x) + B x + c, x -> x~ solves
+Throughout the library, eps is the paper's epsilon and the time step is 2 eps. For f(x) = Q(x, x) + B x + c, x~ solves
 
     (x~ - x) / (2 eps) = Q(x, x~) + B (x + x~)/2 + c,
 
@@ -8,7 +8,7 @@ which is linear in x~; explicitly, Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} 
 its Jacobi matrix is (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
 gen), (Jac).
 
-Like every map (implicit.py), it has an equation M(x) x~ = r(x), with M = I - eps f' and r = (I + eps B) x + 2 eps c.
+Like every map (implicit.py), Phi has an equation M(x) x~ = r(x), with M = I - eps f' and r = (I + eps B) x + 2 eps c.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class KahanMap(ElementaryMap):
         time_step: Any = None,
         h: Any = None,
     ) -> None:
-        """`inside` is the eps in the coefficients, if not `eps`: an inverse map has -eps and the same coefficients."""
+        """`inside` is the eps in the coefficients (default `eps`); an inverse has -eps and the same coefficients."""
         if eps is None:
             eps = resolve_eps(eps, time_step, h)
         if not isinstance(system, QuadraticSystem | SystemOver):
@@ -152,7 +152,7 @@ class KahanMap(ElementaryMap):
 
     @property
     def flow(self) -> tuple[Any, Any] | None:
-        """The flow of the system, with the values of its symbols, for the time step 2 eps."""
+        """The flow as ((system as text, values of its symbols), time step 2 eps); None for a `SystemOver`."""
         if isinstance(self._arguments[0], SystemOver):
             return None
         symbols = self._system_eps if "eps" in self.system.symbols else None, *self.values

@@ -19,7 +19,7 @@ def has_numba() -> bool:
 @cache
 def has_llvm() -> bool:
     """Return whether numba's compiler is installed in a sufficient version: llvmlite 0.45 (numba 0.62)."""
-    from importlib.metadata import PackageNotFoundError, version  # loading it takes longer than the rest of this file
+    from importlib.metadata import PackageNotFoundError, version  # imported only here, since this is slow
 
     try:
         return tuple(map(int, version("llvmlite").split(".")[:2])) >= (0, 45)

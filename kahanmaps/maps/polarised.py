@@ -4,7 +4,7 @@ For x' = f(x) let F be the symmetric d-linear form, in (x, 1), with F(x, ..., x)
 
     (x_{k+d-1} - x_k) / ((d - 1) h) = F(x_k, x_{k+1}, ..., x_{k+d-1}),      h = 2 eps,
 
-is linear in the last and in the first point: a birational map of (x_k, ..., x_{k+d-2}). For d = 2 it is Kahan's map.
+is linear in the last and in the first point: it gives a birational map of (x_k, ..., x_{k+d-2}), Kahan's map for d = 2.
 Source: cmoq-2015.
 """
 
@@ -68,7 +68,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     forward = [unit_row(k * n + i, points[k + 1][i]) for k in range(copy_count - 1) for i in range(n)]
     backward = [unit_row((k + 1) * n + i, points[k][i]) for k in range(copy_count - 1) for i in range(n)]
     for i, f in enumerate(rhs):
-        # (d - 1) h F(x_k, ..., x_{k+d-2}, y) is linear in y: the coefficients of y, and the constant term.
+        # (d - 1) h F(x_k, ..., x_{k+d-2}, y) is linear in y: compute the coefficients of y and the constant term.
         linear_coefficients, constant = [zero] * n, zero
         for monomial, coefficient in f.terms():
             indices: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]

@@ -15,7 +15,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.inverse import TooLarge
 
-_MAX_TERMS = 3_000  # terms of a form of a composition, before the common factor is divided out
+_MAX_TERMS = 3_000  # maximal number of terms of a form of a composition, before the common factor is divided out
 
 
 class HomogeneousMap(NamedTuple):

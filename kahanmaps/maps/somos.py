@@ -56,13 +56,13 @@ def _next_term(terms: Sequence[Any], H: Any) -> Any:
 
 
 class Integers:
-    """Arithmetic of rational terms written as integer times rational scale, the integers coprime to `power`."""
+    """Arithmetic of rational terms, each written as an integer coprime to `power` times a rational scale."""
 
     def __init__(self, power: fmpz) -> None:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Return (integer, scale) for `value`, not 0. ArithmeticError if its denominator has a prime not in `power`."""
+        """Split a nonzero value as (integer, scale). ArithmeticError if a denominator has primes not in `power`."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, bad_part = split_by_primes(value.p, self.power)
@@ -186,9 +186,9 @@ class Terms:
         return self._mixed_quotients[n]
 
     def forget(self, n: int) -> None:
-        """Discard the terms with index below n that terms near 2 n + 8 and later do not need, except the first ones.
+        """Discard terms with index below n, which the terms near 2 n + 8 and later do not need; the first terms remain.
 
-        To recompute the discarded products that are needed again takes a fifth of the time of the first computation.
+        Some discarded products are needed again. Recomputing them takes a fifth of the time of the first computation.
         """
         while self._computation_order and self._computation_order[0] < n:
             self._terms.pop(self._computation_order.popleft(), None)

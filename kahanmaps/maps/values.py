@@ -108,7 +108,7 @@ def point_of(arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
 
 
 def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -> tuple[Any, ...]:
-    """Convert a value that `as_point` accepts to a point over the field. InputError for a wrong length and floats."""
+    """Convert a value for `as_point` to a point over `field`. Raises InputError for a wrong length and for floats."""
     if not isinstance(values, tuple):
         values = as_point(values, variables)
     if len(values) != dim:

@@ -13,7 +13,7 @@ from kahanmaps.function_calls import CallableModule
 
 
 def command(name: str | None = None, **parameters: Any) -> Any:
-    """Return the catalogue; or its system with this name, with the given values of its parameters."""
+    """Return the catalogue or, if `name` is given, its system of this name with these values of its parameters."""
     catalog = import_module("kahanmaps.documents.catalog")
     return catalog.catalogue() if name is None else catalog.load(name, **parameters)
 

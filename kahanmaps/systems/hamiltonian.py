@@ -104,7 +104,7 @@ class CubicHamiltonian(LatexDisplay):
         n, zero = self.dim, (0,) * self.dim
         hessian_entries = [component.derivative(j) for i, component in enumerate(self.gradient) for j in range(i + 1)]
         rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in hessian_entries]
-        # In this vector all free unknowns but the last are 0. So the solution is c = 0, if c = 0 is a solution.
+        # In the vector with v[n] != 0, all free unknowns except the last are 0: so c = 0 is taken if it is a solution.
         solution = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
         if solution is None or any(evaluate(component, QQ, solution[:n]) != 0 for component in self.gradient):
             return None

@@ -49,7 +49,7 @@ class PolynomialField:
         return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
 
     def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
-        """Return f . grad P for P = `function`, its derivative along solutions; P may also contain symbols and eps.
+        """Return f . grad P, the derivative of P = `function` along solutions; P may also contain symbols and eps.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x*y", "x")))

@@ -2,7 +2,7 @@
 
 Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in named variables and
 symbols; `SystemOver` is the system over another field, with the value, the Jacobian and the polarization that the Kahan
-map needs. It uses the constant tensor f'' instead of Q = f''/2, so that it is also defined modulo 2.
+map needs. `SystemOver` uses the constant tensor f'' instead of Q = f''/2, so that it is also defined modulo 2.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 # f'' has dim^3 entries: 10^6 for the largest dimension.
 MAX_DIMENSION = 100
-LONG_COEFFICIENTS = 2_000  # digits; equations with longer coefficients are not set up and solved
+LONG_COEFFICIENTS = 2_000  # number of digits; equations with longer coefficients are not set up and solved
 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticSystem(PolynomialField, LatexDisplay):
     """A quadratic system x' = f(x).
 
-    `rhs` are polynomials over Q in the variables, of degree at most 2, and in `symbols`, symbolic constants that may
-    include eps. Raises InputError for a wrong number of right-hand sides, and for a degree above 2.
+    `rhs` are polynomials over Q in the variables and `symbols` (symbolic constants, possibly eps), of degree at most 2
+    in the variables. Raises InputError for a wrong number of right-hand sides, and for a degree above 2.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y - x", "1/2*x^2"])
     >>> system.Q[0]
@@ -180,7 +180,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
     @cached_property
     def digits(self) -> int:
-        """Approximate number of decimal digits of the longest coefficient, all written over a common denominator."""
+        """The approximate number of decimal digits of the longest coefficient, with all over a common denominator."""
         return digits_of(self.rhs)
 
     def __repr__(self) -> str:
@@ -193,7 +193,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
 
 @dataclass(frozen=True, eq=False)
 class SystemOver:
-    """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's.
+    """A quadratic system with coefficients in `field`; points are sequences of field elements, matrices are FLINT's.
 
     `tensor` is f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k. If `B` and `c` are
     None, the system is homogeneous.

@@ -1,7 +1,7 @@
 """Solutions of quadratic systems in balls, from Taylor polynomials with a bound of the remainder.
 
-Let q = max_i (sum |Q_jk| s + sum |B_j| + |c|/s) over the equations, and v_0 = max |x_i|/s + 1 at a point, for a number
-s > 0. Then x/s is majorized by v - 1, where v' = q v^2, so the k-th Taylor coefficient of x_i is at most
+Let q = max_i (sum |Q_jk| s + sum |B_j| + |c|/s) over the equations i, and v_0 = max |x_i|/s + 1 at a point, for a
+number s > 0. Then x/s is majorized by v - 1, where v' = q v^2, so the k-th Taylor coefficient of x_i is at most
 s v_0 (q v_0)^k, and beyond degree p the terms at time t add up to at most s v_0 r^(p + 1)/(1 - r), r = q v_0 t < 1.
 """
 

@@ -1,10 +1,10 @@
-"""One-step methods for quadratic vector fields in floating point, for comparison with Kahan's; time step h = 2 eps.
+"""One-step methods for quadratic vector fields in floating point, to compare with Kahan's method; time step h = 2 eps.
 
 The step of each method is a straight-line program (straight_line_program.py), which runs like a step of a Kahan map: as
-numpy code, or compiled. The equations of implicit methods are quadratic. They are solved by Newton's method from the
-step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), with the quadratic
-part Q of f and the matrix (a_ij) of the method, so that convergence up to rounding can be tested. The fast step takes
-two iterations. If these do not suffice, the careful step takes eight; if it does not converge either, the orbit ends.
+numpy code, or compiled. The equations of implicit methods are quadratic. Newton's method solves them, starting at the
+step of Kahan's method. After an iteration with the corrections d_j of the stages, the residual of stage i is exactly
+h sum_j a_ij Q(d_j, d_j) (Q: quadratic part of f; (a_ij): matrix of the method). Its size is the test of convergence.
+The fast step takes two iterations. If the test fails, the careful step takes eight; without convergence the orbit ends.
 Source: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
@@ -31,7 +31,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROUNDING = 2.0**-52  # relative size of a residual below which the equations count as solved
 _STALLED = 1e-10  # relative size below which the last correction of a careful step counts as round-off
-_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # of Newton's method, in the fast and in the careful step
+_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8  # numbers of Newton iterations in the fast and in the careful step
 
 
 class Method(NamedTuple):
@@ -62,25 +62,25 @@ METHODS = {
 }
 SEPARABLE = {"symplectic-euler", "stormer-verlet"}  # methods for systems with positions and momenta only
 
-_TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods
+_TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods: rows of A, weights b
     "euler": ([[]], [1.0]),
     "rk4": ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
 }
 _ROOT3 = sqrt(3.0)
-# Implicit Runge-Kutta methods: the matrix A, and the weights of the increments in the step, b^T A^-1.
+# Implicit Runge-Kutta methods: the matrix A, and b^T A^-1, the weights of the increments of the stages in the step.
 _IMPLICIT: dict[str, tuple[list[list[float]], list[float]]] = {
     "midpoint": ([[0.5]], [2.0]),
     "gauss4": ([[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]], [-_ROOT3, _ROOT3]),
 }
 IMPLICIT = set(_IMPLICIT)  # names of the implicit methods
-# The coefficients of solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
+# The coefficients of Yoshida's composition of order 6, solution A, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
 _YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
 
 
 def composition(method: str) -> list[fmpq]:
-    """Return the parts of the time step that a symmetric composition of Kahan steps takes one after the other.
+    """Return the fractions of the time step taken by the successive Kahan steps of a symmetric composition.
 
-    The parts are rational approximations beyond double precision, and their sum is exactly 1.
+    They are rational numbers, accurate beyond double precision, and their sum is exactly 1.
 
     >>> [float(share.p) / float(share.q) for share in composition("yoshida4")]
     [1.3512071919596578, -1.7024143839193153, 1.3512071919596578]
@@ -88,7 +88,7 @@ def composition(method: str) -> list[fmpq]:
 
     if method == "yoshida6":
         weights = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
-    else:  # k/2 steps of length 1/(k - k^(1/3)), one step back, and k/2 steps again
+    else:  # k/2 steps of length 1/(k - k^(1/3)), one step backward in time, and k/2 steps again
         k = 4 if method == "suzuki4" else 2
         weights = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
     return [*weights, 1 - 2 * sum(weights, fmpq(0)), *reversed(weights)]
@@ -97,7 +97,7 @@ def composition(method: str) -> list[fmpq]:
 def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
     """Return the numbers of evaluations of f and of linear systems in `steps` steps.
 
-    `repeated` of these steps were repeated by the careful step, with more iterations.
+    The careful step, which takes more iterations, repeated `repeated` of these steps.
 
     >>> work("midpoint", 100), work("midpoint", 100, 1)
     ((300, 300), (309, 309))
@@ -228,9 +228,9 @@ def _sum(values: Any) -> Any:
 
 
 def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
-    """Return the step x~ = x + sum_i w_i z_i, `weights` w, with z_i = h sum_j A_ij f(x + z_j) by Newton's method.
+    """Return the writer of the step x~ = x + sum_i w_i z_i, where w is `weights` and z_i = h sum_j A_ij f(x + z_j).
 
-    It starts from points z_i on a parabola that is determined by f(x) and a step of Kahan's method.
+    Newton's method finds the z_i. Their initial values lie on a parabola given by f(x) and a step of Kahan's method.
     """
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
@@ -238,7 +238,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
         nodes = [sum(row) for row in A]
 
         def matrix(factors: list[list[float]], jacobians: Sequence[Any]) -> list[list[Any]]:
-            """Return the matrix with the blocks delta_rs I - h factors_rs jacobian_s."""
+            """Return the matrix with the blocks delta_rs I - h factors[r][s] jacobians[s] in row r and column s."""
             pairs = [(r, i) for r in range(len(factors)) for i in range(n)]
             return [
                 [float((r, i) == (s, j)) - h * factors[r][s] * jacobians[s][i][j] for s, j in pairs] for r, i in pairs
@@ -251,7 +251,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
         rows = [[*row, b] for row, b in zip(matrix([[0.5]], [field.jacobian(x)]), euler_step, strict=True)]
         kahan_step = solve(rows, lambda: 1.0, StepChecks(False))
         z = [c * a + c * c * (b - a) for c in nodes for a, b in zip(euler_step, kahan_step, strict=True)]
-        # Newton's method. Its pivots need no check of their own: an inaccurate elimination only makes it slower.
+        # Newton's method. The pivots need no check: an inaccurate elimination only slows down the convergence.
         for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
             points = [[a + w for a, w in zip(x, z[k : k + n], strict=True)] for k in range(0, len(z), n)]
             values, rows = [field(point) for point in points], matrix(A, [field.jacobian(point) for point in points])
@@ -267,7 +267,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
             checks.near = True
         else:
             checks.good = checks.good & newton_checks.good
-            # The residuals after the last correction d: h a_ij Q(d, d).
+            # The residuals after the last corrections d_s: h sum_s A_rs Q(d_s, d_s), with the quadratic part Q of f.
             for residual in stage_sums([field(correction[s * n : s * n + n], (2,)) for s in stages]):
                 if not is_zero(residual):
                     checks.good = checks.good & (abs(residual) <= _ROUNDING * size)
@@ -279,7 +279,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
 def separated(
     system: QuadraticSystem, hamiltonian: CubicHamiltonian | None
 ) -> tuple[frozenset[int], frozenset[int]] | str:
-    """Return the positions and the momenta (indices of variables) in H = T(p) + V(q); if there are none, the reason.
+    """Return the indices of the positions q and of the momenta p if H = T(p) + V(q), otherwise the reason as text.
 
     >>> from kahanmaps.documents.catalog import load
     >>> file = load("henon_heiles")

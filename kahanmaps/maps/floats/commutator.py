@@ -19,16 +19,16 @@ from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.maps.implicit import MapFamily
 
 _HALVINGS = 6  # number of values eps, eps/2, eps/4, ... at which the commutator is measured
-_ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, counts as rounding error
+_ROUNDING = 1e-13  # a size of the commutator (see `Commutator`) below this number counts as rounding error
 
 
 @dataclass(frozen=True)
 class Commutator:
-    """Measured sizes of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)), relative to the largest coordinate (at least 1).
+    """The size |Phi_g Phi_f^n x - Phi_f^n Phi_g x|/max(1, largest coordinate of Phi_f^n x, Phi_f^n Phi_g x), measured.
 
-    `by_step` contains pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the maximum over all steps.
-    `by_eps` has pairs (eps, size) at n = 1 for eps, eps/2, eps/4, ...; `slope` is the slope of log size against log
-    eps for the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
+    `by_step` contains pairs (n, size) for n = 1, 2, 4, ... and the last n; `largest` is the largest size for any n.
+    `by_eps` contains pairs (eps, size) at n = 1 for eps, eps/2, eps/4, ... `slope` is the slope of log size over log
+    eps for the last two sizes above rounding error (None without two). `message` says why an orbit ended early, or "".
     """
 
     by_step: tuple[tuple[int, float], ...]

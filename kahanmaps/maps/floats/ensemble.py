@@ -1,7 +1,7 @@
 """Ensembles of float orbits, which are advanced together.
 
-There are two methods: "normal form", if a NormalForm of the system is given (planar_blocks.py, also for h, D and chi),
-and "generic" for any map; steps.py defines a step. There are two kernels: "numpy", which is always available, and
+There are two methods: "normal form", if a NormalForm of the system is given (see planar_blocks.py, which defines h, D
+and chi), and "generic" for any map; steps.py defines a step. There are two kernels: "numpy", always available, and
 "numba", machine code (the extra `fast`; machine_code.py). The results depend on method, kernel and initial points, but
 not on the number of threads, or on the number of steps computed in one portion.
 """
@@ -43,23 +43,23 @@ from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SAMPLE_INTERVAL = 1000  # steps from one sample of the integrals of the planes to the next
-_MAX_SCALAR_ORBITS = 4  # up to this number, machine code advances one orbit after the other
-_CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
-_RECORDED_NUMBERS = 1_000_000  # numbers in a portion of recorded points
+SAMPLE_INTERVAL = 1000  # default number of steps from one sample of the integrals to the next
+_MAX_SCALAR_ORBITS = 4  # up to this number of orbits, machine code advances one orbit after the other
+_CHUNKS_PER_THREAD = 8  # more than one, since a thread is slower while another program occupies its core
+_RECORDED_NUMBERS = 1_000_000  # number of coordinates in a portion of recorded points
 
-# A function of a point; if it has a true attribute `of_arrays`, it is a function of many points (n, dim).
+# A function of one point; if it has a true attribute `of_arrays`, its argument is an array (n, dim) of n points.
 Function = Callable[[Any], Any]
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # probabilities of the quantiles in `distribution`
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drift of an integral: how far its value has moved, with one entry for each orbit.
+    """The drift of an integral, that is, the distance of its values from the initial value, with an entry per orbit.
 
-    `initial` is the value at the initial point (complex at a complex root of chi), `largest` the largest distance from
-    `initial` at the sampled points, `last` the distance at the last sampled point (NaN if the orbit has ended). The
-    distance of a value that is not finite is infinity.
+    `initial` is the value at the initial point (complex for a block at a complex root, see planar_blocks.py). `largest`
+    is the largest distance from `initial` at the sampled points, `last` the distance at the last sampled point (NaN if
+    the orbit has ended). The distance of a value that is not finite is infinity.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Drift:
 
 
 def distribution(values: NDArray[Any]) -> dict[str, float]:
-    """Return minimum, quantiles, maximum and mean of numbers; a quantile is one of the numbers. Empty for no numbers.
+    """Return the minimum, quantiles, maximum and mean of an array; quantiles are entries of it. {} if it is empty.
 
     >>> distribution(np.array([4.0, 1.0, 2.0, np.inf]))
     {'min': 1.0, '5%': 1.0, '25%': 1.0, '50%': 2.0, '75%': 4.0, '95%': inf, 'max': inf, 'mean': inf}
@@ -101,10 +101,10 @@ class FloatEnsemble(AttributeHints):
             an elimination, and loses fewer digits.
         kernel: "numpy" or "numba" (default: numba if installed).
         threads: the number of cores that numba may use (default: all).
-        integrals: functions of a point, or rational functions of the variables and eps, such as those of
-            `load(name).integrals`, by name; their drift is measured at recorded points.
-        sampled: the number of steps from one sample to the next, for the integrals of the planes, and for `integrals`
-            if no points are recorded.
+        integrals: a dict {name: function}, such as `load(name).integrals`; each function has one point as argument, or
+            is a rational function of the variables and eps. Its drift is measured at recorded points.
+        sampled: the number of steps from one sample to the next, for the integrals of the normal form, and for
+            `integrals` if no points are recorded.
         radius: if given, every step is examined, and for each orbit the first point with max |x_i| > radius is stored.
 
     >>> import numpy as np
@@ -251,8 +251,8 @@ class FloatEnsemble(AttributeHints):
     def statistics(self) -> dict[str, dict[str, float]]:
         """Return distributions over the orbits: of the largest drift of each integral, and of the escape steps.
 
-        The drift is over the orbits that completed their steps, by the name of the integral. If a radius is given,
-        "escape step" is the distribution of `escaped_at` over the orbits that escaped. See `distribution`.
+        The drift distributions (keys: the names of the integrals) are over the orbits that completed their steps.
+        With a radius, "escape step" is the distribution of `escaped_at` over the escaped orbits. See `distribution`.
         """
         is_complete = self._batch.status == RUNNING
         results = {drift.name: distribution(drift.largest[is_complete]) for drift in self.drift}
@@ -262,7 +262,7 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
+        """The drift of h/(1 + eps^2 D) for each planar block (planar_blocks.py), and of each of `integrals`."""
         drifts = []
         if self._blocks is not None:
             current_drift = self._blocks.distances(self._batch.z, self._initial_values)
@@ -340,7 +340,7 @@ class FloatEnsemble(AttributeHints):
     def _record_steps(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
         """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: no states)."""
         batch, last_step, rows = self._batch, self.step + steps, self._step.rows
-        # Rough estimates of the time per step; for arrays only a part of the time grows with the number of orbits.
+        # Rough estimates of the seconds per step; with numpy, only a part is proportional to the number of orbits.
         if self._is_compiled:
             speed = 8e9 if self.n > _MAX_SCALAR_ORBITS else 1.5e9
             seconds = self.n * self._step.operations / speed / self._threads
@@ -464,8 +464,8 @@ def ensemble(
     """Return the float orbits of many initial points after `steps` steps.
 
     The arguments are those of `FloatEnsemble`; `x0` is another name of `starts`, `n` of `steps`, and `time_step` or `h`
-    give 2 eps. `starts` may also be a grid or a line, as text: "x=-1:1:20, y=1/2" or "0,0:1,2:50". Raises InputError
-    for a negative number of steps and for invalid arguments.
+    give 2 eps. A text for `starts` describes a grid, as "x=-1:1:20, y=1/2", or points on a line, as "0,0:1,2:50".
+    Raises InputError for a negative number of steps and for invalid arguments.
 
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
     >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
@@ -502,7 +502,7 @@ def require_every(every: int) -> None:
 
 
 def _multiply(matrix: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return matrix @ columns, for columns of shape (..., rows, n), with sums taken from left to right.
+    """Return matrix @ columns, for columns of shape (..., rows, n), with each sum taken from left to right.
 
     BLAS is not used, since its order of summation depends on the shapes of the arrays.
     """

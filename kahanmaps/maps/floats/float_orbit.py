@@ -1,7 +1,7 @@
 """Orbits in floating point, one at a time.
 
-This implementation is independent of the exact one and tested against it. Only `to_floats` converts exact numbers. The
-modules of this folder: `steps` defines a step, `straight_line_program` its operations, `machine_code` compiles these,
+This implementation is independent of the exact orbits and is tested against them. In this folder, `float_conversion`
+rounds exact numbers, `steps` defines a step, `straight_line_program` its operations, `machine_code` compiles these,
 `planar_blocks` is the normal form in doubles, `ensemble` advances many orbits, `npy_file` stores them.
 """
 
@@ -57,8 +57,8 @@ class FloatOrbit:
         every: only the points whose step is a multiple of this number are yielded.
         integrals, sampled: see FloatEnsemble.
 
-    Points are computed in portions, ahead of the point yielded; the near-singular steps and the drift refer to all
-    points computed so far.
+    Points are computed in portions, ahead of the point yielded. The number of near-singular steps and the drift refer
+    to all points computed so far.
 
     >>> orbit = FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 4, every=2)
     >>> [(step, float(x[0])) for step, x in orbit]
@@ -125,11 +125,11 @@ class FloatOrbit:
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the integrals h/(1 + eps^2 D) (planar_blocks.py), one per root of chi, and of `integrals`."""
+        """The drift of h/(1 + eps^2 D) for each planar block (planar_blocks.py), and of each of `integrals`."""
         return tuple(drift.of(0) for drift in self._ensemble.drift)
 
     def interrupt(self) -> None:
-        """Stop a running orbit after the current step."""
+        """Stop a running iteration after the current point, or `portions` after the current portion."""
         self._interrupted = True
 
     def __iter__(self) -> Iterator[tuple[int, FloatArray]]:
@@ -143,7 +143,7 @@ class FloatOrbit:
                     return
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the step reached, and an array (count, dim) of the points since the previous portion."""
+        """Yield pairs (step reached, array (count, dim) of the points at multiples of `every` since the last pair)."""
         if (
             self.end is not None or self._ensemble.step
         ):  # create a new ensemble: the old one would continue the previous iteration
@@ -167,8 +167,8 @@ _NO_LIMIT = 1 << 62  # the number of steps of an orbit without a limit
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
     """Write an orbit to a .npy file of shape (points, dim): the initial point and every `orbit.every`-th iterate.
 
-    `progress` is called with the current step about ten times a second. `orbit.interrupt()` stops after the current
-    portion.
+    Returns how the orbit ended. `progress` is called with the current step about ten times a second. The method
+    `orbit.interrupt()` stops the orbit after the current portion.
     """
     with NpyFile(path, (orbit.dim,)) as file:
         for step, x in orbit.portions():

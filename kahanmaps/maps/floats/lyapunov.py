@@ -3,8 +3,8 @@
 The orbits are computed in portions (ensemble.py). The tangent map dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is
 (I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion together. Tangent maps are
 multiplied along each orbit as long as the product stays well conditioned. The product is then applied to a frame of n
-tangent vectors, which a QR decomposition makes orthonormal again. The sums of the logarithms of the lengths give the
-exponents. The tangent map is the formula for the derivative, evaluated in double precision, not a finite difference.
+tangent vectors, and a QR decomposition makes the frame orthonormal again. The sums of log |R_ii| give the exponents.
+The derivative dPhi is computed by its formula in double precision, not by finite differences.
 Sources: benettin-1980 for the method; petrera-suris-2016, eq. (Jac), for the tangent map.
 """
 
@@ -33,11 +33,11 @@ from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.values import start_rows
 
-MAX_NUMBERS = 20_000_000  # entries of the frames of all orbits together
-_PORTION_ENTRIES = 200_000  # entries of the tangent maps in a portion
+MAX_NUMBERS = 20_000_000  # maximal number of entries of the frames of all orbits together
+_PORTION_ENTRIES = 200_000  # number of entries of the tangent maps in a portion
 _MAX_PORTION_STEPS = 512
-_MAX_LOG_CONDITION = 16.0  # logarithm of the condition number of a product; larger products would lose digits
-_MAX_LOG_NORM = 300.0  # logarithm of the norm of a tangent map, whose square must not overflow
+_MAX_LOG_CONDITION = 16.0  # logarithm of the condition number of a product of tangent maps; larger ones lose digits
+_MAX_LOG_NORM = 300.0  # logarithm of the norm of a tangent map; the square of the norm must not overflow
 _MIN_COMPILED_WORK = 10_000  # orbits times steps; for less work, compiling takes longer than it saves
 
 
@@ -49,7 +49,7 @@ class Lyapunov(ResultPart):
     `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them. `half`
     contains the exponents over the first half of the steps, to show how far they have converged. `log_volume` is the
     mean of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is
-    the number of orbits that overflowed or reached a pole; they are excluded. `steps` is the number of counted steps,
+    the number of orbits that overflowed or became singular; they are excluded. `steps` is the number of counted steps,
     after `transient` uncounted steps; it is smaller than requested if a time limit `stopped` the computation.
     """
 
@@ -100,12 +100,12 @@ class Lyapunov(ResultPart):
 
     @property
     def change(self) -> FloatArray:
-        """The distances of the mean exponents over the first half of the steps from those over all steps."""
+        """The absolute differences between the mean exponents over the first half of the steps and over all steps."""
         return np.abs(_statistic_over_orbits(np.mean, self.half) - self.mean)
 
     @property
     def residual(self) -> float:
-        """The maximum of |sum of exponents - log |det dPhi||, normally round-off; NaN if no orbit was completed."""
+        """The maximum over orbits of |sum of exponents - `log_volume`|, normally round-off; NaN if none completed."""
         return (
             float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max()) if len(self.exponents) else float("nan")
         )
@@ -143,7 +143,7 @@ def lyapunov_exponents(
         progress: a function that is called with a message for each portion.
 
     Returns:
-        The exponents (Lyapunov). If a TimeLimit is raised, they are over the steps completed before it.
+        A `Lyapunov` object. If a TimeLimit is raised, its exponents are over the counted steps completed before.
 
     Raises:
         InputError: for eps = 0, for fewer than 2 steps, and for initial points of a wrong shape.
@@ -238,9 +238,9 @@ def lyapunov_exponents(
 
 
 def _tangent_maps(equations: Sequence[Equation], x: FloatArray, images: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return dPhi and log |det dPhi| at points x (count, n) with these images.
+    """Return dPhi and log |det dPhi| at the points x with the images `images`, both arrays (count, n).
 
-    dPhi is the product over the factors of M(x)^{-1} N(x, x~), where N = -(d/dx)(M x~ - r) at fixed x~.
+    dPhi is the product, over the factors of the map, of M(x)^{-1} N(x, x~), where N = -(d/dx)(M x~ - r) at fixed x~.
     """
     x, image, tangent_map = x.T, images.T, None
     log_volume = np.zeros(len(images))

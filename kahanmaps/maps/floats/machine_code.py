@@ -4,7 +4,7 @@ The program of a step (straight_line_program.py) is translated to LLVM's interme
 orbits, inside a loop over the steps, and compiled in a fraction of a second. (Numba would take 10 to 20 seconds for the
 same loop, mostly for its analysis of Python code, and would need a cache on disk.) The loop advances a vector of
 orbits, or a single orbit, through all steps in registers. After each step it checks whether the fast step was valid in
-all orbits of the vector; orbits in which it was not take the careful step, and their status is recorded. Without
+all orbits of the vector; orbits in which it was not valid take the careful step, and their status is recorded. Without
 fast-math flags no operation is contracted or reordered, so the results are equal to those of numpy.
 
 Machine code is called through ctypes, which releases the interpreter lock, so threads can work on ranges of orbits.
@@ -24,7 +24,7 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, BatchState, FloatStep, RecordTable
 from kahanmaps.maps.floats.straight_line_program import StraightLineProgram, Value
 
-_INSTRUCTIONS = {  # $v: type of a vector of numbers; $m: of truth values; $s: suffix of vector functions
+_INSTRUCTIONS = {  # $v: type of vectors of numbers; $m: type of vectors of truth values; $s: suffix of vector functions
     **{name: f"f{name} $v {{0}}, {{1}}" for name in ("add", "sub", "mul", "div")},
     **{name: f"fcmp {word} $v {{0}}, {{1}}" for name, word in {"gt": "ogt", "le": "ole", "eq": "oeq"}.items()},
     **{name: f"{name} $m {{0}}, {{1}}" for name in ("and", "or")},
@@ -36,7 +36,7 @@ _INSTRUCTIONS = {  # $v: type of a vector of numbers; $m: of truth values; $s: s
 _NEVER = 1 << 62  # a step that no orbit reaches
 
 # The loops over vectors of orbits and over steps. The last vector is padded with orbits that count as ended. Up to two
-# tables are filled, each for the first time after `until` steps, then after every `every` steps.
+# tables are filled: a table receives its first record after `until` steps, then a record after every `every` steps.
 _LOOPS = Template("""
 declare $v @llvm.fabs.$s($v)
 declare i1 @llvm.vector.reduce.and.v${width}i1($m)
@@ -172,7 +172,7 @@ class MachineCode:
             return "\n".join(lines), [name(x) for x in code.outputs]
 
         def repeat_for_rows(*lines: str) -> str:
-            """Repeat lines for each row, with its index and the names of its images in the fast and careful step."""
+            """Repeat lines for each row i of a state; {fast} and {careful} stand for its images in these two steps."""
             return "\n".join(
                 line.format(i=i, fast=fast_image[i], careful=careful_image[i]) for i in rows for line in lines
             )
@@ -220,7 +220,7 @@ class MachineCode:
     def advance(
         self, batch: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
     ) -> None:
-        """Advance the orbits low, ..., high - 1 by `steps` steps from step `first`; there are at most two tables."""
+        """Advance the orbits low, ..., high - 1 by `steps` steps from step `first`, with at most two tables."""
         records: list[Any] = []
         for interval, states in tables:
             records += [states.ctypes.data, interval, interval - first % interval]
@@ -231,7 +231,7 @@ class MachineCode:
 
 @lru_cache(maxsize=32)
 def _compile(text: str) -> tuple[Any, Any]:
-    """Compile a module; return the engine that owns the machine code, and the function `advance`."""
+    """Compile the text of an LLVM module; return the engine that owns the machine code, and the function `advance`."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()

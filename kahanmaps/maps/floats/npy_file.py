@@ -1,7 +1,7 @@
 """A .npy file to which float orbits are appended as they are computed; the file is valid at any time.
 
-A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header in which the first
-length can grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in
+A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header for a larger number
+of rows, so a portion is appended in two writes: first the numbers, then the header with the new length, in
 place. A reader between these writes, or after the program was killed, finds a file that is complete up to the last
 portion (readers ignore numbers that the header does not count yet). The length shows how much was computed, and no disk
 space is used for steps that are never taken. Closing the file writes it to the disk (fsync). If the machine crashes

@@ -1,20 +1,20 @@
 """The normal form in floating point: one planar map for each root of chi, in a canonical form.
 
-At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). Let
-(U, V) = 2 eps (u, v), and A = a U + b V, B = b U + c V, C = c U + d V half the second derivatives of
-h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3. Then the map is Cramer's rule for two equations:
+At a root r of chi the Kahan map of a member is a map of the plane (u, v), given by a binary cubic h_r (see
+kahanmaps/family/planar.py). Let (U, V) = 2 eps (u, v) and h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3. Half the second
+derivatives of h are A = a U + b V, B = b U + c V and C = c U + d V. Cramer's rule for two equations gives the map:
 
     U~ = ((1 + B) U + C V)/w,     V~ = ((1 - B) V - A U)/w,     w = (1 + B)(1 - B) + A C = 1 + eps^2 D.
 
-A linear change of U and V (h is divided by its determinant) makes h one of
+A linear change of coordinates (U, V) -> F (U, V), which multiplies h by det F, makes h one of
 
     lines    U V (U + V)         (a, b, c, d) = (0, 1, 1, 0)    three linear factors over R, or over C at a complex r
     cubes    (U^3 + V^3)/3                      (1, 0, 0, 1)    one real linear factor
     general                      arbitrary                      a repeated factor, h = 0, or U and V nearly dependent
 
-so that most maps have no coefficients except 0 and 1, and take five or six multiplications and a division. The linear
-factors U and V are those two whose forms in x are closest to orthogonal. The integral h_r/(1 + eps^2 D) of the block is
-kappa (A U^2 + 2 B U V + C V^2)/w, with a constant kappa for each block.
+so that most maps have no coefficients except 0 and 1, and take five or six multiplications and a division. If several
+pairs (U, V) are possible, U and V as forms in x are as close to orthogonal as possible. The integral of the block,
+h_r/(1 + eps^2 D), is kappa (A U^2 + 2 B U V + C V^2)/w, with a constant kappa for each block.
 
 A real root gives a real block (two rows: U, V), a pair of complex roots a complex block (four rows: Re U, Im U, Re V,
 Im V). Roots, coefficients and the linear maps between x and the rows are computed in balls and rounded once, so each of
@@ -55,7 +55,7 @@ Frame = tuple[list[acb], list[acb]]
 class PlanarBlocks:
     """The planar maps of a normal form at one eps, in doubles.
 
-    The `reals` real blocks come first, by increasing root; then one block for each root with positive imaginary part.
+    The `reals` real blocks come first, sorted by root; then one block for each root with positive imaginary part.
     `coefficients` has a row (a, b, c, d) of complex numbers for each block. `x_to_state` is the 2m x 2m matrix that
     maps x to the rows of the blocks, and `state_to_x` is its inverse.
 
@@ -185,7 +185,7 @@ class _BallBlocks:
         return PlanarBlocks(reals, arrays[0], arrays[1], arrays[2], arrays[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
-        """Return (a, b, c, d); kappa; U and V as forms in x; and the columns that express x in U and V."""
+        """Return for a root: (a, b, c, d); kappa; U and V as forms in x; the columns that express x in U and V."""
         cubic = [_evaluate(coefficient, root) for coefficient in self.form.coefficients]
         rows = [[_evaluate(element[k], root) for element in self.S_inverse_columns] for k in (0, 1)]
         kind, frame = self._frame(root, cubic, rows)
@@ -194,7 +194,7 @@ class _BallBlocks:
         if kind == LINES:
             scale_U, scale_V = b, c
         elif kind == CUBES:
-            # U = s L1, V = t L2 with 3 a t = s^2 and 3 d s = t^2: s^3 = 27 a^2 d, t^3 = 27 a d^2
+            # U = s L1, V = t L2 for `frame` = (L1, L2); 3 a t = s^2 and 3 d s = t^2: s^3 = 27 a^2 d, t^3 = 27 a d^2
             scale_U, scale_V = acb(_cube_root((27 * a * a * d).real)), acb(_cube_root((27 * a * d * d).real))
         else:
             scale_U, scale_V = acb(1), acb(1)
@@ -252,7 +252,7 @@ class _BallBlocks:
         value = _evaluate(element, root)
         if not value.contains(acb(0)):
             return False
-        gcd = element.gcd(self.form.chi)  # since chi has simple roots, it is 0 at the root iff the element is
+        gcd = element.gcd(self.form.chi)  # chi has simple roots, so the gcd is 0 at the root iff the element is
         if gcd.degree() < 1 or not _evaluate(gcd, root).contains(acb(0)):
             raise _InsufficientPrecision
         if gcd.degree() < self.form.chi.degree() and _evaluate(self.form.chi / gcd, root).contains(acb(0)):
@@ -261,7 +261,7 @@ class _BallBlocks:
 
 
 def _linear_factors(form: list[acb]) -> list[list[acb]]:
-    """Return the linear factors f u + g v, up to scale, of a binary form (u^k first) without repeated factors."""
+    """Return the linear factors f u + g v, as [f, g] up to scale, of a squarefree form (coefficient of u^k first)."""
     for p, q in _ROTATIONS:
         # u = p u' - q v', v = q u' + p v'
         rotated_form = _substitute(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
@@ -270,7 +270,7 @@ def _linear_factors(form: list[acb]) -> list[list[acb]]:
                 roots = acb_poly(rotated_form[::-1]).roots(tol=arb(2) ** (ctx.prec // -2), maxprec=2 * ctx.prec)
             except ValueError as error:
                 raise _InsufficientPrecision from error
-            # u' - root v', with u' = (p u + q v)/N, v' = (p v - q u)/N
+            # u' - root v', with u' = (p u + q v)/N, v' = (p v - q u)/N and N = p^2 + q^2
             return [[p + root * q, q - root * p] for root in roots]
     raise _InsufficientPrecision
 

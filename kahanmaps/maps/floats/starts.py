@@ -12,8 +12,8 @@ from kahanmaps.algebra.parsing import parse_number, parse_point
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 
-MAX_NUMBERS = 50_000_000  # coordinates of all initial points together
-_MAX_DIGITS = 9  # digits of the number of points
+MAX_NUMBERS = 50_000_000  # maximal number of coordinates of all initial points together
+_MAX_DIGITS = 9  # maximal number of digits of the number of points
 
 
 def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
@@ -29,9 +29,9 @@ def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
 def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
     """Return the initial points (n, dim) of a grid or of a line.
 
-    A grid gives variables as NAME=LOW:HIGH:N, for N equidistant values including both ends, or as NAME=VALUE; all other
-    variables are 0. The last variable with several values changes fastest. A line is A:B:N with two points A and B.
-    Coordinates are rounded from exact numbers. Raises InputError for any other text, and for too many points.
+    A grid is a list of NAME=LOW:HIGH:N (N equidistant values, including both ends) and NAME=VALUE; all other variables
+    are 0. The last variable with several values changes fastest. A line is A:B:N, for N points from A to B, both
+    included. Coordinates are rounded from exact numbers. Raises InputError for any other text and for too many points.
 
     >>> starts_on("x=-1:1:3, z=1/2", ["x", "y", "z"]).tolist()
     [[-1.0, 0.0, 0.5], [0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]
@@ -72,7 +72,7 @@ def starts_on(text: str, variables: Sequence[str]) -> FloatArray:
 
 
 def _equidistant_values(low: fmpq, high: fmpq, count: str, dim: int) -> FloatArray:
-    """Return equidistant numbers including both ends, each rounded to the nearest double."""
+    """Return `count` equidistant numbers from low to high, including both, each rounded to the nearest double."""
     digits = count.strip()
     point_count = int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _MAX_DIGITS else 0
     if not 2 <= point_count <= MAX_NUMBERS // dim:

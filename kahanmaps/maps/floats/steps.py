@@ -6,7 +6,7 @@ blocks (planar_blocks.py), and the same equation splits into blocks of two rows.
 small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular* if a
 pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
 
-With the same kernel, results agree to the last bit for any number of orbits and threads, and for any portions.
+With one kernel, results agree to the last bit for any number of orbits and threads, and for any portions of steps.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from kahanmaps.maps.kahan import KahanMap
 IntArray = NDArray[np.int64]
 
 RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
-STATUS = ("completed", "overflow", "singular")  # indexed by a code; the values of OrbitEnd.status
+STATUS = ("completed", "overflow", "singular")  # indexed by these three codes; the values of OrbitEnd.status
 
 
 Write = Callable[[Sequence[Any], StepChecks], Sequence[Any]]
@@ -51,9 +51,9 @@ class FloatStep:
     """A step of states with `rows` rows; `write` writes the operations for the image of a state and the checks.
 
     `careful` maps the rows of a state (arrays) to the rows of its image and three more rows, which say in which orbits
-    the step is near-singular, singular, or an overflow. `fast` has one more row, which says in which orbits it is good.
-    If the fast program has too many operations, it is omitted; if the careful program has too many (row exchanges fill
-    in zeros), `in_arrays` takes its place. Machine code needs both programs.
+    the step is near-singular, singular, or an overflow. `fast` returns the image and one more row, which says in which
+    orbits the fast step is valid. A fast program with too many operations is omitted. `in_arrays` replaces a careful
+    program with too many operations (row exchanges fill in zeros). Machine code needs both programs.
     """
 
     def __init__(self, rows: int, write: Write, in_arrays: Callable[..., tuple[Any, ...]] | None = None) -> None:
@@ -117,7 +117,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
 
 
 def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
-    """Return the step of a composition of maps. Raises InputError if a coefficient is out of range."""
+    """Return the step of a composition of maps. Raises InputError if a coefficient is out of the range of doubles."""
     equations = [float_equation(factor) for factor in factors]
 
     def write(x: Sequence[Any], checks: StepChecks) -> Sequence[Any]:
@@ -129,9 +129,9 @@ def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
 
 
 class FloatEquation(NamedTuple):
-    """The equation M(x) x~ = r(x) in doubles, in sparse form; r is the last column of (M | r).
+    """The equation M(x) x~ = r(x) in doubles, as the matrix (M | r) in sparse form.
 
-    Entry (i, j) is `constants[i][j]` plus the sum of c y[k] over the pairs (k, c) of `terms[i][j]`. The vector y
+    Entry (i, j) of (M | r) is `constants[i][j]` plus the sum of c y[k] over the pairs (k, c) of `terms[i][j]`. Here y
     is x followed by y[a] y[b] for every pair (a, b) in `products`.
     """
 
@@ -166,8 +166,8 @@ class FloatEquation(NamedTuple):
 def float_equation(map_over: ElementaryMap) -> FloatEquation:
     """Return the equation of a map over QQ in doubles; each number is rounded only once.
 
-    Near-singular steps are recognized by the size of pivots, so each row is divided by its largest coefficient in M,
-    except for Kahan maps, whose rows have size 1 for small eps. Raises InputError if a number is too large for doubles.
+    Near-singular steps are recognized by the size of pivots. Hence each row is divided by its largest coefficient in M,
+    except for Kahan maps, where M has rows of size 1 for small eps. Raises InputError if a number is too large.
     """
     equation = map_over.equation
     n = equation.dim
@@ -231,10 +231,10 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
-    """Gaussian elimination with partial pivoting for a batch of matrices (n, n + count + ..., batch), in place.
+    """Solve a batch of linear systems by Gaussian elimination with partial pivoting; overwrite M with the result.
 
-    The `count` columns after the first n are right-hand sides, which the solutions replace; in all later columns the
-    rows are only permuted. Returns the absolute values of the pivots, an array (n, batch).
+    M has the shape (n, n + count + ..., batch). The `count` columns after the first n are right-hand sides, which the
+    solutions replace; in all later columns rows are only permuted. Returns the |pivots|, an array (n, batch).
     """
     columns, last_column = np.arange(M.shape[2]), n + count
     pivots = np.empty((n, len(columns)))
@@ -277,9 +277,9 @@ def _cached_step(map_: Map) -> FloatStep:
 class BatchState(NamedTuple):
     """The states of a batch of n orbits, one per column, and the status of each orbit.
 
-    `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
-    near-singular steps, `near_at` the index of the point before the first near-singular step; -1 means none. Columns of
-    ended orbits are 0.
+    `z` has the shape (rows, n); its columns are 0 for orbits that have ended. `failed_at` is the index of the first
+    iterate that does not exist, `near` the number of near-singular steps, `near_at` the index of the point before the
+    first near-singular step; -1 means none.
     """
 
     z: FloatArray
@@ -296,7 +296,7 @@ class BatchState(NamedTuple):
         return cls(np.ascontiguousarray(z), *columns)
 
     def note(self, orbits: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
-        """Record the results of a careful step from `index`, for the orbits `orbits`; return which of these ended."""
+        """Record the results of a careful step from index `index` for `orbits`; return which of these have ended."""
         near, singular, overflow = (np.broadcast_to(x, orbits.shape) for x in (near, singular, overflow))
         has_ended = singular | overflow
         self.status[orbits[has_ended]] = np.where(singular[has_ended], SINGULAR, OVERFLOW)
@@ -340,7 +340,7 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                             is_good = not (is_near_singular or is_singular or is_overflow)
                     else:
                         *image, is_good = step.fast(*x)
-                except ZeroDivisionError:  # in arrays the result would be infinite
+                except ZeroDivisionError:  # a quotient of arrays would be infinite
                     image, is_good = x, False
                 # Orbits in which the fast step is not valid repeat it as a careful step.
                 if is_good is not True and not np.all(is_good | has_ended):

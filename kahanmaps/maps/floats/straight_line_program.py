@@ -6,15 +6,15 @@ results to the last bit: as a Python function of floats or of numpy arrays (`Str
 machine code for vectors of orbits (machine_code.py).
 
 `solve` writes a program for the solution of M y = r, where the positions of zeros in M are known. Rows and columns with
-a single entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal
-form are such blocks, with complex entries for a complex eigenvalue), larger blocks by Gaussian elimination.
+one nonzero entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a
+normal form are such blocks, with complex entries for a complex eigenvalue), larger blocks by Gaussian elimination.
 
-Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 of the numbers
-from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the diagonal, in
-an order with little fill-in. This is stable as long as no pivot row is multiplied by more than 8 before it is
-subtracted. Each step has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows need
-to be exchanged and all numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports the
-status. If the fast version is valid, both versions give the same numbers.
+Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 times the
+numbers from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the
+diagonal, in an order with little fill-in. It is stable as long as no pivot row is multiplied by more than 8 before it
+is subtracted. Each step has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows
+need to be exchanged and all numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports
+the status. If the fast version is valid, both versions give the same numbers.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-MIN_PIVOT_RATIO = 2.0**-40  # of a pivot to the numbers from which it was computed, in steps that are not near-singular
+MIN_PIVOT_RATIO = 2.0**-40  # a step is near-singular if a pivot is at most this fraction of the numbers it comes from
 MAX_FACTOR = 8.0  # maximal factor by which a pivot row is multiplied when it is subtracted from another row
 LARGEST_DOUBLE = float(np.finfo(np.float64).max)
-MAX_OPERATIONS = 4000  # operations of a fast step; longer programs take too long to compile
+MAX_OPERATIONS = 4000  # maximal number of operations of a fast step; longer programs take too long to compile
 
 _SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=", "eq": "==", "and": "&", "or": "|"}
 
@@ -120,7 +120,7 @@ class StraightLineProgram:
 
 
 class Value:
-    """A number or a truth value in a program; constants are floats and bools of Python."""
+    """A number or a truth value in a program; constants are represented by floats and bools of Python."""
 
     def __init__(self, code: StraightLineProgram, number: int) -> None:
         self.code, self.number = code, number
@@ -258,7 +258,7 @@ def extreme(name: str, x: Any, y: Any) -> Any:
 class StepChecks:
     """The checks on the intermediate numbers of a step.
 
-    For a fast step, `good` is true if its result is valid. For a careful step, `near` is true if a pivot was small,
+    For a fast step, `good` is true if the result is valid. For a careful step, `near` is true if a pivot was small,
     `zero` if a pivot was 0, and `finite` if all numbers were finite.
     """
 
@@ -291,7 +291,7 @@ class StepChecks:
                 self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """Return `good` of a fast step; of a careful step, whether it was near-singular, singular, an overflow."""
+        """Return [good] for a fast step, and [near-singular, singular, overflow] for a careful step."""
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST_DOUBLE) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
@@ -304,14 +304,14 @@ def _negation(x: Any) -> Any:
 
 
 def solve(rows: Sequence[Sequence[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
-    """Write the solution y of M y = r, given the rows of (M | r); y is meaningless if M is singular.
+    """Write the operations that solve M y = r, given the rows of (M | r); y is meaningless if M is singular.
 
-    `entry_bound` returns an upper bound of the entries of M; only fast eliminations need it.
+    `entry_bound` returns an upper bound of the |entries| of M; only fast eliminations need it.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
     rhs, remaining, solution = [row[n] for row in rows], set(range(n)), [0.0] * n
-    # A row with one entry is solved first. A column with one entry is solved last: only one row contains its unknown.
+    # A row with one entry is solved first. A column with one entry is solved last: its unknown is only in one row.
     solved_last: list[tuple[int, int]] = []
     while remaining:
         single_row = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
@@ -358,7 +358,7 @@ def solve(rows: Sequence[Sequence[Any]], entry_bound: Callable[[], Any], checks:
 
 
 def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
-    """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
+    """Write the operations that solve two equations by Cramer's rule; entries may be complex (`ComplexPair`)."""
     # The bound for the pivot a d - b c grows with b c: digits are lost if a d and b c cancel, however large they are.
     (a, b, r), (c, d, s) = rows
     bc = b * c
@@ -377,9 +377,9 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
 def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
     """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small.
 
-    `entry_bound` returns an upper bound of the entries of the matrix; only the fast version needs it.
+    `entry_bound` returns an upper bound of the |entries| of the matrix; only the fast version needs it.
     """
-    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row
+    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row of the matrix
     pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(pivots) < n:  # the matrix is singular at all points
         checks.pivot(0.0, MIN_PIVOT_RATIO)
@@ -422,7 +422,7 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
 
 
 def _choose_pivots(nonzero_columns: list[set[int]]) -> list[tuple[int, int]]:
-    """Return row and column of each pivot, on the diagonal if possible, with little fill-in (Markowitz).
+    """Return the pairs (row, column) of the pivots, diagonal if possible, with little fill-in (Markowitz's rule).
 
     The result has fewer pivots than rows if the positions of the zeros make the matrix singular.
     """

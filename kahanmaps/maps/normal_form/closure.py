@@ -1,10 +1,10 @@
 """Whether an orbit is dense in the real components of its level set that it visits, and whether it is Zariski dense.
 
-Let rho_i be the coordinates of the translation on the circles whose products the components are. The orbit is dense if
-and only if sum n_i rho_i = n_0 has no integer solution except n_i = 0 for all i (Kronecker). On one circle it is enough
-that the translation has infinite order. For several circles no theorem is known that excludes all such relations; balls
-exclude those with small coefficients. The orbit is Zariski dense if no two level curves are isogenous, which one prime
-may prove. See docs/mathematics.md, "Geometry of the level sets".
+The components are products of circles. Let rho_i be the coordinates of the translation on these circles. The orbit is
+dense if and only if sum n_i rho_i = n_0 has no integer solution except n_i = 0 for all i (Kronecker). On one circle the
+orbit is dense if the translation has infinite order. For several circles no theorem is known that excludes all such
+relations; computations in balls exclude relations with small coefficients. The orbit is Zariski dense if no two level
+curves are isogenous; a single prime can prove this. See docs/mathematics.md, "Geometry of the level sets".
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.fields import RR
 
-_SCALE = 10**15  # the inverse of the accuracy of rotation numbers
-_MIN_EXCLUDED_SIZE = 10  # if relations up to this size cannot be excluded, the answer is "undecided"
+_SCALE = 10**15  # rotation numbers have errors of at most 1/_SCALE
+_MIN_EXCLUDED_SIZE = 10  # if relations with coefficients up to this size are possible, the answer is "undecided"
 _MAX_PRIME = 4000  # largest prime modulo which curves are compared
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Whether an orbit is dense in the components that it visits: True and False are proved, None is undecided.
+    """Whether an orbit is dense in the components that it visits: proved if True or False, not proved if None.
 
-    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if only
-    this is known. If `prime` is given, no two of the curves are isogenous modulo this prime, so that the orbit is
-    Zariski dense (proved), and on the level set all integrals are constant; None: no prime was found or needed.
+    `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if
+    `is_dense` is None. If `prime` is given, no two level curves are isogenous modulo this prime (proved). Then the
+    orbit is Zariski dense and all integrals are constant on the level set. Otherwise `prime` is None.
     """
 
     is_dense: bool | None
@@ -70,7 +70,7 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
     Args:
         gammas, orders: for each plane over Q in which the orbit moves, gamma and the order of the translation (None:
             infinite).
-        numbers: the rotation numbers at real roots of chi, and both coordinates at each pair of complex roots.
+        numbers: the rotation numbers at real roots of chi; both coordinates of the translation at complex pairs.
     """
     if any(order is not None for order in orders):
         return Closure(False, "a translation has finite order")
@@ -88,10 +88,10 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
 
 
 def separating_prime(gamma_polynomial: fmpq_poly) -> int | None:
-    """Return a prime modulo which the curves of all roots of `gamma_polynomial` are good and no two are isogenous.
+    """Return a prime modulo which all curves of roots of `gamma_polynomial` are good and no two are isogenous.
 
     All roots must lie in GF(p). Two curves are not isogenous over any extension of GF(p) if the product of the
-    discriminants a^2 - 4p of their Frobenius maps is not a square. Returns None if no prime below 4000 shows this.
+    discriminants a^2 - 4p of their Frobenius maps (a: trace) is not a square. None if no prime below 4000 shows this.
 
     >>> separating_prime(fmpq_poly([6, -5, 1])), separating_prime(fmpq_poly([9, -6, 1]))
     (7, None)
@@ -115,11 +115,11 @@ def separating_prime(gamma_polynomial: fmpq_poly) -> int | None:
 
 
 def excluded_relations(numbers: Sequence[arb]) -> int:
-    """Return an N such that sum n_i rho_i is not an integer for integers n_i, not all 0, of size at most N.
+    """Return an N such that sum n_i rho_i is not an integer for any integers n_i with 0 < max |n_i| <= N.
 
     The numbers rho_i are balls of radius at most 1e-15.
 
-    With C = 10^15 the vectors (n_1, ..., n_d, sum n_i [C rho_i] - C n_0) form a lattice; a relation is a short vector.
+    With C = 10^15 the vectors (n_1, ..., n_d, sum n_i [C rho_i] - C n_0) form a lattice; relations give short vectors.
     No lattice vector is shorter than the shortest vector of the orthogonalized basis; LLL only makes this bound large.
 
     >>> excluded_relations([arb(2).sqrt()]) > 10**6, excluded_relations([arb(1) / 3]) < 3
@@ -141,6 +141,6 @@ def excluded_relations(numbers: Sequence[arb]) -> int:
             vector = [x - factor * y for x, y in zip(vector, previous_vector, strict=True)]
         orthogonal_basis.append(vector)
         squared_lengths.append(sum((x * x for x in vector), fmpq(0)))
-    # [C rho] has an error of at most 3, so the last entry of a relation is at most 3 d N.
+    # [C rho_i] differs from C rho_i by at most 3, so the last entry of the vector of a relation is at most 3 d N.
     min_squared_length = min(squared_lengths)
     return isqrt(int((min_squared_length.p - 1) // (min_squared_length.q * d * (1 + 9 * d))))

@@ -1,8 +1,8 @@
 """Division polynomials psi_N of the translation T, in gamma; their roots are the levels with periodic orbits.
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
-gamma = 1 - 64 eps^6 disc(h) c^2, c = h/(1 + eps^2 D) (docs/mathematics.md, "A translation, and tau functions"). So it
-has period N on the smooth levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for 1 <= d < N. By Mazur's theorem the
+gamma = 1 - 64 eps^6 disc(h) c^2, c = h/(1 + eps^2 D) (docs/mathematics.md, "A translation, and tau functions"). So the
+map has period N on the smooth levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for 1 <= d < N. By Mazur's theorem the
 period at a rational gamma is neither 11 nor larger than 12. Sources: ward-1948 for the recurrence, mazur-1977.
 """
 
@@ -55,7 +55,7 @@ class PeriodicLevels:
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
     def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
-        """Return for each of `gammas` the square of the level h/(1 + eps^2 D), in a plane with this disc(h).
+        """Return for each of `gammas` the square of the level h/(1 + eps^2 D), if disc(h) is `discriminant`.
 
         The levels with a positive square are real. Raises InputError for disc(h) = 0 or eps = 0.
 
@@ -76,7 +76,7 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
     def term(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """Return the product of psi at these indices; three cube roots more than in psi_n give a factor gamma."""
+        """Return the product of the psi_k, k in `indices`, with the omitted cube roots of gamma, except psi_n's."""
         cube_root_count = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
         value = _GAMMA ** (cube_root_count // 3)
         for k in indices:

@@ -47,13 +47,13 @@ _MAX_GAMMA_BITS = 4000  # largest number of bits of gamma for which a height is 
 class Rotation:
     """The rotation of an orbit on its level curve at one real root, or at one pair of complex roots, of chi.
 
-    `number` is the rotation number in (0, 1/2], up to sign: one application rotates the circle by this part of a turn.
-    It belongs to the iterate with `steps` steps of the map: 2 if the level curve has two real components that the map
-    exchanges, otherwise 1. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the
-    coordinates of the translation in a reduced basis of the periods. `flow` is the rotation number of the flow for the
-    time 2 eps, 2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step;
-    None if the level of the initial point is singular at some smaller eps. `component` is the component of the closed
-    level curve that contains the initial point, "oval" or "unbounded", if the curve has two.
+    `number` is the rotation number in (0, 1/2], up to sign: `steps` steps of the map rotate the circle by this part of
+    a turn. `steps` is 2 if the level curve has two real components that the map exchanges, otherwise 1. At complex
+    roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of the translation in a
+    reduced basis of the periods. `flow` is the rotation number of the flow for the time 2 eps. `phase_error` is
+    `number` minus `flow`, the error of the phase in one step; it is None if the level of the initial point is singular
+    at some smaller eps. If the closed level curve has two components, `component` says which of them contains the
+    initial point: "oval" or "unbounded".
     """
 
     root: str
@@ -73,8 +73,8 @@ class PlaneGeometry:
     """The geometry of an orbit in the planes at the roots of one irreducible factor of chi.
 
     `delta` = disc(h) level^2, `gamma` = 1 - delta and the j-invariant lie in the field of the root; they are None if
-    the level is not smooth. The Jacobian of the level curve is Y^2 = x^3 + (9 + 3 gamma) x^2 + 48 gamma x + 64 gamma^2,
-    and the map is the translation by `point` on it. `order` is the order of the translation, None if it is infinite
+    the level is not smooth. The Jacobian of the level curve is Y^2 = x^3 + (9 + 3 gamma) x^2 + 48 gamma x + 64 gamma^2.
+    On it the map is the translation by `point`. `order` is the order of the translation, None if it is infinite
     (proved). `height` is the canonical height of the translation point (absolute, if the root is not rational), with an
     error of at most `height_error`. `degree` is the degree of the field.
     """
@@ -167,8 +167,8 @@ class PlaneGeometry:
 class LevelGeometry(PrintableResult):
     """The geometry of the level set of the integrals through a point, and of the map on it.
 
-    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all levels are smooth. `closure` says
-    whether the orbit is dense in the real components that it visits; None if it is fixed or a level is singular.
+    The n-th iterate has about `height_constant` n^2 bits for large n, if all levels are smooth. `closure` says whether
+    the orbit is dense in the real components that it visits; None if the orbit is fixed or a level is singular.
     """
 
     planes: tuple[PlaneGeometry, ...]
@@ -177,9 +177,9 @@ class LevelGeometry(PrintableResult):
 
     @property
     def components(self) -> int | None:
-        """The number of real components of the level set, closed at infinity; None if a level is singular.
+        """The number of components of the real level set with its points at infinity; None if a level is singular.
 
-        If there are several, the orbit visits two of them alternately, as the map exchanges components in each plane.
+        If there are several, the orbit alternates between two: the map exchanges the components in a plane with two.
         """
         if any(plane.kind is not PeriodKind.SMOOTH for plane in self.planes):
             return None
@@ -264,7 +264,7 @@ def geometry(
     if eps is not None and rational(eps) == 0:
         raise InputError("found eps = 0, expected a nonzero number: at 0 the map is the identity")
     file = import_module("kahanmaps.documents.inline").as_file(system)
-    normal_form = file.normal_form  # with the A of the file, if it declares one
+    normal_form = file.normal_form  # if the file declares a matrix A, the normal form uses this A
     if isinstance(normal_form, SystemNormalForm):
         return geometry_of(normal_form, eps, start)
     return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start, family, list(file.integrals.values()))
@@ -309,7 +309,7 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
 
 
 def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> dict[str, Rotation]:
-    """Return the rotations on the level set through `start`, by the root of chi; singular levels are omitted.
+    """Return the rotations on the level set through `start`, by the root of chi (text); singular levels are omitted.
 
     Raises PrecisionLost if a level is almost singular.
     """
@@ -321,7 +321,7 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 def _plane_levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
 ) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Yield each plane with the start in it, the kind of its level curve, gamma, and, if smooth, the rotations."""
+    """Yield tuples (plane, initial point in it, kind of the level curve, gamma, rotations on a smooth level)."""
     form: Any = getattr(normal_form, "form", normal_form)
     splitting = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
@@ -386,7 +386,7 @@ def _real_rotation(gamma: arb, disc: arb, h: arb, D: arb, *, root: str) -> Rotat
     # For gamma < 0 the cubic polynomial of the Jacobian has three real roots, and T lies on the oval.
     number, steps = rotation_number(curve, curve.T, has_oval=not gamma > 0)
     # On a level of h, p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2 along the flow u' = h_v, v' = -h_u. If h has three
-    # real roots, p has three poles in a period, one at each point at infinity.
+    # real roots, p has three poles in a period, one at each point at infinity of the level.
     g3, one_third = 27 * disc * h * h, arb(1) / 3
     unit_period = one_third.gamma() ** 3 / (2 * arb.pi())  # the period of p'^2 = 4 p^3 - 1
     period = unit_period / abs(g3).root(6)

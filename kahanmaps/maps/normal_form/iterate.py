@@ -46,7 +46,7 @@ class NthIterate:
         self._cached_orbit: tuple[Any, OrbitInPlanes] | None = None  # the last orbit over Q, with its arguments
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
-        """Return Phi^n(start) for n >= 0: over Q a PlanesPoint if chi splits, otherwise the coordinates.
+        """Return Phi^n(start) for n >= 0: over Q as a PlanesPoint, over other fields as its coordinates.
 
         Raises SingularStep if the map is not defined at a step: over Q at any step, over other fields at one of the
         first few steps or the last. Raises PrecisionLost for balls that are too wide and, over Q, OverBudget if numbers
@@ -98,7 +98,7 @@ class NthIterate:
 
 
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
-    """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; else "".
+    """Return why the orbit of a rational initial point is special in a plane, or ""; balls cannot decide this.
 
     It is special if the initial point is a fixed point in the plane, or on a singular level cubic (delta is 0 or 1).
     """

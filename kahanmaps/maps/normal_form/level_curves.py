@@ -15,14 +15,14 @@ from kahanmaps.algebra.elliptic_curves import AffinePoint, EllipticCurve, by_dou
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 
-_MAX_DIGIT = 2000  # largest prime l whose parts are compared: a digit to base l is found by counting
-_MAX_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm; this takes about 2^17 steps
+_MAX_DIGIT = 2000  # largest prime l at which parts of l-power order are compared, by counting for each digit to base l
+_MAX_RADIUS = 1 << 32  # radius of the largest interval searched without Schoof's algorithm, in about 2^17 steps
 
 
 class Jacobian(EllipticCurve):
-    """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian with Y = y + 3x + 8 gamma, and its point T; None is the zero.
+    """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian of E with Y = y + 3x + 8 gamma; None is the zero of the group.
 
-    a2 = 9 + 3 gamma, a4 = 48 gamma, a6 = 64 gamma^2, T = (0, 8 gamma).
+    a2 = 9 + 3 gamma, a4 = 48 gamma, a6 = 64 gamma^2. The attribute `T` is the point (0, 8 gamma).
 
     >>> from flint import fmpq
     >>> E = Jacobian(fmpq(32, 27))
@@ -65,9 +65,9 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 
 
 def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int:
-    """Return some k > 0 with k T = 0; it must have the form `center` + m `modulus` with |m| <= `radius`.
+    """Return some k > 0 with k T = 0; some number `center` + m `modulus`, |m| <= `radius`, must annihilate T.
 
-    m is written as i (2b + 1) - j with |j| <= b: b baby steps of `modulus` T, and giant steps of (2b + 1) `modulus` T.
+    m is written as i (2b + 1) - j, |j| <= b: there are b baby steps of `modulus` T, and a giant step is 2b + 1 of them.
     """
     baby_step_count, step = isqrt(radius) + 2, curve.multiple(modulus, curve.T)
     index: dict[Any, tuple[int, Any]] = {}
@@ -93,9 +93,9 @@ def _annihilator(curve: Jacobian, center: int, modulus: int, radius: int) -> int
 
 
 class LevelCubic:
-    """A smooth level cubic denominator h - numerator W (W^2 + D), as a group with one of its points as zero.
+    """The smooth level cubic denominator h = numerator W (W^2 + D), as a group with one of its points as zero.
 
-    Sums of points are computed from chords and tangents, without a normal form. Points are triples, not normalized.
+    Sums are computed from chords and tangents, without a Weierstrass equation. Points are triples, not normalized.
     """
 
     def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
@@ -116,8 +116,8 @@ class LevelCubic:
 
     def third_point(self, P: Triple, Q: Triple) -> Triple:
         """Return the third point of the cubic on the line through P and Q, or on the tangent if they are equal."""
-        # The cubic form on a line has four coefficients. As P and Q are zeros, two coefficients remain, and these are
-        # derivatives; no equation has to be solved.
+        # A cubic form on a line has four coefficients. Two of them are 0, since P and Q are zeros of the form. The two
+        # others are derivatives of the form; no equation has to be solved.
         if not same_point(P, Q):
             s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
             return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]
@@ -149,13 +149,13 @@ class LevelCubic:
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
         """Return whether P is a multiple of T, whose order is `order`; None if this is not decided.
 
-        If `order` P is not zero, P is none. Otherwise, for every prime l that divides both the order of T and the index
-        of its multiples in the group, one discrete logarithm compares the parts of P and T of l-power order; for other
-        primes no comparison is needed.
+        If `order` P is not zero, P is no multiple of T. Otherwise, for every prime l that divides both the order of T
+        and the index of the multiples of T in the group, one discrete logarithm compares the parts of P and T of
+        l-power order. For all other primes no comparison is needed.
         """
         if not self.is_zero(self.multiple(order, P)):
             return False
-        # The number of points of the curve, if only one multiple of the order of T lies in the Hasse interval.
+        # `point_count` is the number of points if only one multiple of the order of T lies in the Hasse interval.
         radius = isqrt(4 * q)
         point_count = -(-(q + 1 - radius) // order) * order
         if point_count + order <= q + 1 + radius:

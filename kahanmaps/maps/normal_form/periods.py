@@ -1,14 +1,14 @@
 """The exact period of an orbit of a family member: over GF(p) without computing the orbit, over Q with a proof.
 
-In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py), and its period is
-the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, which is the same for all
-points of a level. Over a field of q elements the Hasse interval q + 1 +- 2 sqrt(q) contains a multiple of this order,
-which about q^(1/4) baby steps and as many giant steps find; in large fields Schoof's algorithm first narrows the
-interval. The period of the orbit is the least common multiple of the periods in the planes.
+In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py). Its period is the
+order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, for all points of a level.
+Over a field of q elements the Hasse interval q + 1 +- 2 sqrt(q) contains a multiple of this order. About q^(1/4) baby
+steps and as many giant steps find this multiple; in large fields Schoof's algorithm first narrows the interval. The
+period of the orbit is the least common multiple of the periods in the planes.
 
 The translation is also defined at the poles of the map, where W = 0. The program also decides whether an orbit meets a
-pole. On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. If h has no root in the field, there are
-none; otherwise the orbit of P meets a pole if and only if P - (U : V : 0) is a multiple of T for one of them.
+pole. On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. If h has no root in the field, there is
+no pole. Otherwise the orbit of P meets a pole if and only if P - (U : V : 0) is a multiple of T for a pole (U : V : 0).
 
 On singular level cubics the period is elementary: see `PeriodKind`.
 """
@@ -81,7 +81,7 @@ class PlanePeriod:
 
 @dataclass(frozen=True)
 class OrbitPeriod(PrintableResult):
-    """The period of an orbit that is continued through poles: the least common multiple of those in the planes.
+    """The period of an orbit that is continued through poles: the least common multiple of its periods in the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (in some plane the map is not defined at the initial
     point and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the
@@ -154,7 +154,7 @@ def plane_period(
     name: str = "the plane",
     largest: int = LARGEST_FIELD,
 ) -> PlanePeriod:
-    """Compute the period of (U : V : 1) under Psi of a block over GF(p), or over its extension `context`.
+    """Compute the period of `point` = (U : V : 1) under the map Psi of a block over GF(p) or its extension `context`.
 
     >>> from flint import nmod
     >>> block = PlanarBlock(*(nmod(c, 10007) for c in (1, 0, 2, 1)))
@@ -177,7 +177,7 @@ def plane_period(
     if kind in _PERIOD_OF_KIND:
         return PlanePeriod(name, q, kind, *_PERIOD_OF_KIND[kind])
     if kind is PeriodKind.ADDITIVE:
-        # A step decreases W/s by 1, where s^2 = -D: is W/s an element of GF(p)?
+        # A step decreases W/s by 1, where s^2 = -D: the orbit meets a pole if and only if W/s is in GF(p).
         a, b, c = block.D
         (U, V, W), meets_pole = point, False
         if (D := a * U * U + b * U * V + c * V * V) != 0:
@@ -273,10 +273,10 @@ def period_of(
     *,
     largest: int = LARGEST_FIELD,
 ) -> OrbitPeriod:
-    """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
+    """Compute the period of the orbit of `start`, a point in the coordinates of the system, modulo `prime` or over Q.
 
     `normal_form` is the normal form of the system (family.system_normal_form), or of a member in the same coordinates.
-    All other arguments and the results are as in `orbit_period` and `period_over_rationals`.
+    `prime` is None over Q. All other arguments and the results are as in `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
@@ -349,8 +349,8 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     """Compute the period over Q of the orbit of `start` under the Kahan map at `eps`, or prove that it is aperiodic.
 
     `eps` is half the time step, exact. Reduction modulo an unramified odd prime of good reduction is injective on
-    torsion points. So T has infinite order if its orders modulo two such primes differ; if all orders agree on n,
-    n T = 0 is tested over the field itself.
+    torsion points. So T has infinite order if its orders modulo two such primes differ. If T has the same order n
+    modulo all primes tried, the equation n T = 0 is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -362,7 +362,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
 
 
 def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
-    """Compute the period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
+    """Compute the period of `point` = (U : V : 1) under the map Psi of a block over Q, or over a field Q[t]/g.
 
     >>> block = PlanarBlock(*(fmpq(c) for c in (0, 2, -1, 2)))
     >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
@@ -405,7 +405,7 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
 
 
 def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
-    """Yield unramified primes above 100, with gamma modulo each in the smallest residue field above the prime."""
+    """Yield (unramified prime p > 100, gamma in the smallest residue field above p, that field or None for GF(p))."""
     modulus = None if isinstance(gamma, fmpq) else gamma.field.chi
     element = gamma if modulus is None else gamma.polynomial
     denominator = element.q if modulus is None else element.denom() * modulus.denom()

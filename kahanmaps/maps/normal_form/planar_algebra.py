@@ -1,10 +1,10 @@
 """Planes over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t].
 
 The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes,
-natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short at one
-root of g and long at another. So a value is multiplied by a short element of the lattice of those elements that cancel
-its bad part. LLL finds such an element, with the lengths at the roots as weights. Any choice is correct, since the
-product of value and scale is exact.
+natural lifts are integral, and so are psi and chi (of `tau`). But ideals need not be principal, and an element may be
+short at one root of g and long at another. So a value is multiplied by a short element of the lattice of all elements
+that cancel the bad part of the value. LLL finds such an element, with the lengths at the roots as weights. Any element
+is correct, since the product of value and scale is exact.
 
 A point (U : V : W) has the rational coordinates U W'/N and V W'/N, where N = W W' is the norm of W.
 """
@@ -31,12 +31,12 @@ from kahanmaps.algebra.integers import (
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
-_MAX_LENGTH_RATIO = 1 << 20  # a value is short if its bad part, and the ratio of its lengths at two roots, is smaller
+_MAX_LENGTH_RATIO = 1 << 20  # a value is short if its bad part and the ratios of its lengths at the roots are smaller
 _MIN_RELATIVE_LENGTH = arb(2) ** -50  # smallest length at a root that is used, relative to the largest
 
 
 class AlgebraBlock(LevelBlock):
-    """One plane over K, with g integral: `block` is the cubic, `start` contains the triple (2 eps u : 2 eps v : 1)."""
+    """One plane over K, with g integral: `block` is the cubic, and `start` is the triple (2 eps u : 2 eps v : 1)."""
 
     def __init__(self, block: PlanarBlock, start: Triple, scale: fmpq) -> None:
         self.block, self.start, self.scale = block, start, scale
@@ -44,7 +44,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer divisible by small primes, and by those modulo which the start or its image may be (0, 0, 0)."""
+        """An integer divisible by small primes and all primes modulo which the start or its image may be (0, 0, 0)."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant
@@ -58,7 +58,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> ShortElements:
-        """The representation of the values of tau functions."""
+        """The object that represents values of tau functions by short elements."""
         return ShortElements(self.algebra, self.bad)
 
     @cached_property
@@ -86,10 +86,10 @@ class AlgebraBlock(LevelBlock):
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Return numerators of the coefficients of U/W and V/W, the denominator, and a number whose primes may cancel.
+        """Return numerators of the coefficients of U/W and V/W, their denominator, and a third number (see below).
 
         If a prime divides the denominator, but neither `bad` nor the third number, exactly one prime ideal above it
-        divides W, and has degree 1. If W is not rational, the level of the initial point must be defined.
+        divides W, and this ideal has degree 1. If W is not rational, the level of the initial point must be defined.
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
@@ -113,7 +113,7 @@ class AlgebraBlock(LevelBlock):
         return [entry // common_factor for entry in numerators], norm.p // common_factor, coprime_content
 
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
-        """Return a number divisible by all primes that may divide form and denominator; None if every prime may.
+        """Return a number divisible by all primes that may divide the form and its denominator; None if any prime may.
 
         The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K, since the elements of the basis
         dual to 1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).
@@ -139,7 +139,7 @@ class AlgebraBlock(LevelBlock):
     integral = shortest  # over K, the integral triple is the same
 
     def residue_map(self, prime: int) -> Callable[[EtaleElement], nmod] | None:
-        """Return a homomorphism from K to GF(p) on elements without p in the denominator; None if g has no root."""
+        """Return a homomorphism from the elements of K integral at p to GF(p); None if g has no root modulo p."""
         g = nmod_poly([int(c.p) for c in self.algebra.chi.coeffs()], prime)
         root = next((-factor[0] / factor[1] for factor, _ in g.factor()[1] if factor.degree() == 1), None)
         if root is None:
@@ -178,7 +178,7 @@ class ShortElements:
         lengths = [max(min_length, abs(embedding).mid()) for embedding in embeddings]
         if denominator == 1 and bad_part < _MAX_LENGTH_RATIO and max(lengths) < _MAX_LENGTH_RATIO * min(lengths):
             return value, self._algebra.one
-        # All b with b value = 0 modulo `bad_part`.
+        # The lattice of all b in Z[t] with b * value = 0 modulo `bad_part`.
         rows = (residue.matrix.transpose() if bad_part != 1 else residue.matrix).numer_denom()[0].tolist()
         augmented_rows = [
             [entry % bad_part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)
@@ -226,7 +226,7 @@ class ShortElements:
         return (value, self._algebra.one) if value == 0 else self.split(value)
 
     def lifts(self, points: Sequence[Triple]) -> tuple[fmpz_mat, fmpz]:
-        """Return the integer matrix c M and c, where M maps the coefficients of (a_1, a_2, a_3) to sum a_i P_i."""
+        """Return (c M, c), c an integer: M maps the coefficients of a_1, a_2, a_3 to sum a_i P_i, P_i in `points`."""
         degree = self._algebra.degree
         blocks = [[point[i].matrix.tolist() for point in points] for i in range(3)]
         rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]
@@ -235,9 +235,9 @@ class ShortElements:
     def combined(
         self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
-        """Return the sum of scale * term * lift, times `inverse` and a number that makes the result integral.
+        """Return the triple of the sum of scale * term * lift, times `inverse`, in lowest terms without denominator.
 
-        Terms and result have coefficients in Z[t]; those of the result are coprime to the remaining denominator.
+        Hence the result is a triple over Z[t], equal to the sum up to a rational factor. Terms are also in Z[t].
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]

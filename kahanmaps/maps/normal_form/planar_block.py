@@ -14,8 +14,8 @@ on which Psi is a translation. Let delta = disc(h) level^2. On the Jacobian
 
     y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2,      gamma = 1 - delta,
 
-Psi is the translation by T = (0, 0); E is singular for delta = 0 and for gamma = 0, where it consists of three lines
-(docs/mathematics.md). Elements may be from any field, or integers, since only sums and products occur.
+Psi is the translation by T = (0, 0). E is singular for delta = 0, and it consists of three lines for gamma = 0
+(docs/mathematics.md). Coefficients and coordinates may be from any field, or integers: only sums and products occur.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Triple = tuple[Any, Any, Any]
 
 
 class PlanarBlock:
-    """The map Psi for the cubic with these four coefficients, elements of a field or integers.
+    """The map Psi for the cubic h with the coefficients a, b, c, d, elements of a field or integers.
 
     >>> block = PlanarBlock(1, 0, 0, 1)
     >>> block.image((1, 2, 1)), block.preimage(block.image((1, 2, 1)))

@@ -1,10 +1,10 @@
 """Planes over Q in integers: primitive triples, and the bad primes.
 
 h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
-factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
-numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level), the content of
+factor; the scale contains eps. Psi is quadratic, so the content of Psi(P_k) must be removed: otherwise the numbers
+would double their length with every step. Up to primes that divide 6 disc(h) den(level), the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
-lifts of `tau`. Single steps remove the content by gcds; they are used for short orbits, and on singular cubics, where
+lifts of `tau`. Single steps remove the content by gcds. They are used for short orbits, and on singular cubics, where
 numbers hardly grow.
 """
 
@@ -68,7 +68,7 @@ class LevelBlock(ABC):
     @staticmethod
     @abstractmethod
     def shortest(triple: Triple) -> Triple:
-        """Return the normalized triple of the same point."""
+        """Return the normalized triple that is proportional to `triple`."""
 
 
 class IntegerBlock(LevelBlock):
@@ -93,13 +93,13 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer whose prime factors are the primes for which the rule for the content fails; disc(h) != 0."""
+        """An integer divisible by all primes at which the content rule (module docstring) may fail; disc(h) != 0."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad`, whose exponents are rarely exceeded in the numbers that occur."""
+        """A power of `bad` that is divisible by the bad parts of most numbers."""
         return self.bad**3
 
     @cached_property
@@ -180,7 +180,7 @@ class PlaneIntegers(Integers):
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        # The divisor contains no bad prime.
+        # No bad prime divides `divisor`.
         U, V, W = divide_exactly(undivided_entries, common_part(undivided_entries[::-1], self.power) * divisor)
         return U, V, W
 

@@ -5,8 +5,8 @@ that gamma = G/u^2. With x = 4 u^2 X the Jacobian is the curve with b2 = 9 u^2 +
 has an integral Weierstrass equation: modulo 4, disc(h) is the square of s = ad + bc, and b2 = disc(h) h^2, hence
 a1 = s h, a3 = 0, a2 = (b2 - a1^2)/4, a4 = b4/2, a6 = b6/4. So at each prime the points with nonsingular reduction form
 a group. If m T belongs to this group at all primes, no doubling of m T cancels a common factor, and only the
-archimedean parts of Tate's series remain. The first doubling shows at which primes this holds. Factors that are
-cancelled at the remaining primes divide a resultant R, which bounds the rest of the series.
+archimedean parts of Tate's series remain. The first doubling shows at which primes m T belongs to the group. Factors
+that are cancelled at the other primes divide a resultant R; hence R bounds the rest of the series.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from kahanmaps.errors import PrecisionLost
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 _MULTIPLES = 24  # the largest m for which the reduction of m T is examined
-_LARGE_MULTIPLE = 50  # if no such m T is nonsingular at all primes, a multiple with m of at least this size is used
+_LARGE_MULTIPLE = 50  # if no such m T has nonsingular reduction at all primes, a multiple with m >= this is used
 _MAX_COEFFICIENT = 3  # largest coefficient of elements by which the model is reduced
-_TERMS = 40  # terms of the series; they decrease like 4^-n
+_TERMS = 40  # number of terms of Tate's series; they decrease like 4^-n
 _ACCURACY = 1e-14  # requested accuracy of heights
 
 
 def plane_height(block: PlanarBlock, point: Triple) -> arb:
-    """Return the canonical height of T, normalized to half the height of its x-coordinate, as a ball.
+    """Return the canonical height of T, normalized like half the height of x(T), as a ball.
 
     Args:
         block: the cubic of the plane, with coefficients in Q[t]/g, g irreducible.
@@ -56,8 +56,8 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     norm = abs(K.norm(resultant)).p
 
     def uncertain_part(Q: Any) -> fmpz:
-        """Return the part of the norm of R at the primes at which doubling Q cancels factors; 1 if there are none."""
-        # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; `norm_of_denominator` gives norms of ideals.
+        """Return the part of the norm of `resultant` at the primes where doubling Q cancels factors; 1 if none."""
+        # The numerator of x(2Q) is a quartic form, the denominator 4 Y^2; `norm_of_denominator` gives norms of ideals.
         full_norm = abs(K.norm(4 * Q[1] * Q[1])) * norm_of_denominator(Q[0]) ** 4
         cancelled_norm = full_norm / norm_of_denominator(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
         return split_by_primes(norm, cancelled_norm.p)[1]
@@ -77,7 +77,7 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
 
 
 def _reduce_model(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
-    """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and a product w of small elements for which these are integral.
+    """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and w, a product of small elements for which these quotients are integral.
 
     The curve must keep an integral Weierstrass equation at each prime; for primes over 2 this equation is searched for.
     """
@@ -109,7 +109,7 @@ def _is_integral(element: Any) -> bool:
 
 
 def _denominator(elements: Any) -> int:
-    """Return an integer such that the products of these elements of Q[t]/g with it are integral."""
+    """Return an integer whose products with all `elements` of Q[t]/g are integral."""
     denominator = fmpz(1)
     for element in elements:
         denominator = denominator.lcm(element.polynomial.denom())

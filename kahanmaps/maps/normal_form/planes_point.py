@@ -1,10 +1,10 @@
 """Rational points stored as primitive triples in the planes; x is computed from the triples only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
-product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
-removed: the gcds of the W_i with each other; the primes of the fixed numbers (denominators of alpha, beta and of the
-level, and h_i(beta, -alpha), since a prime that divides alpha U + beta V and W divides h(U, V), hence h(beta, -alpha));
-and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.
+product of the W_i take a few multiplications. For fractions in lowest terms, three kinds of common factors must be
+removed. First, the gcds of the W_i with each other. Second, the primes of the fixed numbers, i.e. the denominators of
+alpha, beta and the level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V), hence
+h(beta, -alpha). Third, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class _Coordinate:
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
     denominator: fmpz
-    fixed_number: fmpz  # contains the fixed primes that numerator and denominator may have in common
+    fixed_number: fmpz  # divisible by the fixed primes that numerator and denominator may have in common
     divisor_planes: tuple[int, ...]  # the planes in which the form alpha U + beta V divides h
 
 
 class Assembly:
-    """The conversion of triples to points x = sum of R (u, v), given the blocks and the matrix R of each block."""
+    """The conversion of triples to points x, the sum over the blocks of R (u, v) with the matrix R of each block."""
 
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
@@ -89,7 +89,7 @@ class Assembly:
         for row in self.rows:
             forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
-        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # all rows, over one denominator
+        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, with one denominator
         # The number of bits by which numerators may be longer than the products of triples that give them.
         largest = max(map(abs, table_rows))
         self.extra_bits = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
@@ -114,12 +114,12 @@ class PlanesPoint:
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
-        """Return for each plane the numerators of the coordinates, their denominator, and primes that may cancel."""
+        """Return the results of `fraction` for each plane: numerators of the coordinates, denominator, third number."""
         return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
     def height(self) -> int:
-        """The bit length of the largest integer over the least common denominator; computing it takes a gcd.
+        """The bit length of the largest integer, with x over its least common denominator; computing it takes a gcd.
 
         `bits` differs by a few bits, but is much too large if denominators of planes have common factors.
         """
@@ -154,7 +154,7 @@ class PlanesPoint:
         """Return numerator and denominator of each coordinate in lowest terms, with positive denominators."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
         possible_primes = fmpz(1)  # divisible by all primes that divide two of the W_i
-        *denominators, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest W is only reduced
+        *denominators, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # `product` is first the longest W
         while denominators:
             longest = denominators.pop()
             possible_primes = possible_primes * longest.gcd(product % longest)
@@ -227,7 +227,7 @@ def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
 
 
 class NormalSteps:
-    """Steps of Phi(., eps) over Q in a normal form; the time step is 2 eps.
+    """Orbits of Phi(., eps) over Q in a normal form; the time step is 2 eps.
 
     >>> from itertools import islice
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
@@ -244,7 +244,7 @@ class NormalSteps:
         self._eps = eps
 
     def blocks(self, start: Sequence[Any]) -> tuple[list[Block], Assembly]:
-        """Return the planes, the triples of the initial point, and the conversion to x."""
+        """Return the blocks of the planes, with the initial point in each, and the conversion of triples to x."""
         planes, scale = self.splitting.planes, 2 * self._eps
         blocks: list[Block] = []
         triples = self.splitting.triples([QQ.convert(entry) for entry in start])
@@ -257,7 +257,7 @@ class NormalSteps:
         return blocks, Assembly(blocks, [self.splitting.matrix(i) for i in range(len(planes))])
 
     def points(self, start: Sequence[Any]) -> Iterator[PlanesPoint]:
-        """Yield the orbit, as long as the map is defined."""
+        """Yield the points of the orbit of `start`, as long as the map is defined."""
         blocks, assembly = self.blocks(start)
         for triples_at_step in zip(*(triples(block) for block in blocks), strict=False):
             yield PlanesPoint(assembly, triples_at_step)

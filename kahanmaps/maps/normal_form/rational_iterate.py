@@ -5,8 +5,8 @@ would end (at a pole or over the budget) is determined as follows.
 
 * Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
   (polynomials of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
-  between. A rise gives a step at which the budget is exceeded at the latest; later steps are irrelevant.
-* Poles up to this step are found modulo random primes of 61 bits (a pole over Q is one for every prime), and verified.
+  between. If heights rise, extrapolation gives a step at which the budget is surely exceeded: no later step matters.
+* Poles up to this step are found modulo random primes of 61 bits (a pole over Q is one modulo each prime) and verified.
 * If the orbit in a plane is periodic, or its level is parabolic, its poles are known for all steps together, and its
   numbers stay short. If this holds for all planes, any n can be reached.
 """
@@ -34,7 +34,7 @@ _EXACT_STEPS = 256  # number of steps that are first computed exactly,
 _EXACT_BITS = 8192  # as long as the numbers have at most this bit length
 _SINGLE_STEPS = 24  # up to this step, single steps are used in a plane
 _PRIMES = 20  # number of random primes modulo which a pole is searched for
-# The default limits: longer numbers take minutes; this number of steps modulo a prime is faster than long numbers.
+# The default limits: longer numbers take minutes; so many steps modulo a prime take less time than long numbers.
 _MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
 
@@ -66,7 +66,7 @@ class OrbitInPlanes:
         for step, value in enumerate(steps.points(x)):
             bits = value.exceeding(self._limit)
             if step == 0 or not bits:
-                self._first_points.append(value)  # not charged to the budget, since the user gave the initial point
+                self._first_points.append(value)  # step 0 is not charged to the budget: the user gave this point
             if bits:
                 self._end_error = OverBudget(step, bits)
                 break
@@ -104,9 +104,9 @@ class OrbitInPlanes:
         return value
 
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
-        """Return (n, value, 0), or for an earlier step over the budget (step, None, its bits or None if unknown).
+        """Return (n, Phi^n(start), 0), or for a step over the budget (step, its point, its bits or None if unknown).
 
-        The value is None if it was not computed or if step n is a pole.
+        The point is None if it was not computed. For a pole at step k the result is (k, None, 0).
         """
         step = max(1, min(self._last_reachable_step, n - 1))
         target_step = n if self._numbers_stay_short else _halve_above(n, step)
@@ -172,7 +172,7 @@ class OrbitInPlanes:
 
 
 def _halve_above(n: int, step: int) -> int:
-    """Return the least of n, n/2, n/4, ..., rounded down, above `step`: a tau table for n contains its value."""
+    """Return the least of n, n/2, n/4, ... (rounded down) above `step`; a tau table for n has the values there."""
     while n >> 1 > step:
         n >>= 1
     return n
@@ -254,7 +254,7 @@ def _point_in_plane(block: Block, n: int) -> Triple:
 
 
 def _steps_modulo(block: Block, n: int, residue_map: Callable[[Any], nmod]) -> tuple[int | None, Triple]:
-    """Return P_n modulo a prime, or the first step at which W vanishes modulo the prime."""
+    """Return (None, P_n) modulo a prime, or (k, P_k) for the first step k at which W vanishes modulo the prime."""
     cubic = block.block
     block_modulo_prime = PlanarBlock(*map(residue_map, (cubic.a, cubic.b, cubic.c, cubic.d)))
     point: Triple = tuple(map(residue_map, block.start))  # type: ignore[assignment]  # a tuple of three

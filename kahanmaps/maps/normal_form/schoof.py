@@ -1,9 +1,9 @@
 """The number of points of an elliptic curve modulo small primes, by Schoof's algorithm, over a field of any size.
 
 For a curve y^2 = c(x) over q elements with q + 1 - t points, the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
-F^2 - t F + q = 0. To find t modulo l, the equation is tested for t = 0, ..., l - 1 on the points of order l, whose x
-are the roots of the division polynomial f of degree (l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c. An
-element without inverse modulo f gives a divisor of f, which replaces f. FLINT's polynomials make this fast enough.
+F^2 - t F + q = 0. To find t modulo l, the equation is tested for t = 0, ..., l - 1 on the points of order l. Their
+x-coordinates are the roots of the division polynomial f of degree (l^2 - 1)/2: computations are modulo f and y^2 = c.
+An element without inverse modulo f gives a divisor of f, which replaces f. FLINT's polynomials make this fast enough.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ class _Divisor(Exception):
 
 
 class _TorsionPoints:
-    """Points (X, y Y) of y^2 = c = x^3 + A x + B with X and Y modulo f."""
+    """Points (X, y Y) of y^2 = c = x^3 + A x + B, where X and Y are polynomials in x modulo f."""
 
     def __init__(self, f: Poly, c: Poly, A: Any) -> None:
         self.f, self.c, self.A = f, c % f, A
 
     def inverse(self, value: Poly) -> Poly:
-        """Return 1/value modulo f. Raises _Divisor."""
+        """Return 1/value modulo f. Raises _Divisor if there is no inverse."""
         common_factor, inverse, _ = value.xgcd(self.f)
         if common_factor.degree() > 0:
             raise _Divisor(common_factor)
         return inverse % self.f
 
     def add(self, P: Point, Q: Point) -> Point:
-        """Return P + Q. Raises _Divisor."""
+        """Return P + Q. Raises _Divisor if an element has no inverse modulo f."""
         if P is None or Q is None:
             return Q if P is None else P
         (X, Y), (Z, T), f = P, Q, self.f
@@ -58,7 +58,7 @@ class _TorsionPoints:
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
-    """Return (t, M): the trace t of y^2 = x^3 + a2 x^2 + a4 x + a6 modulo M, where M = 2 3 5 7 ... is at least `bound`.
+    """Return (t mod M, M): the trace t of Frobenius of y^2 = x^3 + a2 x^2 + a4 x + a6, M = 2 3 5 7 ... >= `bound`.
 
     The field has characteristic at least 5.
 

@@ -83,7 +83,7 @@ class Splitting:
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
-        """Return the rows of R, where x is the sum of R (u, v) over the planes; coefficients are in the field of x."""
+        """Return the rows of R: x is the sum of R w over the planes, w the coefficients of u and v in x's field."""
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:
@@ -101,7 +101,7 @@ class Splitting:
             return triples
 
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
-        """Return the point with these homogeneous coordinates. Raises SingularStep if a triple is at infinity."""
+        """Return the point with the homogeneous coordinates `triples` in the planes. Raises SingularStep if W = 0."""
         with self.field.working():
             coordinates = [self.field.zero] * self.dim
             for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):
@@ -114,7 +114,7 @@ class Splitting:
 
 
 def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
-    """Return the planes over Q or GF(p), one for each irreducible factor of chi."""
+    """Return the planes over Q or GF(p), one for each irreducible factor of chi, and a basis of each plane's field."""
     p = field.characteristic
     chi: Any
     elements: Any
@@ -134,7 +134,7 @@ def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], lis
         return ring([fmpz(int(c)) for c in coefficients]) if p else fmpq_poly(list(coefficients))
 
     def plane_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
-        """Return the plane of a factor, and its basis as coefficients in K of elements that are 0 in other planes."""
+        """Return the plane of a factor, and a basis of its field: coefficients in K of elements 0 in other planes."""
         degree, generator = int(factor.degree()), polynomial([0, 1])
         context: Any = None
         residue: Any
@@ -188,7 +188,7 @@ def _planes_by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], lis
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
-    """Return the monic irreducible factors over Q: linear factors by root, then the others by degree, coefficients."""
+    """Return the monic irreducible factors over Q: linear factors by root, then others by degree and coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 

@@ -1,4 +1,4 @@
-"""Tau functions: points of an orbit in a plane from terms of two Somos sequences, which have a third of their digits.
+"""Tau functions: points of an orbit in a plane from two Somos sequences, whose terms have a third of the digits.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -15,9 +15,9 @@ and both sequences satisfy bilinear identities (phi is psi or chi; there are no 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
 psi depends only on delta = disc(h) level^2: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
-gamma = 1 - delta. For n divisible by 3, the cube root is factored out. These are the sequences W and U of `somos`,
-whose terms follow from those of half the index. Over Q the terms are integers coprime to the bad primes, times scales
-that are never computed, since they contain powers of the bad primes with exponents quadratic in n.
+gamma = 1 - delta. For n divisible by 3, the cube root is factored out. psi and chi are the sequences W and U of
+`somos`: a term follows from terms of half its index. Over Q the terms are integers coprime to the bad primes, times
+scales that are never computed, since they contain powers of the bad primes with exponents quadratic in n.
 docs/mathematics.md has the proofs. Source: ward-1948, for such sequences.
 """
 
@@ -38,7 +38,7 @@ _MAX_SHARED_POINTS = 8  # number of points taken from one table, which then hold
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    After P_n the terms of both sequences are kept from the index n/2 - 4 on.
+    After P_n, only the terms of both sequences from the index n/2 - 4 on are stored.
     """
     table = table_near(block)
     if table is None:
@@ -66,7 +66,7 @@ def iterate(block: Any, n: int) -> Triple | None:
 
 
 def table_near(block: Any) -> TauTable | None:
-    """Return a table for one of the base points P_0, P_1, P_2 around which no value is zero; None if there is none.
+    """Return a table for the first base point among P_0, P_1, P_2 near which no W and no chi is zero; None without one.
 
     Unless T is a torsion point, chi_n is zero for at most one n. Near a pole there are no natural lifts.
     """
@@ -95,7 +95,7 @@ def _divide(triple: Triple, denominator: Any) -> Triple:
 
 
 def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
-    """Return chi_n for some n from -2 to 4, from natural lifts of the points around P_0."""
+    """Return {n: chi_n} for `indices` between -2 and 4, from natural lifts of the points around P_0."""
     rows = {-2: (-2, -1, 1), -1: (-2, 0, 1), 0: (-1, 0, 1), 1: (-1, 0, 2), 2: (-1, 1, 2), 3: (0, 1, 2), 4: (0, 1, 3)}
     values = {n: determinant(*(P[k] for k in rows[n])) for n in indices}
     return {n: value if n % 3 else 3 * value for n, value in values.items()}

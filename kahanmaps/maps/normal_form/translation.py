@@ -55,9 +55,9 @@ def iterate(
         return points[n]
     numerator, denominator = block.level(start)
     if numerator == 0 or block.discriminant == 0:
-        # delta = 0, and the start has an image. (U/W, V/W) is the sum of a part with h = 0, or in the simple root of h,
-        # which is multiplied by r/(r - n), and a part in the double root, which is multiplied by
-        # ((r - n)^2 - 1)/(r^2 - 1).
+        # delta = 0, and the start has an image. (U/W, V/W) is the sum of two parts. In n steps the first part, on which
+        # h = 0 (or h has its simple root), is multiplied by r/(r - n), and the second part, in the double root of h, is
+        # multiplied by ((r - n)^2 - 1)/(r^2 - 1).
         U, V, W = block.image(start)
         pairs = [(start[0] / start[2], U / W), (start[1] / start[2], V / W)]  # coordinates of the start and its image
         r = parabolic_ratio(block, start)
@@ -87,10 +87,10 @@ def iterate(
 
 
 def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
-    """Return r = W/s, s^2 = -D, at a start with delta = 0 and an image; None if D = 0: P_n = P_0 + n (P_1 - P_0).
+    """Return r = W/s, s^2 = -D, at a start with delta = 0 and an image; None if D = 0 (P_n = P_0 + n (P_1 - P_0)).
 
-    A step decreases r by 1, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r if r is
-    a positive integer, and no pole otherwise. r is a rational function of the values of r^2 at the start and its image.
+    A step decreases r by 1. The image has W' = W^2 - s^2, which is 0 for r = 1 or r = -1. So the orbit meets a pole at
+    step r if r is a positive integer, and no pole otherwise. r is computed from r^2 at the start and at its image.
     """
 
     def squared_ratio(point: Triple) -> Any:
@@ -126,7 +126,7 @@ def _point_along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any],
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
-    # Coordinates (x, y) stand for x P + y Q; two entries of the triples in which P, Q are independent determine them.
+    # Coordinates (x, y) stand for x P + y Q. Two entries in which P and Q are independent give (x, y).
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
     determinant = P[i] * Q[j] - P[j] * Q[i]
     (a, b), (c, d) = (
@@ -155,7 +155,7 @@ def _point_along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any],
 
 
 def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
-    """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor is zero."""
+    """Return P_n, counted from the third of five consecutive points, n > 0; None if a divisor is zero."""
     P = dict(zip(range(-2, 3), points, strict=False))
     chi = first_chi(P, range(-1, 3))
     if any(is_zero(value) for value in chi.values()):
@@ -194,7 +194,7 @@ def _point_by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Calla
 
 
 def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
-    """Return 2^count times the point (x, y), None for zero. Sums replace integer multiples, which FLINT does slowly."""
+    """Return 2^count times the point (x, y), None for zero. FLINT multiplies by integers slowly, so sums are used."""
     try:
         for _ in range(count):
             square = x * x
@@ -226,7 +226,7 @@ def _digits(n: int) -> list[tuple[int, int]]:
 def _point_by_doublings(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
-    """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor is zero."""
+    """Return P_n, counted from the fourth of seven consecutive points, n >= 8; None if a divisor is zero."""
     # Natural lifts around this base point: the first two lifts determine all others.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
@@ -243,11 +243,11 @@ def _point_by_doublings(
     psi_values = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
     chi_values, center = [chi[k] for k in range(3)], 1
     for digit in f"{n:b}"[1:]:
-        # The values around 2 centre + digit, computed from the values around `center`.
+        # The values around 2 `center` + digit, computed from the values around `center`.
         first_index = center - 3
         squares = [value * value for value in psi_values]
         neighbours = [None, *(psi_values[k + 1] * psi_values[k - 1] for k in range(1, 7)), None]
-        # The squares for a partner whose index is divisible by 3, and for one whose index is not.
+        # Cube roots of gamma: the square of psi_k, 3 | k, gets the factor gamma unless 3 divides the neighbours' index.
         squares_by_index = [gamma * s if (first_index + k) % 3 == 0 else s for k, s in enumerate(squares)]
         shift = 2 * center + int(digit) - 3
         psi_values = []

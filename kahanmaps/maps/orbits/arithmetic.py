@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-_MAX_DIGITS = 4000  # digits of a prime, or of the number of bits of a precision
+_MAX_DIGITS = 4000  # maximal number of digits of a prime, or of the number of bits of a precision
 
 
 class Arithmetic(NamedTuple):
-    """A number system: "exact", "float", "mod" with a prime, or "ball" with a precision in bits (0: chosen by need).
+    """A number system: "exact", "float", "mod" with the prime `number`, or "ball" with `number` bits (0: automatic).
 
     >>> Arithmetic.parse("mod:101"), str(Arithmetic.parse("ball:auto"))
     (Arithmetic(kind='mod', number=101), 'ball:auto')

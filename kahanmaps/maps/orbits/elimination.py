@@ -11,7 +11,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # If a common divisor has fewer bits than this, dividing every entry by it takes longer than it saves.
 _USEFUL_BITS = 64
-_PRIME = 2**61 - 1  # modulo which a determinant is shown not to be 0
+_PRIME = 2**61 - 1  # the prime modulo which a determinant is shown not to be 0
 
 
 def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz) -> IntegerPoint | None:
@@ -20,18 +20,18 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     Bareiss' two-step algorithm eliminates two columns at a time. For maps of the commuting family the matrix has rank 2
     modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
     up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
-    length of W instead of up to n times: the exact divisions by the previous pivot remove the higher powers. If the
-    minors have no common factor with `candidate_divisor`, this is Bareiss' algorithm. If they have one by chance (a
+    length of W instead of up to n times this length: exact divisions by the previous pivot remove the higher powers. If
+    the minors have no common factor with `candidate_divisor`, this is Bareiss' algorithm. If they have one by chance (a
     pivot W^2 in a matrix with a block that is W times the identity), the previous pivot need not divide later entries;
     the part of it that divides them is then found by gcds. The divisions are not checked one by one: the solution is
     verified in the equation.
     """
     n = matrix.nrows()
     rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous_pivot = fmpz(1)  # the previous pivot; 1 after a pivot that need not divide the entries
+    previous_pivot = fmpz(1)  # 1 at the beginning, and after a pivot that need not divide the entries
     for k in range(0, n - 1, 2):
         a, b, rows_below, m = rows[k], rows[k + 1], rows[k + 2 :], n - k - 2
-        # Replace each entry of the other rows by its minor of order 3 with the pivot rows, over the previous pivot.
+        # Replace each entry of the other rows by its minor of order 3 with the pivot rows, divided by `previous_pivot`.
         pivot, *cofactors = (
             x[k] * y[k + 1] - x[k + 1] * y[k]
             for x, y in [(a, b), *((row, a) for row in rows_below), *((b, row) for row in rows_below)]
@@ -102,7 +102,7 @@ def _divisor_of_all(candidate_divisor: fmpz, values: list[fmpz]) -> fmpz:
     with the exponent needed.
     """
     divisor, small_primes = candidate_divisor, fmpz.primorial_ui(fmpz(1000))
-    while (small_part := divisor.gcd(small_primes)) != 1:  # done first: the remaining part usually divides the values
+    while (small_part := divisor.gcd(small_primes)) != 1:  # first, since the remaining part usually divides the values
         divisor = divisor // small_part
     for value in values:
         if (remainder := value % divisor) != 0:

@@ -1,7 +1,7 @@
 """Forward substitution for maps with a triangular equation, such as explicit maps, on points given by fractions.
 
-Each row of M x~ = r contains one unknown that does not occur in the rows solved before. The entries of a row are
-homogenized in each pair (p_k, q_k) separately, where x_k = p_k/q_k in lowest terms. These integers are shorter than
+Each row of M x~ = r contains exactly one unknown that is not in the rows solved before it. Let x_k = p_k/q_k in lowest
+terms. The entries of a row are homogenized in each pair (p_k, q_k) separately. The resulting integers are shorter than
 integers over a common denominator of all coordinates, since only the coordinates that occur in the row enter.
 """
 
@@ -28,7 +28,7 @@ class _Row:
     divisors: tuple[int, ...]  # indices of the coordinates that divide every entry of M in the row
 
     def solve_unknown(self, point: Sequence[Fraction], solved_coordinates: Sequence[Fraction]) -> Fraction | None:
-        """Return the unknown, given the point and the coordinates solved; None if the unknown has coefficient 0."""
+        """Return the value of the unknown, given the point and the coordinates solved before; None if undefined."""
         monomials = []
         for powers in self.powers:
             monomial = fmpz(1)

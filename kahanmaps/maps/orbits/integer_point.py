@@ -14,7 +14,7 @@ Fraction = tuple[fmpz, fmpz]  # numerator and positive denominator without a com
 
 # If numbers have fewer bits than this, common factors are always removed.
 _LONG_BITS = 3000
-# If a common factor has fewer bits than this, and than this part of the numbers, it is not divided out ...
+# A common factor is short if it has at most _SHORT_BITS + (bits of the numbers)/_SHORT_PART bits; it is not removed ...
 _SHORT_BITS, _SHORT_PART = 64, 64
 # ... until the numbers have become this many times as long as at the last division.
 _MAX_RATIO = 8
@@ -32,12 +32,12 @@ class IntegerPoint:
 
     @property
     def integers(self) -> tuple[Sequence[fmpz], fmpz]:
-        """Return numerators and denominator for the next step; they may have a short common factor."""
+        """The numerators and the denominator for the next step; they may have a short common factor."""
         return self.numerators, self.denominator
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit that was certainly reduced (no common factor)."""
         return self.bits
 
     @staticmethod
@@ -134,7 +134,7 @@ class UnreducedPoint(IntegerPoint):
 
     @property
     def integers(self) -> tuple[Sequence[fmpz], fmpz]:
-        """Return numerators and denominator for the next step; they may have a short common factor."""
+        """The numerators and the denominator for the next step; they may have a short common factor."""
         return self._integers if self.keeps_factors else self._reduced_integers
 
     @cached_property
@@ -160,7 +160,7 @@ class UnreducedPoint(IntegerPoint):
 
     @property
     def reduced_bits(self) -> int:
-        """The bit length of the last point of the orbit whose integers certainly have no common factor."""
+        """The bit length of the last point of the orbit that was certainly reduced (no common factor)."""
         return self._previous_state[1] if self.keeps_factors else self.bits
 
     def lowest_terms(self) -> list[Fraction]:

@@ -25,7 +25,7 @@ _ELIMINATION_BITS = 1000
 _ELIMINATION_DIMENSION = 16  # above this dimension FLINT's solver is faster as well
 _SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes longer than it saves
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
-_CRAMER_BITS = 500  # bits of the first entry of the matrix from which on a point counts as long
+_CRAMER_BITS = 500  # a point counts as long if the first entry of the matrix has at least this number of bits
 _MAX_TRIALS = 2  # after this number of failures, the elimination is no longer tried
 
 
@@ -119,7 +119,7 @@ class IntegerSteps:
         return is_unique_solution(image, *self._equation(point))
 
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
-        """Return `length` points of the orbit modulo a prime below 2^63, each followed by 1; None if not defined."""
+        """Return `length` points of the orbit modulo a prime < 2^63, each followed by 1; None if one is not defined."""
         points, coordinates = list[list[int]](), point.residues(prime)
         while coordinates is not None:
             points.append(coordinates)

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
-DEFAULT_MAX_DIGITS = 200_000  # decimal digits of the integers of a point over one common denominator
-LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits is larger
+DEFAULT_MAX_DIGITS = 200_000  # maximal decimal digits of the integers of a point over one common denominator
+LONGEST_INPUT = 10_000  # maximal digits of eps and of the initial point, unless --max-digits is larger
 FIRST_POINTS = 3  # number of points at the beginning that an orbit stores
 _DIGITS_PER_BIT = 0.30103
 
@@ -100,7 +100,7 @@ class OrbitPoint:
 
     @property
     def digits(self) -> int:
-        """Approximate number of decimal digits of the largest integer over the common denominator; 0 except over Q."""
+        """The approximate number of digits of the largest integer, over one common denominator; 0 except over Q."""
         return 0 if isinstance(self.value, tuple) else _digits_of_bits(self.value.bits)
 
     def __repr__(self) -> str:
@@ -128,10 +128,10 @@ class Orbit(HtmlDisplay):
         at: the requested iterates, each computed directly from the normal form. Except over Q, poles at steps
             in between are not noticed.
         backward: whether steps are taken by the inverse map.
-        max_digits: the largest number of decimal digits of the integers over one common denominator (over Q).
+        max_digits: the largest number of decimal digits of the numerators and their common denominator (over Q).
         normal_form: if given (family.system_normal_form), steps are taken in the normal form: over Q plane by plane;
             over balls each point directly from the initial point, so that balls do not widen from step to step.
-        is_requested: returns whether a step is requested; steps for which it returns False may be skipped.
+        is_requested: a function that returns whether a step is requested; other steps may be skipped.
 
     `first` is the list of the first points, `last` the last point yielded so far.
 
@@ -195,7 +195,7 @@ class Orbit(HtmlDisplay):
 
     @property
     def relations(self) -> str | None:
-        """The relations between points that are in use, and the first step that uses them; None if there are none."""
+        """The relations between points in use, with the first step that uses them, as text; None if there are none."""
         if self._rational_orbit is None or self._rational_orbit.relations is None:
             return None
         return f"{self._rational_orbit.relations.name} from step {self._rational_orbit.since} on"

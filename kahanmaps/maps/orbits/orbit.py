@@ -45,12 +45,12 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _MAX_SINGLE_STEPS = 10**13  # more single steps would take years
-# Up to these numbers of steps, no normal form is searched for: an exact search takes longer than it saves. In floating
-# point and with balls it also makes the points more accurate.
+# Up to these numbers of steps, no normal form is searched for: an exact search takes longer than it saves. A normal
+# form also makes the points more accurate in floating point and with balls.
 _MAX_STEPS_WITHOUT_SEARCH = {"exact": 20, "float": 3, "ball": 3, "mod": DOUBLING_FROM["mod"] - 1}
-_LONG_INPUT_BITS = 4000  # bits of the initial point and eps; above, a normal form saves time only for more steps
+_LONG_INPUT_BITS = 4000  # if eps or the initial point has more bits, no normal form is searched for up to 24 steps
 _MAX_SEARCH_DIMENSION = 16  # largest dimension in which a normal form is searched for
-_FALLBACK_BITS = 4096  # precision of balls if no precision is sufficient
+_FALLBACK_BITS = 4096  # precision of the balls if no precision that was tried suffices
 _BITS_PER_DIGIT = 3.3219281
 
 
@@ -140,7 +140,7 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    if is_float:  # an initial point or eps in floats is accepted, and converted exactly
+    if is_float:  # an initial point in floats is accepted, and converted exactly
         start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
             if isinstance(x, float) and not math.isfinite(x):
@@ -283,7 +283,7 @@ class Trajectory(HtmlDisplay):
         return [point for point in self._compute_points() if self._request.is_requested(point.step)]
 
     def preview(self, count: int) -> list[OrbitPoint]:
-        """Return the first points if they are stored or need at most `count` steps, otherwise an empty list."""
+        """Return the first `count` points if they are stored or every step is requested, otherwise an empty list."""
         if "points" in self.__dict__ or (self._request.at is None and self._request.every == 1):
             return list(islice(self, count))
         return []
@@ -336,7 +336,7 @@ class Trajectory(HtmlDisplay):
         return self.__array__(dtype)
 
     def to_xarray(self) -> Any:
-        """Return the coordinates, rounded to floats, as an xarray.Dataset along `step`. InputError without xarray."""
+        """Return the coordinates as an xarray.Dataset of floats along `step`. Raises InputError without xarray."""
         try:
             xarray: Any = import_module("xarray")
         except ImportError as error:
@@ -384,7 +384,7 @@ class Trajectory(HtmlDisplay):
         return self.write(path)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write step and exact coordinates of the points to a .csv file, without a metadata file."""
+        """Write step and coordinates of the points to a .csv file, without a metadata file."""
         with open_append(path) as stream:
             self.write(stream, "csv")
 
@@ -484,7 +484,7 @@ class Trajectory(HtmlDisplay):
         Args:
             dtype: by default float64, to which exact numbers are rounded; for residues int64, or object if int64 is too
                 small. `object` leaves the coordinates unchanged: fmpq, elements of a number field, balls, float, and
-                residues as int. An integer dtype contains them exactly.
+                residues as int. An integer dtype represents the coordinates exactly.
 
         Raises:
             InputError: if the dtype cannot represent the coordinates: for integers, numbers that are not integers or
@@ -577,7 +577,7 @@ class NotAccurate(Exception):
 
 
 def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Callable[[str], None] | None = None) -> int:
-    """Return a precision in bits for which every point has `digits` correct digits of its largest coordinate.
+    """Return a precision in bits at which all points have `digits` correct digits, relative to the largest coordinate.
 
     The precision is doubled until it suffices. `orbit_with` returns the orbit over RR(bits); an orbit that ends for
     another reason than precision is accepted. `on_progress` is called for every trial. Raises NotAccurate if the

@@ -1,8 +1,8 @@
 """Writers of orbit files, one class for each format: text, json, jsonl, csv, npz and parquet.
 
 Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
-and parquet files are written at the end. Float orbits are passed to them in portions: the rows of an npz file go to a
-temporary file, and in a parquet file each portion is a row group.
+and parquet files are written at the end. Their writers receive float orbits in portions: the rows of an npz file go to
+a temporary file, and in a parquet file each portion is a row group.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from kahanmaps.version import __version__
 
 # An npz file pads exact numbers to the length of the longest; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
-_CHUNK_SIZE = 1 << 18  # numbers copied in one operation
-_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file: from here on pyarrow is loaded; rows in one call
-_FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
+_CHUNK_SIZE = 1 << 18  # number of array entries copied in one operation
+_MIN_ARROW_ROWS, _ARROW_ROWS = 2000, 50_000  # rows of a csv file from which on pyarrow is used; rows in one call of it
+_FLUSH_AFTER = 4_000  # number of characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
 _TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
 
@@ -72,7 +72,7 @@ class Writer(ABC):
 
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
-        # Flushed regularly, so that a killed process loses little, and always before steps that may take long:
+        # Flush regularly, so that a killed process loses little; a long line is flushed before the next long step.
         self._unflushed += len(text)
         if self._unflushed > _FLUSH_AFTER:
             self.stream.flush()
@@ -95,7 +95,7 @@ class Text(Writer):
 
 
 class JsonLines(Writer):
-    """One JSON object per line; its "record" is "header", "point" or "end"."""
+    """One JSON object per line; the value of the key "record" is "header", "point" or "end"."""
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(json.dumps({"record": "header", **header}))

@@ -1,8 +1,8 @@
-"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in integers of 64 bits.
+"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in doubles that are integers.
 
 An element a + b w of GF(p^2), with w^2 = nu not a square modulo p, is a pair of doubles that are integers in [0, p); a
 polynomial is an array (2, length). By the choice of p and of the largest length, sums of products stay below 2^53, so
-that they are exact. They are reduced by a product with 1/p: floor((x + 1/2)/p) is right if x/p < 2^36, since
+that they are exact. Sums are reduced modulo p by a product with 1/p: floor((x + 1/2)/p) is right if x/p < 2^36, since
 (x + 1/2)/p differs from every integer by at least 1/(2 p).
 
 The functions are ordinary Python until `kernel` replaces them by functions compiled by numba.
@@ -48,7 +48,7 @@ def _reduce(x: Any, length: int, p: float) -> None:
 
 
 def _add_product(result: Any, a: Any, length_a: int, b: Any, length_b: int, sign: float, nu: float) -> None:
-    """Add sign a b to `result`, without reduction modulo p."""
+    """Add `sign` * a * b to `result`, without reduction modulo p; a and b are polynomials of the given lengths."""
     x, y, b0, b1 = result[0], result[1], b[0], b[1]
     for i in range(length_a):
         c0, c1 = sign * a[0, i], sign * a[1, i]
@@ -72,14 +72,14 @@ def _copy(a: Any, b: Any, length: int) -> None:
 
 
 def _trimmed_length(a: Any, length: int) -> int:
-    """Return the length of a polynomial without zeros at the end."""
+    """Return the length of a polynomial without the zeros at its end."""
     while length > 0 and a[0, length - 1] == 0 and a[1, length - 1] == 0:
         length -= 1
     return length
 
 
 def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: float, nu: float) -> Any:
-    """Subtract the multiple of b that removes the leading term of a; return this factor. `inverse` is 1/b[-1]."""
+    """Subtract c x^k b from a to remove the leading term of a; return c. `inverse` is 1/b[-1]."""
     u, v = a[0, length_a - 1], a[1, length_a - 1]
     c0 = (u * inverse[0] + nu * v * inverse[1]) % p
     c1 = (u * inverse[1] + v * inverse[0]) % p
@@ -104,7 +104,7 @@ def _inverse_of_last(b: Any, length: int, p: float, nu: float, inverses: Any) ->
 
 
 def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any) -> Any:
-    """Return a gcd and its length; both arrays are overwritten."""
+    """Return a gcd of a and b, and its length; both arrays are overwritten."""
     while length_b > 1:
         inverse = _inverse_of_last(b, length_b, p, nu, inverses)
         while length_a >= length_b:
@@ -116,7 +116,7 @@ def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inve
 
 
 def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any, quotient: Any) -> int:
-    """Divide a by b: write the quotient to `quotient`, leave the remainder in a, and return its length."""
+    """Divide a by b: write the quotient to `quotient`, leave the remainder in a; return the remainder's length."""
     inverse = _inverse_of_last(b, length_b, p, nu, inverses)
     _clear(quotient, max(length_a, 1))
     while length_a >= length_b:
@@ -127,7 +127,7 @@ def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, i
 
 
 def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: float, nu: float, M: Any) -> int:
-    """Write (M | -r) at the curve X, whose polynomials have this length, to M; return the length of its entries.
+    """Write (M | -r) at the curve X, a vector of polynomials of this length, to M; return the length of the entries.
 
     Each row of `terms` is (i, j, k, l): entry (i, j) has monomial k with the coefficient values[l].
     """
@@ -157,7 +157,7 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
 
 
 def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
-    """Compute the minors of the first rows for all sets of columns; return the length of the minors of all rows."""
+    """Compute the minors of the first k rows and any k columns for all k <= n; return the length of those for k = n."""
     n = M.shape[0]
     for j in range(n + 1):
         _copy(M[0, j], minors[1 << j], length)
@@ -197,7 +197,7 @@ def _divide_by_common_factor(
     _reduce(b, length, p)
     divisor, size = _gcd(a, _trimmed_length(a, length), b, _trimmed_length(b, length), p, nu, inverses)
     _copy(divisor, common_factor, size)
-    if size != 1:  # two mixtures may have a common factor that not all polynomials have
+    if size != 1:  # two linear combinations may have a common factor that not all polynomials have
         for j in range(count):
             _copy(X[j], c, length)
             c_length = _trimmed_length(c, length)
@@ -222,8 +222,8 @@ def walk(
     """Write to degrees[m, s] the degree of the image of the line start[m] under s + 1 steps of map m.
 
     start[m, j] contains the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials exceed `max_length`. A degree is -1
-    if the iterate is defined nowhere.
+    `weights` (steps, 2, 2, n + 1) are the coefficients of two linear combinations of the coordinates for each step. The
+    iteration ends before polynomials exceed `max_length`. A degree is -1 if the iterate is defined nowhere.
     """
     n = start.shape[1] - 1
     power = exponents[0].sum()

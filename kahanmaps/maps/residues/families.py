@@ -24,17 +24,17 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 
-MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
+MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, also multiplied by nu, stay below 2^53
 MAX_DIMENSION = 6  # largest number of variables of a map
 NOWHERE, TOO_LARGE = -1, -2  # stored instead of a degree
-_CHUNK_SIZE = 128  # members measured in one call of the kernel
+_CHUNK_SIZE = 128  # number of members measured in one call of the kernel
 LONG = 200  # number of members from which on compiling saves time
 
 Members = NDArray[np.int64]
 
 
 class Family:
-    """A map with symbols modulo an odd prime p < 2^13; each coefficient is a table over monomials in symbols and eps.
+    """A map with symbols modulo an odd prime p < 2^13; a coefficient is a polynomial (table) in the symbols and eps.
 
     Raises InputError for values out of range, BadPrime if the prime divides a denominator.
     """
@@ -79,10 +79,10 @@ class Family:
     ) -> NDArray[np.int64]:
         """Return the degrees d_1, ..., d_terms of each member as a row, for one random line each.
 
-        `members` are residues of the symbols, one row for each member; an additional column contains eps. Without it,
-        `eps` is an exact number, or None for a random element of GF(p^2) for each member. `max_length` is the largest
-        number of coefficients of a polynomial before common factors are removed; beyond it degrees are -2 (TOO_LARGE).
-        They are -1 (NOWHERE) if the iterate is defined nowhere. `kernel`: "numpy" or "numba"; `jobs`: threads.
+        `members` are residues of the symbols, one row for each member; an additional column contains eps. Without this
+        column, `eps` is an exact number, or None: a random element of GF(p^2) per member. `max_length` is the largest
+        number of coefficients of a polynomial before common factors are removed. A degree is -2 (TOO_LARGE) beyond this
+        number, and -1 (NOWHERE) if the iterate is defined nowhere. `kernel`: "numpy" or "numba"; `jobs`: threads.
         """
         numpy_rng = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
@@ -112,7 +112,7 @@ class Family:
         return degrees
 
     def units(self, degrees: Sequence[int]) -> float:
-        """Return the work, in units (algebra/work.py), for one member whose iterates have these degrees, from the 0th.
+        """Return the work, in units (algebra/work.py), for one member whose iterates 0, 1, ... have these degrees.
 
         The units were fitted to the compiled kernel in dimensions 2 to 5; the slower kernel counts the same units.
         """

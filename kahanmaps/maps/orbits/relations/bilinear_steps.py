@@ -4,7 +4,7 @@ Cramer's rule gives the integers of the next point as determinants, several time
 orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation on it, then the homogeneous
 coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), all products
 X_i(n + 1) X_j(n - lag) and X_k(n) X_l(n + 1 - lag) are sections of one bundle. If the products X_k(n) X_l(n + 1 - lag)
-span its sections, then
+span all sections of this bundle, then
 
     f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
 
@@ -29,20 +29,20 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
 Pairs = Sequence[tuple[int, int]]  # indices i, j of products X_i Y_j of coordinates
 
-_MAX_PRIMES = 50  # number of primes from which the coefficients are computed
-_MAX_DIMENSION = 12  # in this dimension the search for forms, with 169 products, takes some seconds
+_MAX_PRIMES = 50  # maximal number of primes from which the coefficients are computed
+_MAX_DIMENSION = 12  # largest dimension, in which the search for forms, with 169 products, takes some seconds
 _EXTRA_POINTS = 8  # points beyond the number of unknowns; wrong forms pass at each with probability 2^-60
 
 
 class BilinearForms:
-    """The forms B_ij for the last j: one row of coefficients for each i, one column for each product."""
+    """The forms B_ij for the last j: one row of coefficients for each i, one column for each of `products`."""
 
     name = "bilinear forms along the orbit"
 
     def __init__(self, steps: IntegerSteps, lag: int, products: Pairs, coefficients: fmpz_mat) -> None:
         self.lag, self.products, self.coefficients = lag, products, coefficients
         self._steps = steps
-        # Only B_ij for the last j are known, so f_n may have a denominator; this is a multiple of all so far.
+        # Only B_ij for the last j are known, so f_n may have a denominator: `_multiple` is divisible by all so far.
         self._multiple = fmpz(1)
 
     def may_skip(self, number: int) -> bool:
@@ -110,8 +110,8 @@ class _Search:
             independent_columns = pivots(echelon(values, prime))
             self.products = [self.products[k] for k in independent_columns]
             values = [[row[k] for k in independent_columns] for row in values]
-        # f = f_n, for points with last coordinate 1: f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
-        # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
+        # With f = f_n and last coordinates 1, the functions f, g(X(n + 1)) f and g(X(n - lag)) f lie in the span of the
+        # columns, if g is a linear form whose divisor has no component in common with that of the last coordinate.
         unknown_count = len(values[0])
         zeros, rows = [0] * unknown_count, []
         for row, *outer_points in zip(values, images, earliest_points, strict=True):

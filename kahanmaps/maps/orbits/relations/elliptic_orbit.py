@@ -1,16 +1,16 @@
 """Orbits on elliptic curves: their coordinates are forms in the terms of two Somos sequences, with a proof.
 
 If a map translates the points of an elliptic curve by T, the coordinates at step n are sections of a line bundle of
-degree d at P + n T. They are forms in terms, with indices near n, of the sequences W and U (see `elliptic_search`); the
+degree d at P + n T. They are forms in the terms near n of the sequences W and U (see `elliptic_search`); the
 forms have rational coefficients that do not depend on n. Such terms have 1/d of the length of a coordinate, so a step
 takes short products, and no gcds of long integers. The points of a composition of several maps may lie alternately on
 several curves: after `stride` steps of factors the orbit returns to the same curve, and T is the translation by these
 steps. If the equation is triangular, each new coordinate has its own sequence U, of lower degree than a common one.
 
 The forms are proved. Substituted into the equation of a step they give a section of known degree D. They agree with
-the points of the orbit, exactly, at more than D steps; a nonzero section of degree D has at most D zeros, hence they
-agree for all n. That the terms of Somos sequences are values of sigma functions on one curve is a theorem (hone-2005),
-and the multiples n T are different from 0 as long as W(n) is not 0.
+the points of the orbit, exactly, at more than D steps. A nonzero section of degree D has at most D zeros; hence the
+forms give all points. That the terms of Somos sequences are values of sigma functions on one curve is a theorem
+(hone-2005), and the multiples n T are different from 0 as long as W(n) is not 0.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, Elliptic
 from kahanmaps.maps.orbits.relations.sections import common_primes
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
-_MAX_PRIMES = 100  # number of primes from which the coefficients are computed
+_MAX_PRIMES = 100  # maximal number of primes from which the coefficients are computed
 _BITS_PER_PRIME = 100  # bits of the points for each prime: the coefficients must be shorter than the points
-_MAX_FACTORS = 8  # of the shortest sequence of factors that a composition repeats
-_SKIPPED_STEPS = 3  # for a special initial point: terms of U near the beginning may be 0, like W(0)
+_MAX_FACTORS = 8  # maximal length of the shortest sequence of factors that a composition repeats
+_SKIPPED_STEPS = 3  # steps skipped at a special initial point: terms of U near the beginning may be 0, like W(0)
 _MIN_INDEX = 2  # the least n for which the forms are used
 
 Groups = Sequence[tuple[int, ...]]  # groups of coordinates with a common denominator
@@ -46,10 +46,10 @@ class TooLongRelation(Exception):
 def elliptic_steps(
     map_over: Map, start: IntegerPoint, bits: int, most_primes: int = _MAX_PRIMES
 ) -> EllipticSteps | None:
-    """Search for elliptic curves that contain the orbit of `start`, and return its steps; None if none is found.
+    """Search for elliptic curves that contain the orbit of `start`; return the steps of the orbit, or None.
 
-    `bits` is the length of the points; only much shorter coefficients are useful. Raises TooLongRelation if the
-    coefficients of a curve are longer than that, but may be useful once the points have grown; it is not raised if
+    `bits` is the bit length of the current points; only much shorter coefficients are useful. Raises TooLongRelation if
+    the coefficients of a curve are too long now, but may be useful once the points have grown; it is not raised if
     `most_primes` primes do not suffice to decide this.
     """
     factors = map_over.factors
@@ -86,7 +86,7 @@ def elliptic_steps(
 
 
 class Numbers(NamedTuple):
-    """What determines the forms of a group: H, y = y(2), z = y(3) (elliptic_search.py); coefficients, row by row."""
+    """The numbers H, y = y(2), z = y(3) (elliptic_search.py) and the coefficients (by row) of the forms of a group."""
 
     H: fmpq
     y: fmpq
@@ -95,7 +95,7 @@ class Numbers(NamedTuple):
 
 
 class _Search:
-    """The search modulo primes for the sections of each curve, for each group of coordinates that is new on it.
+    """The search modulo primes for the sections of each curve and each group of coordinates that is new on the curve.
 
     `earlier` has one row for each of the alternating curves. An entry is None for a new group of coordinates; if the
     group is a copy of a group at the previous step, the entry is the index of that group.
@@ -110,7 +110,7 @@ class _Search:
             # Each coordinate must be new, or equal to one that was new at an earlier step; they must not only permute.
             earlier: list[list[int | None]] = [[None] * n for _ in range(stride)]
             for k, copied_coordinates in enumerate(earlier):
-                # The index of the equal coordinate of the point, for each coordinate of the image that is a copy.
+                # For each coordinate of the image that is a copy: the index of the equal coordinate of the point.
                 equation = factors[(k - 1) % len(factors)].equation
                 for row in equation.terms:
                     unknowns = [j for j in range(n) if row[j]]
@@ -132,7 +132,7 @@ class _Search:
         self.sections: dict[tuple[int, int], Sections] = {}
 
     def numbers(self, max_primes: int = _MAX_PRIMES) -> dict[tuple[int, int], Numbers] | None:
-        """Return the numbers of all new groups; None if no curves exist or `max_primes` primes do not suffice."""
+        """Return {(curve, new group): its numbers}; None if no curves exist or `max_primes` primes do not suffice."""
         residues = from_residues(self._numbers_modulo, max_primes)
         if residues is None:
             return None
@@ -207,7 +207,7 @@ def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bo
         if image is None:
             return False
         point = image
-    # The steps must belong to different multiples of T.
+    # The steps must belong to pairwise different multiples of T.
     return all(steps.multiples.integer(n) != 0 for n in range(1, search.first // stride + max_degree + 2))
 
 
@@ -241,7 +241,7 @@ class _ExactCurves:
             self._all_primes[key] = self._primes.lcm(common_number.p).lcm(common_number.q)
 
     def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
-        """Return the steps; the first `skipped` points of the orbit do not count in the numbers of steps."""
+        """Return the steps of the orbit; the sequences begin at the point after `skipped` steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
         new_coordinates = {

@@ -2,13 +2,13 @@
 
 Let the points of an orbit be P + n T on an elliptic curve, and their coordinates sections of a line bundle of degree d.
 There are d independent sections. Sections that are not coordinates are products of coordinates of several points,
-divided by coordinates of all points but one. Two independent sections vanish at d - 2 points of the orbit, and their
-quotient z takes each value twice. With the sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of
-the zeros of a section,
+divided by coordinates of all points but one. Let z be the quotient of two independent sections that vanish at the same
+d - 2 points of the orbit; z takes each value twice. With the sigma functions W(n) of n T and U(n) of n T + d P - s,
+where s is the sum of the zeros of a section,
 
     z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m))      for an integer k and a sequence r,
 
-so the cross ratios of z give quotients of W and U. Those of four consecutive points are 1 - y(2n + k - 1) with
+so cross ratios of z give quotients of W and U. The cross ratio at four consecutive points is 1 - y(2n + k - 1) with
 
     y(u) = H U(u)^2/(U(u + 1) U(u - 1)),      y(u + 1) y(u) (1 - y(u)) y(u - 1) = H,
 
@@ -34,7 +34,7 @@ Rows = list[list[int]]
 _MAX_PRODUCTS = 64  # largest number of products of coordinates that are tried as sections
 _MAX_DEGREE = 8  # largest degree d of the line bundle
 _EXTRA_POINTS = 8  # rows beyond the number of unknowns; a wrong relation passes at each with probability 2^-60
-_Z_VALUES = 14  # values of z from which the sequences are computed; nine suffice
+_Z_VALUES = 14  # number of values of z from which the sequences are computed; nine suffice
 _POINT_COUNTS, _LAGS = (2, 3), (1, 2)  # possible numbers of points in a product, and possible distances between them
 
 
@@ -73,7 +73,7 @@ class Curve:
 
 
 def points_needed(size: int) -> list[int]:
-    """Return the numbers of points to pass to `curve`, one after the other, for this number of coordinates."""
+    """Return the numbers of points to pass to `curve`, in this order of trials, for `size` coordinates."""
     products: list[int] = [(size + 1) ** count for count in _POINT_COUNTS]
     return [number + 2 * _EXTRA_POINTS + 2 * max(_LAGS) for number in products if number <= _MAX_PRODUCTS]
 
@@ -115,12 +115,12 @@ def _section_basis(points: Rows, sections: Sections, prime: int) -> Rows | None:
     count, lag, coordinates = sections.points, sections.lag, sections.coordinates
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
-    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. The
-    # factors 1 (the last coordinate) and a linear form without zeros in common with it suffice for g.
+    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points. Two
+    # factors of g suffice: 1 (the last coordinate), and a linear form without zeros in common with the last coordinate.
     all_products = _products_of_coordinates(points, coordinates, count, lag, prime)
     values = [[row[k] for k in sections.products] for row in all_products]
     product_matrix = matrix(values[: sections.rows], prime)
-    annihilators = kernel(*product_matrix.transpose().rref())  # of this span
+    annihilators = kernel(*product_matrix.transpose().rref())  # the linear forms that are 0 on the span of the products
     factors = [
         [(1, sum((j + 2) ** 3 * x for j, x in enumerate(point))) for point in points_before]
         for _, *points_before in _points_at_lags(points, count, lag)[: sections.rows]
@@ -150,7 +150,7 @@ def _points_at_lags(points: Rows, count: int, lag: int) -> list[tuple[list[int],
 
 
 def _numbers_of_curve(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
-    """Return the numbers of a `Curve`; None without a pencil or a sequence, or if coordinates are not sections."""
+    """Return the numbers of a `Curve`; None if there is no pencil or no sequence, or coordinates are not sections."""
     degree, first_index = sections.degree, (sections.points - 1) * sections.lag
     pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
@@ -182,9 +182,9 @@ def _numbers_of_curve(points: Rows, sections: Sections, values: Rows, prime: int
 
 
 def _elliptic_sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | None:
-    """Return H, and y at consecutive u; the first u belongs to the four points around z[2] and z[3].
+    """Return H, and a dict {m: y(m + shift)} for consecutive m, where `shift` is that of `_numbers_of_curve`.
 
-    Returns None if z does not come from such a sequence.
+    Returns None if z does not come from sequences W and U.
     """
     y_at_odd = {}  # y(u) is 1 minus this cross ratio
     values_at_even = {}  # y(u) is 1 minus K times this value

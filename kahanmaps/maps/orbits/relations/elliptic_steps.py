@@ -18,16 +18,16 @@ from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.sections import exponents
 from kahanmaps.maps.somos import Terms
 
-_PRIME = 2**61 - 1  # modulo which skipped points are shown to exist
+_PRIME = 2**61 - 1  # the prime modulo which skipped points are shown to exist
 
 
 class EllipticSteps:
     """The steps of an orbit by Somos sequences.
 
     A step of a composition consists of one step of each factor. Let s be the length of `groups`: after n s + k steps of
-    factors, 0 <= k < s, the point lies on the k-th of s curves, which `groups[k]` describes. This row contains for each
-    group of coordinates its Coordinates or, if the last step of a factor only copied the group, the index that the
-    group had before that step. The sequences begin at the point with the number `skipped` of the orbit. The forms give
+    factors, 0 <= k < s, the point lies on the k-th of s curves. The row `groups[k]` describes this curve. It contains
+    the `Coordinates` of each group of coordinates or, for a group that the last step of a factor only copied, the index
+    of the group before that step. The sequences begin at the point number `skipped` of the orbit. The forms give
     the points from `first` steps of factors after that point on.
     """
 
@@ -58,7 +58,7 @@ class EllipticSteps:
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
     def step(self, last_points: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """Return the point with this number, after the previous one was computed or skipped; None if undetermined."""
+        """Return point `number` of the orbit, if the point before was computed or skipped; None if undetermined."""
         return self.point(number) if self._has_point(number) else None
 
     def may_skip(self, number: int) -> bool:
@@ -66,7 +66,7 @@ class EllipticSteps:
         return self._has_point(number)
 
     def _has_point(self, number: int) -> bool:
-        """Return whether the orbit modulo a prime proves that there is a point with this number.
+        """Return whether the orbit modulo a prime proves that point `number` exists.
 
         The numbers of successive calls must increase by 1 as long as the answer is True.
         """
@@ -114,7 +114,7 @@ class EllipticSteps:
 
 
 class Coordinates:
-    """A group of coordinates on one curve; `forms` has one row for each coordinate, the last row is the denominator."""
+    """A group of coordinates on one curve; `forms` has a row for each numerator, and a last row for the denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
         self.W, self.degree, self._U, self._primes = W, degree, U, primes

@@ -1,8 +1,8 @@
 """The elliptic curve of an orbit in the plane, as the level curve F(x, y) = 0 of an integral.
 
-It is used for orbits that do not determine their curve, such as periodic ones. Lines through a point whose multiplicity
-on the curve is the degree minus 2 meet the curve in two more points: so the curve becomes v^2 = g(t), g of degree 3 or
-4, and then a Weierstrass curve.
+It is used for orbits that do not determine their curve, such as periodic ones. Lines through a point of multiplicity
+d - 2 on the curve, d = deg F, meet the curve in two more points. This transforms the curve into v^2 = g(t), with g of
+degree 3 or 4, and then into a Weierstrass curve.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def is_conserved(family: MapFamily, eps: fmpq, integral: RationalFunction) -> bo
 def level_curve(
     integral: RationalFunction, eps: fmpq, points: Sequence[tuple[fmpq, ...]]
 ) -> tuple[EllipticCurve, AffinePoint, fmpq_mpoly] | None:
-    """Return the curve on which an orbit lies, the difference of successive points, and its polynomial F.
+    """Return the Weierstrass curve of an orbit, the difference of successive points on it, and the polynomial F.
 
     Args:
         integral: a function of two variables and eps that the map conserves.
@@ -44,7 +44,7 @@ def level_curve(
         points: at least three successive points of the orbit.
 
     Returns None if the orbit meets several components of the level curve or a singular point, or if no rational point
-    of the curve is found whose multiplicity is the degree minus 2.
+    of multiplicity d - 2 is found on the curve, where d is its degree.
     """
     level = integral.value(QQ, (*points[0], eps))
     if level is None:

@@ -40,7 +40,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 
-_MAX_BITS = 100_000  # bits of coefficients that are searched for, and of points on rational curves
+_MAX_BITS = 100_000  # maximal number of bits of the coefficients searched for, and of points on rational curves
 # The search is repeated from later points, up to 16 steps in distances of 8, as long as points have at most 2000 bits.
 _LAST_SEARCH_STEP, _SEARCH_DISTANCE, _MAX_SEARCH_BITS = 16, 8, 2000
 _MAX_LEVEL_POINTS = 8  # number of points from which the translation on a level curve is computed
@@ -53,9 +53,9 @@ _ACCURACY = 1e-15  # accuracy of rotation numbers
 class OrbitCurve(PrintableResult):
     """The curve of an orbit, and the map on this curve; everything except the balls is exact and proved.
 
-    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers belong to
-    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B; `degree` is that of the
-    coordinates. For genus 0, `trace` = kappa + 1/kappa, kappa the multiplier; trace = 2 for a parabolic map.
+    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers belong to this iterate.
+    For genus 1 the iterate is the translation by `point` on `curve`, y^2 = x^3 + A x + B, on which the coordinates have
+    degree `degree`. For genus 0, `trace` is kappa + 1/kappa with the multiplier kappa; it is 2 for a parabolic map.
     """
 
     genus: int
@@ -72,14 +72,14 @@ class OrbitCurve(PrintableResult):
 
     @cached_property
     def height(self) -> arb | None:
-        """The canonical height of the point."""
+        """The canonical height of `point`."""
         if self.curve is None or self.point is None:
             return None
         return canonical_height(self.curve, self.point) if self.order is None else arb(0)
 
     @property
     def height_constant(self) -> float | None:
-        """The C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits.
+        """The constant C such that the largest coordinate of the n-th iterate of the map has about C n^2 bits.
 
         With all coordinates over one common denominator, the integers may be longer.
         """
@@ -103,7 +103,7 @@ class OrbitCurve(PrintableResult):
 
     @property
     def steps(self) -> int:
-        """1; or 2 if the iterate exchanges two real components, and `rotation` belongs to its square."""
+        """1, or 2 if the iterate exchanges two real components; then `rotation` belongs to the iterate's square."""
         return self._rotation[1]
 
     @cached_property
@@ -280,7 +280,7 @@ def _on_elliptic_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
     a2, a3 = W3 / W2**2, W2
     a1 = (W4 / a3**4 + a3) / a2
     curve, T = EllipticCurve(a2 + a1 * a1 / 4, a1 * a3 / 2, a3 * a3 / 4), (fmpq(0), a3 / 2)
-    # T is the translation by `stride` steps of factors; `factor_steps` is a multiple of that and of a step of the map.
+    # T belongs to `stride` steps of factors; `factor_steps` is the least common multiple of `stride`, `factor_count`.
     factor_count = len(map_over.factors)
     factor_steps = math.lcm(factor_count, steps.stride)
     iterate = factor_steps // factor_count
@@ -308,7 +308,7 @@ def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
 
 
 def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -> OrbitCurve:
-    """Return the multiplier of the translation on Y^2 = (x - r)^2 (x - s).
+    """Return the result, with the multiplier of the translation, on the singular cubic Y^2 = (x - r)^2 (x - s).
 
     The translation multiplies (Y + m (x - r))/(Y - m (x - r)), m^2 = r - s, by the value of this function at the point.
     """
@@ -323,7 +323,7 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
-    """Return the points that show a period (which ends them) or a rational curve; None follows if too long."""
+    """Return enough points to show a period or a rational curve; None follows if the orbit ends or gets too long."""
     dim = map_over.dim
     map_degree = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]

@@ -1,4 +1,4 @@
-"""Orbits over Q: single steps until relations between the points are found, which make the later steps faster."""
+"""Orbits over Q: single steps until relations between the points are found; these make the later steps faster."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class RationalOrbit:
         last_points, last_number = deque([self.start], maxlen=3), 0
         min_bits_by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
         search_bits: float = max(_MIN_BITS, min_bits_by_coordinates, _LONGER_THAN_START * self.start.bits)
-        # When points are longer than this, few steps remain, as bits grow like n^2.
+        # When points are longer than this, few steps remain, since the bit length grows like n^2.
         max_search_bits = inf if self.max_bits is None else self.max_bits / 2
         yield self.start
         for number in count(1):

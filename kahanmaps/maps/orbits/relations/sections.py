@@ -15,7 +15,7 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.maps.somos import around
 
-_PRIME = 2**61 - 1  # modulo which independent products are chosen
+_PRIME = 2**61 - 1  # the prime modulo which independent products are chosen
 
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
@@ -40,8 +40,8 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
     """Return a number divisible by every prime that divides all coordinates at some n.
 
     A common prime of all coordinates divides all products of a coordinate and a section psi(n) that depends only on
-    n T. If these products span the forms of their degree, such primes divide the index of their lattice, since the
-    only common primes of the forms are those of the first terms. Raises ArithmeticError if they do not span.
+    n T. If these products span the forms of their degree, such primes divide the index of the lattice of the products,
+    since the only common primes of the forms are those of the first terms. Raises ArithmeticError if they do not span.
     """
     for extra_degree in (0, *range(2, degree + 1)):  # no section of degree 1 depends only on n T
         length = degree + extra_degree
