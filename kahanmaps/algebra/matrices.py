@@ -197,13 +197,13 @@ class EntryMatrix(ABC):
 
 
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
-    """Multiply each row by its own denominator, which preserves rank and null space and keeps entries short."""
+    """Multiply each row by its common denominator: rank and null space do not change, and the entries stay short."""
     rows = [over_common_denominator(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
-    """Return the rows of the reduced echelon form, and its pivot columns, of a matrix of balls or an `EntryMatrix`."""
+    """Return the rows and the pivot columns of the reduced echelon form of an `EntryMatrix` or a matrix of balls."""
     with field.working():
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []

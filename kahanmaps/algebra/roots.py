@@ -54,7 +54,7 @@ class Root:
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
             with suppress(InputError):  # the error is raised later, when the real number is needed
-                # Replace `near` by the root to 4, 8, ... digits, the first that suffice: equal roots get equal text.
+                # Replace `near` by the root to 4, 8, ... digits, the fewest that select it: equal roots get equal text.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -85,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # The root is b/q for an algebraic integer b; Cauchy's bound holds for all conjugates of b.
+            # q times the root is an algebraic integer b; Cauchy's bound holds for all conjugates of b.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
@@ -117,7 +117,7 @@ class Root:
 
     @property
     def decimal(self) -> str:
-        """The real root as text, `, about 1.41421356237310`; empty if no real root is determined."""
+        """Text such as `, about 1.41421356237310` for the real root; empty if no real root is determined."""
         try:
             return f", about {self._real(64).str(15, radius=False)}"
         except InputError:
