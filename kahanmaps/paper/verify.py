@@ -123,8 +123,7 @@ def verify(
         settings: eps (None: every eps, an indeterminate), the random seed and the error bound.
         options: the sections to be verified, the order of series, complex balls, and whether controls are evaluated.
         m: half the dimension of the generic member, 1 to 8, with random data over GF(p). The error bound is for the
-            probability that a claim is false for it; a claim proved in normal form holds for every member with distinct
-            roots.
+            probability that a claim is false for it; a claim proved in normal form holds if the roots are distinct.
         eps: half the time step, an exact number that replaces the eps of the settings; not for the generic member.
         time_step, h: the time step 2 eps, instead of eps.
 
@@ -385,8 +384,7 @@ class Verifier:
                 text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {point_text}"
                 if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
-                # Over Q a rank may be larger than modulo p, and an equation may fail that holds modulo p; never
-                # conversely.
+                # Modulo p a rank may be smaller than over Q, and an equation may hold only modulo p; never conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
                 return self._finding(claim, verdict, Evidence(method_text, text, {"points": point_count}))
