@@ -445,9 +445,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         integrals = [integral for integral in result.integrals if integral.verdict is proved]
         return [claim for I in integrals for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
-        densities = [
-            density for density in result.shown if density.verdict is proved
-        ]  # the others are integrals times it
+        densities = [density for density in result.shown if density.verdict is proved]  # others: integrals times it
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
     if isinstance(result, PoissonSearch):
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
