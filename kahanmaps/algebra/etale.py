@@ -62,7 +62,7 @@ class EtaleAlgebra(Field):
         return self.convert(fmpq_poly([0, 1]))
 
     def convert(self, value: Any) -> EtaleElement:
-        """Convert an exact number, a polynomial in t or an element to an element."""
+        """Convert an exact number, a polynomial in t (fmpq_poly) or an element of this algebra to an element."""
         if isinstance(value, EtaleElement):
             if value.field == self:
                 return value
@@ -114,7 +114,7 @@ class EtaleElement(Element):
 
     @property
     def coefficients(self) -> list[fmpq]:
-        """The coordinates in the basis 1, t, ..., t^(degree - 1)."""
+        """The coordinates of this element in the basis 1, t, ..., t^(degree - 1)."""
         return [self.polynomial[k] for k in range(self.field.degree)]
 
     @property

@@ -39,10 +39,10 @@ class BudgetExceeded(KahanmapsError):
 
 
 class FunctionField(Field):
-    """The field Q(names) of `Function`, with matrices `FunctionMatrix`; `budget` bounds all products of terms together.
+    """The field Q(names) with elements `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms.
 
     `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients, constant term first,
-    of an irreducible polynomial in the last variable; it is 0 in the field. None: there is no such polynomial.
+    of an irreducible polynomial in the last variable; this polynomial is 0 in the field. None: no polynomial.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -309,7 +309,7 @@ class FunctionMatrix(EntryMatrix):
                 *numerators, denominator = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(denominator):
                     raise ZeroDivisionError("singular matrix in solve()")
-                if denominator.is_constant():  # cancel it: otherwise the digits double with each step of an affine map
+                if denominator.is_constant():  # cancel the constant: else the digits double with each affine step
                     factor = denominator.leading_coefficient() * sign
                     numerators, denominator = [entry / factor for entry in numerators], self.field.one.numerator * sign
                 for i, entry in zip(block, numerators, strict=True):

@@ -7,8 +7,8 @@ to find the rational functions of n symbols that have these values. The steps mo
             fraction N/D of polynomials. The fraction of least degree that fits the values gives the exponents of the
             symbol; one value more than needed is a check.
     stages  Symbols are added one by one, while the remaining ones stay at the anchor. The possible monomials are those
-            of the previous stage times powers of the new symbol, up to a total degree known from a random line. For the
-            values v_k at points s_k, the linear system N(s_k) = v_k D(s_k) determines the coefficients, with a check.
+            of the previous stage times powers of the new symbol, up to a total degree known from a random line. The
+            linear system N(s_k) = v_k D(s_k) for values v_k at points s_k has the coefficients as solution.
 
 All values computed so far are reused as equations. Entries with the same denominator share its unknown coefficients.
 Modulo further primes the monomials are known. The coefficients follow by the Chinese remainder theorem, and the

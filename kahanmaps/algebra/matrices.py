@@ -54,7 +54,7 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     """Return the basis of { v : `matrix` v = 0 } in echelon form, reduced from the last column to the first.
 
     Each basis vector belongs to a column without pivot: it is 1 there and 0 at every other column without pivot, so
-    the basis depends only on the space. It is empty for a matrix of full column rank.
+    the basis depends only on the space. The basis is empty if the rank is the number of columns.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> nullspace(QQ, fmpq_mat([[2, 4]]))

@@ -484,7 +484,7 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
 class _Arithmetic:
     """The operations in one expression; each raises an error before its result would exceed a limit.
 
-    In `pieces`, operands and tokens of operators alternate; `quotients` says whether divisors may contain variables.
+    In an argument `pieces`, operands and operators alternate; `quotients` says whether divisors may contain variables.
     """
 
     def __init__(

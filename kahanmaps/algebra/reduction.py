@@ -121,7 +121,7 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
     K, denominator = gamma.field, norm_of_denominator(gamma)
-    # The primes below the denominator of the j-invariant are bad. They are the primes that divide its norm.
+    # The primes below the denominator of j are bad; they are the primes that divide the norm of this denominator.
     norm_of_j_denominator = norm_of_denominator(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()
@@ -154,7 +154,7 @@ def norm_of_denominator(element: Any) -> fmpz:
 
 
 def newton_slopes(polynomial: fmpq_poly, p: int) -> set[fmpq]:
-    """Return the p-adic valuations of the roots of a polynomial whose coefficient c_0 is not 0.
+    """Return the p-adic valuations of the roots of a polynomial whose constant coefficient is not 0.
 
     >>> newton_slopes(fmpq_poly([25, 0, 1, 0, 5]), 5) == {fmpq(1), fmpq(-1, 2)}
     True

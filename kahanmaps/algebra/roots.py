@@ -24,7 +24,7 @@ from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
-MAX_DEGREE = 12  # of the minimal polynomial of an algebraic number
+MAX_DEGREE = 12  # maximal degree of the minimal polynomial of an algebraic number
 _ROOT_TEXT = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
 _SQUARE_ROOT_TEXT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
 _GUARD_BITS = 64  # bits of working precision beyond the requested ones
@@ -94,7 +94,7 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; 0 if it vanishes at the root."""
+        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; the result is 0 if the root is a zero."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 

@@ -217,7 +217,7 @@ class _Solver:
         self.stop_reason = ""
 
     def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], is_basis: bool = False) -> None:
-        """Add the solutions of `equations` to the result; `is_basis` says that these form a Groebner basis."""
+        """Add the solutions of `equations` to the result; `is_basis` says that they are a Groebner basis."""
         if self.stop_reason:  # the reason is already in the result
             return
         count_work(50)
@@ -355,7 +355,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         return sum(e << 16 * i for i, e in enumerate(monomial))
 
     def add(p: fmpz_mpoly) -> bool:
-        """Add p and return True, unless a limit is exceeded."""
+        """Add p to the basis and return True; return False if a limit is exceeded."""
         nonlocal bits
         bits = max(bits, *(abs(c).bit_length() for c in p.coeffs()))
         if len(basis) >= MAX_BASIS or len(p) > MAX_TERMS or bits > MAX_BITS:

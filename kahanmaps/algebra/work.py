@@ -88,7 +88,7 @@ class Budget:
 
 
 def units_at(effort: int, units: float) -> float:
-    """Return the units for an effort: `units` for effort 1, twice as many per step up, half as many per step down.
+    """Return the units for an effort: `units` for effort 1, doubled for each step up and halved for each step down.
 
     Raises InputError for an effort that is not an integer from -20 to 40.
 

@@ -302,7 +302,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                 claims += prove()
             except FalseClaim:
                 raise
-            except InputError as error:  # of an analysis, results with too long identities are omitted
+            except InputError as error:  # results of an analysis with too long identities are omitted
                 if sub_results == [result]:
                     raise
                 skipped.append(f"{name}: {error}")

@@ -26,7 +26,7 @@ from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
 PRIME = 2**61 - 1
 EPS = 1234567  # the residue of eps
 LINE = ((3, 5), (7, 11), (1, 0))  # the points (3 + 5 t : 7 + 11 t : 1)
-_MAX_TERMS = 100  # maximal number of terms of a form of the iterate before the last one
+_MAX_TERMS = 100  # forms F_n with more terms are not composed further
 _MAX_DEGREE = 600  # maximal degree of the image of the line
 _MAX_STEPS = 5  # the largest n
 

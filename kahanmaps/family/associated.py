@@ -1,8 +1,8 @@
 """Members of the family and their associated systems.
 
-Let chi be the product of p_i^e_i with irreducible p_i, and f_0 = J grad H. For signs s, B_s is the polynomial in A that
-is s_i on the kernel of p_i(A)^e_i. Then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. The
-Kahan maps of all f_s commute. Source: petrera-suris-2016, Sect. 5; for every m and chi, docs/mathematics.md.
+Let chi^2 = det(t - A), chi the product of irreducible p_i^e_i, and f_0 = J grad H. For signs s, the polynomial B_s in A
+acts as s_i on the kernel of p_i(A)^e_i. Then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H.
+The Kahan maps of all f_s commute. Source: petrera-suris-2016, Sect. 5; for every m and chi, docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class AssociatedSystem(HtmlDisplay, ResultPart):
 
 @dataclass(frozen=True, eq=False)
 class ConjugateAssociate:
-    """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at the `root` of g.
+    """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at one `root` of g.
 
     For the `coefficients` c_i in Q[t]/g, B is the sum of c_i A^i, and K is the sum of c_i H_i over the `chain` of H.
     """
@@ -180,7 +180,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
     @cached_property
     def roots(self) -> dict[int, Root]:
-        """One root of each factor with degree at least 2 and multiplicity 1, by the index of the factor."""
+        """One root of each factor of degree at least 2 and multiplicity 1, as {index of the factor: root}."""
         factors = enumerate(self.factors)
         return {k: Root(f.polynomial) for k, f in factors if f.multiplicity == 1 and 2 <= f.degree <= MAX_DEGREE}
 

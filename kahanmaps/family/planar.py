@@ -326,8 +326,8 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
     The integer vectors (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1; those with s = 0 form a
-    lattice of rank m. The weights exceed the bounds of LLL for short vectors of both lattices. So the first m vectors
-    of a reduced basis have s = 0, and the next vector has the least s > 0, up to sign; then e2 = y/s.
+    lattice of rank m. By the bounds of LLL, the weights of s and of the equations are so large that the first m vectors
+    of a reduced basis have s = 0 and the next vector has the least s > 0, up to sign; then e2 = y/s.
     """
     n = t.nrows()
     m = n // 2

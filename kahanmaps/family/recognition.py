@@ -330,7 +330,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
 
 
 def _split_by_factors(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
-    """Return the idempotents into which X = E X E splits E, one for each of `_factors_on_image`; [E] if there is 1."""
+    """Split E into idempotents by X = E X E, one for each irreducible factor of X on the image of E; [E] for one."""
     factors = _factors_on_image(X, E)
     if len(factors) == 1:
         return [E]
@@ -352,7 +352,7 @@ def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
 
 
 def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
-    """Yield X, then Y = (X - a E)/b, each with its irreducible polynomial; b keeps integer coefficients integral."""
+    """Yield X, then Y = (X - a E)/b, each with its irreducible polynomial; integer coefficients stay integral."""
     yield X, polynomial
     d = polynomial.degree()
     if d == 1:

@@ -77,7 +77,7 @@ class PaperObjects:
     associate_matrices: tuple[Any, ...] | None = None  # their matrices B, if given without the roots of chi
     indices_to_test: tuple[int, ...] | None = None  # indices i for which a claim "for all i" is tested; None: all
     order: int = 3  # order in eps^2 up to which series are expanded
-    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 that `inhomogeneous` adds to H
+    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 of the terms added to H
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi in K, constant term first
     varied: bool = True  # whether variations are applied; False for the control
 
@@ -700,8 +700,7 @@ class PaperObjects:
         rows = []
         for a, b, c in itertools.combinations_with_replacement(range(n), 3):
             row = [K.zero] * (n * len(index_of_pair))
-            # The Hesse matrix of x_a x_b x_c contains x_l in the entries (j, k) and (k, j), where {j, k, l} = {a, b,
-            # c}.
+            # The entries (j, k) and (k, j) of the Hesse matrix of x_a x_b x_c contain x_l for {j, k, l} = {a, b, c}.
             for j, k, l in set(itertools.permutations((a, b, c))):
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # add A_ij to entry (i, k) of A nabla^2 H and to entry (k, i) of nabla^2 H A^T

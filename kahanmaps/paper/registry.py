@@ -187,7 +187,7 @@ def outcomes(
     points: Iterable[PaperObjects | None],
     change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
 ) -> Iterator[ClaimOutcome]:
-    """Yield the outcomes of a claim at the points after `change`, except those at which the claim is undefined."""
+    """Yield the outcomes of a claim for `change` of each point, except those for which the claim is undefined."""
     for objects in points:
         if objects is not None:
             with suppress(*UNDEFINED, LookupError):  # LookupError: the claim needs the roots of chi, which are not in K

@@ -70,8 +70,8 @@ from kahanmaps.version import __version__
 MAX_M = 8  # largest m, half the dimension
 # Maximal number of products of terms in a proof: enough for all claims up to m = 6; at m = 8 a few claims exceed it.
 PROOF_BUDGET = 50_000_000
-_MAX_INDETERMINATES = 64  # in a proof for one member
-_MAX_UNDEFINED = 40  # points at which a claim is undefined, before it is given up
+_MAX_INDETERMINATES = 64  # maximal number of indeterminates in a proof for one member
+_MAX_UNDEFINED = 40  # after so many points at which it is undefined, a claim is given up
 _POINT_COUNT = 4  # number of points for statements that objects differ or have full rank
 _MIN_LARGE_M = 5  # for m >= 5, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
