@@ -42,7 +42,7 @@ class FunctionField(Field):
     """The field Q(names) with elements `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms.
 
     `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients, constant term first,
-    of an irreducible polynomial in the last variable; this polynomial is 0 in the field. None: no polynomial.
+    of an irreducible polynomial in the last variable; this polynomial is 0 in the field. None: no such polynomial.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
