@@ -1,10 +1,10 @@
-"""Bounds for degrees and coefficients as a field: to bound the result of a computation, run it over this field.
+"""A field whose elements bound degrees and coefficients: a computation that runs over it bounds its own result.
 
-An element represents a rational function N / (s D_1^k_1 D_2^k_2 ...). N is a polynomial with integer coefficients, of
-which only the `CoefficientSize` is stored; s is a positive integer; D_1, D_2, ... are the divisors that occur in the
-computation, also stored by their sizes. Sums are taken over a common denominator. A matrix has one bound for all its
-entries, and a linear system is solved by Cramer's rule. Evaluating a claim over this field bounds the degree and the
-coefficients of the polynomial equation that is equivalent to the claim (`bound_of`).
+An element represents a rational function N / (s D_1^k_1 D_2^k_2 ...). s is a positive integer, N and the D_i are
+polynomials over Z, and only the `CoefficientSize` of N and D_i is stored. The D_i are the numerators of all elements by
+which the computation divides. A sum is written over a common denominator. A matrix has one bound for all its entries,
+and a linear system is solved by Cramer's rule. If a claim says that pairs of elements are equal, `bound_of` bounds the
+polynomials that vanish if and only if the claim is true.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from kahanmaps.errors import InputError
 class CoefficientSize:
     """Bounds on a polynomial over Z: its total degree, and log2 of the sum of the absolute values of its coefficients.
 
-    The sum is subadditive and submultiplicative in the polynomial, so bounds can be computed operation by operation.
+    This sum is a norm on polynomials with |P Q| <= |P| |Q|, so bounds can be computed operation by operation.
 
     >>> CoefficientSize(2, 1.0) * CoefficientSize(3, 0.5)
     CoefficientSize(degree=5, bits=1.5)
@@ -48,7 +48,7 @@ class CoefficientSize:
         return CoefficientSize(self.degree * exponent, self.bits * exponent)
 
     def __or__(self, other: CoefficientSize) -> CoefficientSize:
-        """Return a bound of all polynomials that satisfy `self` or `other`."""
+        """Return a bound that holds for every polynomial bounded by `self` or by `other`."""
         return CoefficientSize(max(self.degree, other.degree), max(self.bits, other.bits))
 
 
@@ -59,8 +59,8 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
     """Bound the polynomials that are all 0 if and only if the two elements (or matrices) of each pair are equal.
 
     Returns:
-        (bound, degree): `bound` holds for each of these polynomials; `degree` bounds the degree of the product of the
-        polynomials that must not be zero: all divisors, and all elements compared with zero.
+        (bound, degree): `bound` holds for each of these polynomials. The computation assumes that all divisors and all
+        elements compared with zero are nonzero; `degree` bounds the degree of the product of their numerators.
     """
     bound = ONE
     for pair in pairs:
@@ -70,7 +70,7 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
 
 
 class BoundField(Field):
-    """The field of bounds. `variable()` bounds a variable, `polynomial(...)` every polynomial of at most that size."""
+    """The field of bounds. `variable()` bounds a variable, `polynomial(...)` all polynomials of a given size."""
 
     name = "bounds"
     characteristic = 0
@@ -97,25 +97,25 @@ class BoundField(Field):
 
     @property
     def pole_degree(self) -> int:
-        """The degree of the product of all divisors and all elements compared with zero, which must not be zero."""
+        """The degree of the product of the numerators of all divisors and of all elements compared with zero."""
         return sum(size.degree for size in self._denominators)
 
     def denominator(self, owner: Any, size: CoefficientSize) -> int:
-        """Return the index of the denominator of the object `owner`; the same object always has the same index.
+        """Return the index i of D_i, the numerator of the divisor `owner`; the same object always has the same index.
 
-        If `owner` is the common bound of the entries of a matrix, each call returns a new index: the entries differ.
+        If `owner` is the common bound of the entries of a matrix, each call returns a new index: entries may differ.
         """
         if isinstance(owner, Bound) and owner.is_common:
             self._denominators.append(size)
             return len(self._denominators) - 1
         owner_and_index = self._index_by_id.get(id(owner))
         if owner_and_index is None:
-            owner_and_index = self._index_by_id[id(owner)] = owner, len(self._denominators)  # keeps the id unique
+            owner_and_index = self._index_by_id[id(owner)] = owner, len(self._denominators)  # keeps `owner` alive
             self._denominators.append(size)
         return owner_and_index[1]
 
     def product(self, powers: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of the product of D_i^k over the pairs i: k of `powers`, D_i the i-th denominator."""
+        """Return the size of the product of the D_i^k for `powers` = {i: k, ...}."""
         total = ONE
         for index, power in powers.items():
             total = total * self._denominators[index] ** power
@@ -177,7 +177,7 @@ class Bound(Element):
         self.is_common = False
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
-        """Return the size of the numerator if the fraction is written over `scale` times the product `denominator`."""
+        """Return the size of the numerator over `scale` times the product of D_i^k, `denominator` = {i: k, ...}."""
         missing_exponents = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
         return self.numerator * self.field.product(missing_exponents) * CoefficientSize(0, log2(scale // self.scale))
 
@@ -251,13 +251,13 @@ class BoundMatrix:
         return BoundMatrix(self.field, self._rows, other._columns, product)
 
     def det(self) -> Bound:
-        """Bound the determinant: n! products of n entries."""
+        """Bound the determinant, a sum of n! products of n entries."""
         n, entry = self._rows, self.entry
         denominator = {index: n * power for index, power in entry.denominator.items()}
         return Bound(self.field, self._minor_bound(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
-        """Bound the solution by Cramer's rule: for self = N/d with N over Z[x] it is d adj(N) right / det N."""
+        """Bound X with self X = right by Cramer's rule: X = d adj(N) right / det N for self = N/d, N over Z[x]."""
         n, entry = self._rows, self.entry
         index = self.field.denominator(self, self._minor_bound(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
@@ -282,10 +282,10 @@ def log2(value: fmpz | int) -> float:
 
 
 def _lcm_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the least common multiple of two products of powers, given as {index of a denominator: exponent}."""
+    """Return the least common multiple of two products of D_i^k; a product is stored as {i: k, ...}."""
     return {index: max(left.get(index, 0), right.get(index, 0)) for index in {*left, *right}}
 
 
 def _product_exponents(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the product of two products of powers, given as {index of a denominator: exponent}."""
+    """Return the product of two products of D_i^k; a product is stored as {i: k, ...}."""
     return {index: left.get(index, 0) + right.get(index, 0) for index in {*left, *right}}

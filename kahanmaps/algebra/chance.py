@@ -1,10 +1,10 @@
 """Random seeds that depend on the claim: random choices are drawn from a hash of the claim and the user's seed.
 
-If only a seed is hashed, anyone knows the primes and points in advance and can write a false claim that passes at all
-of them, as for primality tests with fixed bases (albrecht-2018). If the claim is hashed as well, the points are known
-only once the claim is written, and change with each of its characters (fiat-shamir-1987). docs/mathematics.md explains
-what an error bound then means: the hash is modeled as a random function (bellare-rogaway-1993), an assumption
-(canetti-2004).
+If the points and primes depended on a seed only, anyone could compute them in advance and write a false claim that
+passes at all of them. Primality tests with fixed bases have this weakness (albrecht-2018). If the claim is hashed as
+well, the points are known only once the claim is written, and any change of the claim changes them (fiat-shamir-1987).
+The error bounds assume that the hash is a random function (bellare-rogaway-1993; limits of this assumption:
+canetti-2004). docs/mathematics.md explains what an error bound then means.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Dual numbers K[d]/(d^2) over any field K: exact derivatives of computations with field operations.
 
 f(x + d v) = f(x) + d f'(x) v, so the slope (the coefficient of d) is the derivative at x in direction v. K may itself
-be a ring of dual numbers: if e^2 = 0, the coefficient of d e in f(x + d v + e w) is the second derivative. A matrix
-M0 + d M1 is stored as two matrices over K; FLINT computes products and linear systems if K has FLINT matrices.
+be a ring of dual numbers: if e^2 = 0, the coefficient of d e in f(x + d v + e w) is the second derivative of f at x
+along v and w. A matrix M0 + d M1 is stored as two matrices over K. FLINT computes with them if it has matrices over K.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class DualField(Field):
         )
 
     def lift_matrix(self, matrix: Any) -> DualMatrix:
-        """Return a matrix over `base` as a constant matrix."""
+        """Return a matrix over `base` as a matrix over the dual numbers with slope 0."""
         rows, columns = matrix.nrows(), matrix.ncols()
         return DualMatrix(self, matrix, self.base.matrix(rows, columns, [self.base.zero] * (rows * columns)))
 
@@ -174,9 +174,9 @@ class DualMatrix:
         return self.__mul__(other)
 
     def det(self) -> Dual:
-        """Compute det M0 (1 + d tr(M0^{-1} M1)) for self = M0 + d M1; for a singular M0 the slope column by column."""
+        """Return det(M0 + d M1) = det M0 (1 + d tr(M0^{-1} M1)); `_slope_of_det` gives the slope if M0 is singular."""
         value = self.value.det()
-        if isinstance(self.value, EntryMatrix):  # solving is slower than computing more determinants here
+        if isinstance(self.value, EntryMatrix):  # n determinants are faster than a linear system here
             return Dual(self.field, value, self._slope_of_det())
         try:
             quotient = solve(self.value, self.slope)

@@ -1,4 +1,4 @@
-"""Elliptic curves Y^2 = x^3 + a2 x^2 + a4 x + a6: the group law, and orders, canonical heights and rotation numbers.
+"""Elliptic curves Y^2 = x^3 + a2 x^2 + a4 x + a6: group law, orders of points, canonical heights, rotation numbers.
 
 Points are pairs (x, Y); None is the point at infinity, the zero of the group. Orders and heights are for points over Q.
 """
@@ -66,13 +66,13 @@ class EllipticCurve:
 
     @property
     def j(self) -> Any:
-        """The j-invariant."""
+        """The j-invariant of the curve."""
         return 256 * (self.a2 * self.a2 - 3 * self.a4) ** 3 / self.discriminant
 
     def order(self, P: AffinePoint) -> int | None:
         """Return the order of a point over Q; None if it is infinite.
 
-        By Mazur's theorem an order larger than 12 is infinite.
+        By Mazur's theorem, a point of finite order over Q has an order of at most 12.
         """
         multiple: AffinePoint | None = P
         for n in range(1, _MAX_TORSION + 1):
@@ -84,7 +84,7 @@ class EllipticCurve:
     def short_model(self, P: AffinePoint) -> tuple[EllipticCurve, AffinePoint]:
         """Return an isomorphic curve Y^2 = x^3 + A x + B over Q with small integers A, B, and the image of P on it.
 
-        A and B are minimal unless they have common powers of large primes.
+        A and B are as small as possible, unless p^4 divides A and p^6 divides B for a prime p of more than 20 bits.
         """
         shift = self.a2 / 3
         A, B, x, y = self.a4 - self.a2 * shift, (2 * shift * shift - self.a4) * shift + self.a6, P[0] + shift, P[1]
@@ -98,7 +98,7 @@ class EllipticCurve:
 
 
 def _candidate_factors(number: fmpz) -> list[fmpz]:
-    """Return the primes of at most 20 bits in a number, the remaining cofactor, and all their integer roots above 1."""
+    """Return the primes of at most 20 bits dividing `number`, the cofactor, and the rounded roots above 1 of these."""
     if number == 0:
         return []
     factors = [abs(factor) for factor, _ in number.factor_smooth(_MAX_PRIME_BITS)]
@@ -117,12 +117,12 @@ def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> A
 
 
 def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
-    """Return the canonical height of a point over Q as a ball, normalized to half the height of its x-coordinate.
+    """Return the canonical height of a point over Q as a ball; it is half the height of x up to a bounded amount.
 
-    The height is computed by Tate's series. In a doubling, the height of x differs from 4 times its former value by a
-    bounded amount. Its archimedean part is computed in balls; the other parts come from the common factor of the values
-    of the two forms of degree 4 that double a point (X : Z). This factor divides the resultant R of the forms, so that
-    X and Z modulo a power of R determine it. The remainder of the series is bounded by the sizes of the forms and of R.
+    Tate's series sums the bounded differences h(2Q) - 4 h(Q) with weights 4^-n over Q = P, 2P, 4P, ...; h is the height
+    of x. Doubling x = X/Z evaluates two forms of degree 4. The sizes of their values are computed in balls. The common
+    factor of the two values divides the resultant R of the forms, so that X and Z modulo a power of R determine it. The
+    sizes of R and of the coefficients of the forms bound the remainder of the series.
 
     Raises PrecisionLost if 32768 bits do not suffice.
 
@@ -149,7 +149,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
         X, Z, gcds = x.p, x.q, list[fmpz]()
         while len(gcds) < terms and (modulus is None or modulus % resultant == 0):
             X, Z = double(X, Z)
-            gcd = (X % resultant).gcd(resultant).gcd(Z % resultant)  # reduced first: the gcd divides R
+            gcd = (X % resultant).gcd(resultant).gcd(Z % resultant)  # the gcd divides R, so reduce modulo R first
             X, Z = X // gcd, Z // gcd
             if modulus is not None:
                 modulus //= gcd
@@ -157,13 +157,13 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
             gcds.append(gcd)
         return gcds
 
-    # The gcds are usually much smaller than R, and as large as the first ones, which are computed without a modulus.
+    # The gcds usually divide the lcm of the first ones, which are computed without a modulus and are smaller than R.
     typical_factor = reduce(fmpz.lcm, common_factors(_EXACT_TERMS, None))
     gcds = common_factors(_HEIGHT_TERMS, resultant * typical_factor**_HEIGHT_TERMS)
     if len(gcds) < _HEIGHT_TERMS:
         gcds = common_factors(_HEIGHT_TERMS, resultant ** (_HEIGHT_TERMS + 1))
-    # R = f F + g G for the forms F, G with cofactors f, g (minors of a matrix with eight rows). So log R <= log |forms|
-    # + log |cofactors|, which bounds the terms from below. The sums of the coefficients bound them from above.
+    # R = f F + g G for the forms F, G, where f and g are minors of a matrix with eight rows. This bounds the size of F
+    # and G, hence the terms of the series, from below. The sums of the coefficients of F and G bound them from above.
     largest = max(abs(c) for c in (fmpz(4), 2 * b4, 2 * b6, b8, b2, b6)) + 1
     bound = resultant.bit_length() + 8 * (largest.bit_length() + 3)
     for bits in (1 << 9, 1 << 12, MAX_BITS):
@@ -175,7 +175,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
                 point = double(*point)
                 sizes.append(abs(point[0]).max(abs(point[1])))
                 point = (point[0] / sizes[-1], point[1] / sizes[-1])
-        with RR(128).working():  # summing needs few bits: only the doublings lose digits
+        with RR(128).working():  # the sum needs few bits: only doublings lose digits
             total, scale = initial_size.log(), arb(1)
             for size, gcd in zip(sizes, gcds, strict=True):
                 scale /= 4
@@ -189,14 +189,14 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
 def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
     """Return the roots of x^3 + a2 x^2 + a4 x + a6 with arb coefficients; the first is the largest real root.
 
-    `has_oval`: the discriminant is positive, so all roots are real, in decreasing order; else two are conjugate.
+    If `has_oval` (the discriminant is positive), all roots are real, in decreasing order; otherwise two are conjugate.
     """
     shift, A, B = _depressed_cubic(curve)
     s = B * B / 4 + A * A * A / 27
     if has_oval:  # Viete's formula
         radius, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
         return [acb(radius * (angle - 2 * k * arb.pi() / 3).cos() - shift) for k in range(3)]
-    # Cardano's formula, with the one of the two cube roots that suffers no cancellation.
+    # Cardano's formula, with the one of the two values of u^3 whose computation suffers no cancellation.
     u_cubed = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
     u = -((-u_cubed).root(3)) if u_cubed < 0 else u_cubed.root(3)
     v = -A / (3 * u)
@@ -215,7 +215,7 @@ def complex_roots(curve: EllipticCurve) -> list[acb]:
 
 
 def _depressed_cubic(curve: EllipticCurve) -> tuple[Any, Any, Any]:
-    """Return c, A and B with x^3 + a2 x^2 + a4 x + a6 = z^3 + A z + B, z = x + c."""
+    """Return (c, A, B) such that x^3 + a2 x^2 + a4 x + a6 = z^3 + A z + B for z = x + c."""
     shift = curve.a2 / 3
     return shift, curve.a4 - curve.a2 * shift, (2 * shift * shift - curve.a4) * shift + curve.a6
 
@@ -238,7 +238,7 @@ def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tup
         if double is None:
             return arb(0), 2
         steps, x = 2, double[0]
-    # Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
+    # For the roots e_i, Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
     integral = acb.elliptic_rf(x + a, x + b, x + c)
     period = 2 * acb.elliptic_rf(acb(0), b - a, c - a)
     return (integral / period).real, steps

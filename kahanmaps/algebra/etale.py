@@ -18,8 +18,8 @@ from kahanmaps.algebra.matrices import EntryMatrix, trace
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
-# For coefficients with more bits, a quotient is computed by a linear system instead of Euclid's algorithm, and a
-# product of polynomials with few coefficients by Karatsuba's formula instead of FLINT.
+# Above _LONG_BITS bits, a quotient is computed by a linear system instead of Euclid's algorithm. Above
+# _MIN_KARATSUBA_BITS, a product of polynomials with few terms is computed by Karatsuba's formula instead of FLINT.
 _LONG_BITS, _MIN_KARATSUBA_BITS = 2000, 8000
 _MAX_KARATSUBA_TERMS = 6
 
@@ -62,7 +62,7 @@ class EtaleAlgebra(Field):
         return self.convert(fmpq_poly([0, 1]))
 
     def convert(self, value: Any) -> EtaleElement:
-        """Convert an exact number, a polynomial in t or an element to an element."""
+        """Convert an exact number, a polynomial in t (fmpq_poly) or an element of this algebra to an element."""
         if isinstance(value, EtaleElement):
             if value.field == self:
                 return value
@@ -114,7 +114,7 @@ class EtaleElement(Element):
 
     @property
     def coefficients(self) -> list[fmpq]:
-        """The coordinates in the basis 1, t, ..., t^(degree - 1)."""
+        """The coordinates of this element in the basis 1, t, ..., t^(degree - 1)."""
         return [self.polynomial[k] for k in range(self.field.degree)]
 
     @property
@@ -134,7 +134,7 @@ class EtaleElement(Element):
 
     def _multiply(self, other: EtaleElement) -> EtaleElement:
         f, g = self.polynomial, other.polynomial
-        # Only the length of the constant coefficients is tested: if others are shorter, the product is merely slower.
+        # Only the constant coefficients are tested for length: if others are shorter, the product is merely slower.
         is_long = f[0].p.bit_length() > _MIN_KARATSUBA_BITS and g[0].p.bit_length() > _MIN_KARATSUBA_BITS
         product = _karatsuba_product(f, g) if is_long and self.field.degree <= _MAX_KARATSUBA_TERMS else f * g
         return EtaleElement(self.field, product % self.field.chi)

@@ -26,7 +26,7 @@ from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
-# FLINT proves primality of 512 bits in about 0.1 s; for more bits the cost grows steeply.
+# FLINT proves that a number of 512 bits is prime in about 0.1 s; the time grows steeply with the number of bits.
 MAX_PRIME_BITS = 512
 MAX_BALL_BITS = 1_000_000  # largest precision of balls
 
@@ -62,7 +62,7 @@ def rational(value: Any) -> fmpq:
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or numpy_kind:
-        example = str(value)  # nan, inf and 1j are no exact numbers and get no example
+        example = str(value)  # the example in the message is 1/10 for nan, inf and 1j
         try:
             parse_number(example)
         except InputError:
@@ -77,7 +77,7 @@ def rational(value: Any) -> fmpq:
 
 
 def integer(value: Any, name: str) -> int:
-    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError about `name` for others.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int. Raises InputError, which names `name`, for others.
 
     >>> integer(7, "m")
     7
@@ -127,11 +127,11 @@ class Field(ABC):
         return str(element)
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
-        """Return a random element: a rational number of at most this height, or any residue."""
+        """Return a random element: a rational number of height at most `height`, or any residue modulo p."""
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     def value(self, polynomial: Any, point: Sequence[Any]) -> Any:
-        """Return the value of a polynomial; None if the field leaves this to `polynomials.evaluate`."""
+        """Return the value of a polynomial at `point`; None if the field leaves this to `polynomials.evaluate`."""
         return None
 
     @abstractmethod
@@ -155,7 +155,7 @@ class Field(ABC):
         return bool(element == 0)
 
     def equal(self, left: Any, right: Any) -> bool:
-        """Whether two elements are equal; for balls, whether they overlap, so that the numbers may be equal."""
+        """Whether two elements are equal; for balls, whether they overlap (the enclosed numbers may be equal)."""
         return bool(left == right)
 
     def working(self) -> AbstractContextManager[Any]:
@@ -167,7 +167,7 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """Convert an operand to an element of `field`; return None for text, matrices and other objects.
+    """Convert an operand of + - * / to an element of `field`; return None for text, matrices and other objects.
 
     Raises `InexactNumber` and `BadPrime` like `convert`.
     """
@@ -182,7 +182,7 @@ def operand(field: Field, value: Any) -> Any:
 
 
 class Element(ABC):
-    """An element of a field that FLINT lacks. Subclasses define sum, product, quotient and equality of two elements.
+    """An element of a type that FLINT lacks. Subclasses define sum, product, quotient and equality of two elements.
 
     The second operand may be any number or element that `field.convert` accepts, but not text.
     """
@@ -211,13 +211,13 @@ class Element(ABC):
     def __neg__(self) -> Self: ...
 
     def _common_operands(self, other: Any) -> tuple[Self, Self] | None:
-        """Return (self, other), both converted to one of their two fields; None if that is impossible."""
+        """Return self and other as elements of one of their two fields; None if neither field accepts both."""
         if isinstance(other, type(self)) and other.field is self.field:
             return self, other
         right = operand(self.field, other)
         if right is not None:
             return self, right
-        # For two operands of equal types Python calls no reflected method.
+        # Python calls no reflected method for operands of equal types, so the field of `other` is tried here.
         left = operand(other.field, self) if isinstance(other, type(self)) else None
         return None if left is None else (left, other)
 
@@ -347,7 +347,7 @@ class PrimeField(Field):
             raise InputError(f"found an element of another field, expected one of {self.name}")
         if isinstance(value, fmpz_mod):
             try:
-                return value + self._zero  # raises for another modulus; FLINT has no function to read a modulus
+                return value + self._zero  # raises if the moduli differ; FLINT has no function to read a modulus
             except (TypeError, ValueError) as error:
                 raise InputError(f"found an element of another field, expected one of {self.name}") from error
         if isinstance(value, int | fmpz) and not isinstance(value, bool):
@@ -384,7 +384,7 @@ class PrimeField(Field):
 
 
 class _Balls(Field):
-    """The common base of real and complex balls: every result encloses the true number.
+    """The common base class of the fields of real and complex balls: each result encloses the exact number.
 
     A ball that contains zero and other numbers is neither zero nor invertible: `is_zero` raises `PrecisionLost`.
     """
@@ -439,7 +439,7 @@ class _Balls(Field):
 
 
 class BallField(_Balls):
-    """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`."""
+    """The field of real balls with `bits` bits of precision, made by `RR`; elements are arb."""
 
     _symbol, _element_type, _matrix_type = "RR", arb, arb_mat
 
@@ -451,7 +451,7 @@ class BallField(_Balls):
 
 
 class ComplexBallField(_Balls):
-    """Complex numbers, each enclosed in a rectangle of two real balls; elements are acb. Made by `CC`."""
+    """The field of complex balls, made by `CC`; an element (acb) is a rectangle given by two real balls."""
 
     _symbol, _element_type, _matrix_type = "CC", acb, acb_mat
 

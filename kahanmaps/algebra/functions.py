@@ -1,9 +1,9 @@
-"""The field of rational functions Q(x1, ..., xn). Expanding both sides of an identity in this field proves it.
+"""The field of rational functions Q(x1, ..., xn). Expanding both sides of an identity over this field proves it.
 
-FLINT has no fraction field of polynomials. Elements here are quotients. By default they are never reduced by a gcd:
-sums and comparisons use the larger of two denominators if the other one divides it, and their product otherwise. This
-is fast for expanding an identity of few terms once. A field with `reduces` cancels a gcd after every sum and product:
-each operation is slower, but quotients with many factors stay small. Work is counted in advance and has a budget.
+FLINT has no fraction field of polynomials. Elements here are quotients. By default no gcd is canceled: a sum or a
+comparison uses the larger of two denominators if the other divides it, and their product otherwise. This is fast for
+expanding an identity of few terms once. A field with `reduces` cancels a gcd after each sum and product: this is
+slower, but quotients with many factors stay small. Products of terms are counted in advance, up to a budget.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from kahanmaps.algebra.work import count_work, counted
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # products of terms: about a second, for coefficients of a few words
-_MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # number of matrices whose minors are cached; terms of all minors: 30 MB
-_MAX_ROWS_BY_MINORS = 7  # up to 7 rows, minors (2^n n/2 products by single entries) are faster than elimination
+_MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # number of matrices with cached minors; terms of all minors: 30 MB
+_MAX_ROWS_BY_MINORS = 7  # n <= 7 rows: minors (2^n n/2 products with single entries) are faster than elimination
 
 _BUDGET_MESSAGE = "expanding the identity would take too many products of terms"
 _Key = bytes | tuple[bytes, int]  # hash of a matrix; after a failure, with the budget that was too small
@@ -40,10 +40,10 @@ class BudgetExceeded(KahanmapsError):
 
 
 class FunctionField(Field):
-    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the total number of term products.
+    """The field Q(names) with elements `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms.
 
-    `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients of an irreducible
-    polynomial in the last variable: its multiples are 0 in the field. None: there is no such polynomial.
+    `reduces` says whether quotients are reduced to lowest terms. `modulus` lists the coefficients, constant term first,
+    of an irreducible polynomial in the last variable; this polynomial is 0 in the field. None: no such polynomial.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -101,12 +101,12 @@ class FunctionField(Field):
         return self.vanishes((left - right).numerator)
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
-        """Multiply two polynomials; the budget is charged before. Raises BudgetExceeded."""
+        """Charge the budget, then multiply two polynomials. Raises BudgetExceeded."""
         self.pay(len(left) * len(right) + 1)
         return left * right
 
     def pay(self, product_count: int) -> None:
-        """Charge this number of products of terms to the budget. Raises BudgetExceeded if it is too small."""
+        """Charge this number of products of terms to the budget. Raises BudgetExceeded if the budget is too small."""
         self.budget -= product_count
         if self.budget < 0:
             raise BudgetExceeded(_BUDGET_MESSAGE)
@@ -124,7 +124,7 @@ class FunctionField(Field):
         return Function(self, numerator, denominator)
 
     def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
-        """Evaluate a polynomial over Q by Horner's rule, over a common denominator of the entries.
+        """Evaluate a polynomial over Q by Horner's rule, over a common denominator of the coordinates of `point`.
 
         Returns None in a field that reduces, where the general evaluation reduces each term before adding it.
         """
@@ -154,7 +154,7 @@ class FunctionField(Field):
             (D, tuple(max_power + a for a in row))
             for D, max_power, row in zip(denominators, max_powers, exponents, strict=True)
         ]
-        # The longest polynomial comes last: then the innermost sum multiplies it by short polynomials only.
+        # The longest polynomial comes last: Horner's rule then adds up its powers with constant coefficients.
         factor_rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in factor_rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [numerator for numerator, _ in factor_rows])
@@ -170,7 +170,7 @@ class FunctionField(Field):
         return product
 
     def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """Return the sum over `terms` (exponents: coefficient) of the coefficient times these powers of `factors`."""
+        """Return the sum of c times the powers of `factors` with the exponents e, over `terms` = {e: c, ...}."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
         terms_by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
@@ -197,9 +197,9 @@ class FunctionField(Field):
 
 
 class Function(Element):
-    """A quotient of two polynomials in a `FunctionField`, not reduced.
+    """A quotient of two polynomials in a `FunctionField`, in lowest terms only if the field reduces.
 
-    If it is the value of a polynomial, `powers` are the factors of its denominator: they cancel in quotients of values.
+    For the value of a polynomial, `powers` lists the factors of the denominator, which cancel in quotients of values.
     """
 
     __slots__ = ("denominator", "numerator", "powers")
@@ -250,7 +250,7 @@ class Function(Element):
             (D, min(power, other_power)) for D, power in self.powers for E, other_power in other.powers if D == E
         ]
         if common_powers:
-            # a/D^3 over b/D^2 is a/(D b): multiplying both sides by the full denominators would leave a factor D^2.
+            # (a/D^3)/(b/D^2) is computed as a/(D b); the quotient a D^2/(D^3 b) would have the common factor D^2.
             times, product_of = self.field.times, self.field.product_of
             own_cofactor, other_cofactor = (
                 product_of([(D, power - sum(n for E, n in common_powers if D == E)) for D, power in value.powers])
@@ -305,7 +305,7 @@ class FunctionMatrix(EntryMatrix):
                 *numerators, denominator = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(denominator):
                     raise ZeroDivisionError("singular matrix in solve()")
-                if denominator.is_constant():  # cancel it: otherwise the digits double with each step of an affine map
+                if denominator.is_constant():  # cancel the constant: else the digits double with each affine step
                     factor = denominator.leading_coefficient() * sign
                     numerators, denominator = [entry / factor for entry in numerators], self.field.one.numerator * sign
                 for i, entry in zip(block, numerators, strict=True):
@@ -313,7 +313,7 @@ class FunctionMatrix(EntryMatrix):
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
     def _diagonal_blocks(self) -> list[list[int]]:
-        """Return lists of indices, as short as possible, such that entries between two of the lists are 0."""
+        """Return the finest partition of the indices for which entry i, j is 0 if i and j are in different parts."""
         indices = set(range(self._rows))
         blocks = []
         while indices:
@@ -333,7 +333,7 @@ class FunctionMatrix(EntryMatrix):
         for i in range(self._rows):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
-            for entry in row:  # the sum of all 1/denominator has a common denominator
+            for entry in row:  # the denominator of the sum of all 1/denominator is a common one
                 if entry.numerator.is_zero():
                     continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.denominator)

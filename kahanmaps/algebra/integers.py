@@ -2,7 +2,7 @@
 
 The integers are long, and the parts that consist of given primes are short, so these parts are computed from residues.
 The primes are given as the divisors of an integer `power`. The computation is fastest if `power` contains each prime
-with the multiplicity that it has in the integers; higher multiplicities in the integers are found as well.
+with the multiplicity that it has in the integers; higher multiplicities in the integers are allowed.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
         prime_part = prime_part * gcd
         if has_full_multiplicity(gcd, power):
             break
-        power = gcd * gcd  # contains every prime that may still divide the number
+        power = gcd * gcd  # contains every prime of `power` that may still divide the number
     return number, prime_part
 
 
@@ -70,7 +70,7 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
-    """Whether `power` has each prime of `gcd` = gcd(n, `power`) more often than `gcd`: then n has it as `gcd` does."""
+    """Whether each prime of `gcd` = gcd(n, `power`) occurs more often in `power`; then n has it as often as `gcd`."""
     cofactor = power // gcd
     while gcd != 1:
         common_factor = gcd.gcd(cofactor)
@@ -81,7 +81,7 @@ def has_full_multiplicity(gcd: fmpz, power: fmpz) -> bool:
 
 
 def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
-    """Return values / divisor. Raises ArithmeticError if the lowest 64 bits of a value reveal a remainder."""
+    """Return all v / divisor, v in `values`. Raises ArithmeticError if the lowest 64 bits of a v reveal a remainder."""
     if divisor == 1:
         return list(values)
     quotients = [value // divisor for value in values]
@@ -93,7 +93,7 @@ def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
 
 
 def radical(*numbers: fmpz) -> fmpz:
-    """Return an integer with the same prime factors as the product of `numbers`: small primes occur in it once."""
+    """Return an integer with the same prime factors as the product of `numbers`; each small prime occurs in it once."""
     product = fmpz(1)
     for number in numbers:
         if number == 0:

@@ -1,20 +1,20 @@
 """Interpolation of rational functions over Q from few values modulo primes.
 
 A black box is a function that returns, for a prime p and a point of GF(p)^n, a vector of numbers modulo p. The aim is
-to find the rational functions of n symbols that have these values. Modulo one prime:
+to find the rational functions of n symbols that have these values. The steps modulo the first prime are:
 
-    axes    On each axis through a random point (the anchor), every entry is a fraction N/D of two polynomials. The
-            fraction of least degree that fits the values is computed; one value more than needed is a check. The
-            exponents of each symbol are read off, so that functions of eps^2 are recognized early.
+    axes    On the line through a random point (the anchor) in the direction of a symbol, each entry of the vector is a
+            fraction N/D of polynomials. The fraction of least degree that fits the values gives the exponents of the
+            symbol; one value more than needed is a check.
     stages  Symbols are added one by one, while the remaining ones stay at the anchor. The possible monomials are those
-    of the previous stage times the exponents of the new symbol, up to a total degree known from a random line. The
-    linear system N(s_k) - v_k D(s_k) = 0 for values v_k at points s_k gives the coefficients. One value is a check.
+            of the previous stage times powers of the new symbol, up to a total degree known from a random line. The
+            linear system N(s_k) = v_k D(s_k) for values v_k at points s_k has the coefficients as solution.
 
-All values computed so far are reused as equations, and entries with the same denominator share its unknowns. Modulo
-further primes the monomials are known. The coefficients follow by the Chinese remainder theorem, and the functions must
-agree with the black box at new points modulo new primes. If the black box has the values of a rational function over Q,
-a wrong answer passes at each of these points with probability about degree/2^60 (schwartz-1980). That the black box
-is rational at all is supported by these points only: an answer is strong evidence, not a proof.
+All values computed so far are reused as equations. Entries with the same denominator share its unknown coefficients.
+Modulo further primes the monomials are known. The coefficients follow by the Chinese remainder theorem, and the
+functions must agree with the black box at new points modulo new primes. If the black box has the values of a rational
+function over Q, a wrong answer passes at each of these points with probability about degree/2^60 (schwartz-1980). Only
+these points support the assumption that the black box is rational: this is strong evidence, not a proof.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reco
 
 
 _MAX_UNLUCKY_PRIMES = 3  # after this number of failures the black box is declared not rational
-# One value modulo each of these new primes; a black box like the Legendre symbol passes each with probability 1/2.
+# New primes with one test each; a black box such as the Legendre symbol passes each test with probability 1/2.
 _CONFIRMING_PRIMES = 5
 
 
@@ -75,7 +75,7 @@ class Samples:
 
 
 class SampledValues:
-    """The points so far modulo one prime, the values of the black box there, and cached values of monomials there."""
+    """Points modulo one prime, and at each point the values of the black box and cached values of monomials."""
 
     def __init__(self, black_box: BlackBox, prime: int, samples: Samples) -> None:
         self.prime = prime
@@ -131,7 +131,7 @@ class SampledValues:
 
 @dataclass(frozen=True)
 class Shape:
-    """The monomials of a numerator and a denominator. `leading_monomial`, in the denominator, has coefficient 1."""
+    """The monomials of a numerator and a denominator; the `leading_monomial` of the denominator has coefficient 1."""
 
     numerator: tuple[Exponents, ...]
     denominator: tuple[Exponents, ...]
@@ -155,7 +155,7 @@ class Quotient:
 
     @classmethod
     def of(cls, shape: Shape, numerator: Sequence[int], denominator: Sequence[int], prime: int) -> Quotient | None:
-        """Return the fraction without zero terms, its denominator normalized; None if the denominator is 0."""
+        """Return the fraction without zero terms, scaled to the leading coefficient 1; None if the denominator is 0."""
         numerator_terms = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
         denominator_terms = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
         if not denominator_terms:
@@ -171,7 +171,7 @@ class Quotient:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """The result of `reconstruct`: the functions, or None and the reason for the failure.
+    """The result of `reconstruct`: the `functions`, or None and the `reason` for the failure.
 
     `samples` is the number of calls of the black box, including calls that give no value; `primes` are the primes used.
     """
@@ -255,7 +255,7 @@ def reconstruct(
 
 
 def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int, rng: random.Random) -> list[Quotient]:
-    """Return the functions in `nvars` symbols modulo the prime of `values`, one quotient for each entry."""
+    """Return the entries of the black box, functions of `nvars` symbols, as quotients modulo the prime of `values`."""
     p = values.prime
     values.take(values.random_points(nvars, rng))
     anchor = values.points[0]
@@ -266,7 +266,7 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
     for j in range(nvars):
         direction = tuple(int(i == j) for i in range(nvars))
         axes.append(_interpolate_on_line(values, anchor, direction, max_degree, rng))
-    # Symbols of large degree come first: each new symbol multiplies the number of monomials in those before it.
+    # Symbols of large degree come first: each new symbol multiplies the number of monomials in the earlier symbols.
     symbol_order = sorted(range(nvars), key=lambda j: -max((_deg(N) + _deg(D) for N, D in axes[j]), default=0))
     denominator_texts: list[list[str]] = [[] for _ in entries]
     for stage, j in enumerate(symbol_order):
@@ -291,7 +291,7 @@ def _interpolate_modulo_prime(values: SampledValues, nvars: int, max_degree: int
         if not dependents:
             continue
         shapes = {}
-        for i in dependents:  # a monomial in the earlier symbols, times a power of symbol j that occurs on axis j
+        for i in dependents:  # monomials in the earlier symbols times powers of symbol j that occur on axis j
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -330,7 +330,7 @@ def _interpolate_on_line(
 ) -> list[tuple[nmod_poly, nmod_poly]]:
     """Interpolate all entries on the line anchor + t direction as fractions (N, D) of polynomials in t, D monic.
 
-    If the line is parallel to the axis of a symbol, t is the symbol itself, so both have the same exponents.
+    If the line has the direction of one symbol, t is this symbol, so N and D have the exponents of the symbol.
     """
     p = values.prime
     symbols = [i for i, d in enumerate(direction) if d]
@@ -344,8 +344,8 @@ def _interpolate_on_line(
         nodes.append(t)
         return tuple((a + (t - t0) * d) % p for a, d in zip(anchor, direction, strict=True))
 
-    # Newton's form: each new point adds one term to each polynomial. The degrees are not known in advance, so points
-    # are taken one by one until all fractions are determined.
+    # In Newton's form, each new point adds one term to each interpolating polynomial. The degrees of the fractions are
+    # not known, so points are taken one by one until all fractions are determined.
     entries = range(len(values.values[0]))
     node_polynomial = nmod_poly([-t0, 1], p)
     interpolants = [nmod_poly([v], p) for v in values.values[0]]
@@ -370,7 +370,7 @@ def _interpolate_on_line(
 
 
 def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
-    """Return (N, D), N/D = `interpolant` modulo `node_polynomial`, deg N + deg D <= n - 2, D monic; or None."""
+    """Return (N, D) with N/D = `interpolant` at n nodes, deg N + deg D <= n - 2 and D monic; None if there is none."""
     p = interpolant.modulus()
     previous, current = (node_polynomial, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:
@@ -393,9 +393,9 @@ def _least_fraction(interpolant: nmod_poly, node_polynomial: nmod_poly, n: int) 
 
 
 def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
-    """Split a group of entries with the same denominator into some that determine it, and the remaining entries.
+    """Split a group of entries with the same denominator into some that determine the denominator, and all others.
 
-    Entries with proportional numerators give the same equations, so the first part has only one of these.
+    Entries with proportional numerators give the same equations, so only one of them is in the first list.
     """
     if len(shapes[group[0]].denominator) == 1:
         return group[:1], group[1:]
@@ -412,9 +412,9 @@ def fit(
     rng: random.Random,
     fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
-    """Return, for each entry, the fraction of its shape that agrees with all values; compute missing values first.
+    """Return, for each entry, the fraction of the given shape that agrees with all values; compute missing values.
 
-    The values at the last point are only a check. Only points with the coordinates `fixed` (index: value) are used.
+    The values at the last point are a check only. Only points with the coordinates `fixed` = {index: value} are used.
     """
     quotients: dict[int, Quotient] = {}
     draw = values.random_points(nvars, rng, fixed)
@@ -447,13 +447,13 @@ def _solve(
 ) -> int:
     """Compute the fractions of entries that have the same denominator, and store them in `quotients`.
 
-    Returns how many values are missing, 0 on success. Raises Unlucky if no fractions have these values.
+    Returns the number of missing values, 0 on success. Raises Unlucky if no fractions with these shapes fit the values.
     """
     p = values.prime
     values.samples.check()
     denominator = shapes[entries[0]].denominator if known_denominator is None else known_denominator.shape.denominator
     widths = [len(shapes[i].numerator) for i in entries]
-    # The last point is left out of the equations, as a check; without symbols all points are the same.
+    # The equations do not use the last point, which is a check. Without symbols, all points are the same.
     test_index = point_indices[-1]
     rows: list[int] = []
     height = 0
@@ -567,7 +567,7 @@ def _lift(
 def _find_counterexample(
     functions: Sequence[RationalFunction], sample_new_prime: Callable[[], SampledValues], rng: random.Random
 ) -> SampledValues | None:
-    """Compare the functions with the black box modulo new primes; return the values modulo the first that disagrees."""
+    """Compare the functions with the black box modulo new primes; return the values at the first difference."""
     for _ in range(_CONFIRMING_PRIMES):
         values = sample_new_prime()
         values.take(values.random_points(len(functions[0].names) if functions else 0, rng))

@@ -54,7 +54,7 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     """Return the basis of { v : `matrix` v = 0 } in echelon form, reduced from the last column to the first.
 
     Each basis vector belongs to a column without pivot: it is 1 there and 0 at every other column without pivot, so
-    the basis depends only on the space. It is empty for a matrix of full column rank.
+    the basis depends only on the space. The basis is empty if the rank is the number of columns.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> nullspace(QQ, fmpq_mat([[2, 4]]))
@@ -197,13 +197,13 @@ class EntryMatrix(ABC):
 
 
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
-    """Multiply each row by its own denominator, which preserves rank and null space and keeps entries short."""
+    """Multiply each row by its common denominator: rank and null space do not change, and the entries stay short."""
     rows = [over_common_denominator(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
-    """Return the rows of the reduced echelon form, and its pivot columns, of a matrix of balls or an `EntryMatrix`."""
+    """Return the rows and the pivot columns of the reduced echelon form of an `EntryMatrix` or a matrix of balls."""
     with field.working():
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []

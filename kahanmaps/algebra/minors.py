@@ -14,13 +14,13 @@ PairsCheck = Callable[[list[tuple[Any, Any]]], None]
 def kernel_minors(
     rows: Sequence[Sequence[Any]], times: Product = operator.mul, check_pairs: PairsCheck | None = None
 ) -> list[Any]:
-    """Return the vector of signed maximal minors of an n x (n + 1) matrix, which is in its kernel.
+    """Return the vector of signed maximal minors of an n x (n + 1) matrix: it lies in the kernel of the matrix.
 
     `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays); the result is exact
-    if the ring is. `times` multiplies two elements. The minors of the first k rows are computed for k = 1, 2, ..., with
-    2^(n+1) n/2 products in all. An entry None stands for 0; products with it are skipped. `check_pairs` is called with
-    all pairs to be multiplied for the next row, and may raise an exception. The k-th minor omits column k and has the
-    sign (-1)^k; it is None if all its products contain a None.
+    if the operations of the ring are. `times` multiplies two elements. The minors of the first k rows are computed for
+    k = 1, 2, ..., with 2^(n+1) n/2 products in all. An entry None stands for 0; products with it are skipped.
+    `check_pairs` is called with all pairs to be multiplied for the next row, and may raise an exception. The k-th minor
+    omits column k and has the sign (-1)^k; it is None if all its products contain a None.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
@@ -57,7 +57,7 @@ def kernel_minors(
 def _layers(width: int) -> list[list[tuple[int, list[tuple[int, int, bool]]]]]:
     """Return, for k = 2, 3, ..., all sets of k columns as bit masks, each with the expansion of its minor.
 
-    The expansion is along the last row. Its products are (column, the mask without it, whether the sign is -1).
+    The expansion is along the last row. Each of its products is (column, mask without column, whether the sign is -1).
     """
     layers = []
     for k in range(2, width):

@@ -71,7 +71,7 @@ def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
 
 
 def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
-    """Return a basis of the null space of a reduced echelon form: one vector for each free column, where it is 1.
+    """Return a basis of the null space of a reduced echelon form: for each free column a vector that is 1 there.
 
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]

@@ -4,10 +4,10 @@
     point       1/2,-1/3,0
     expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
-Text is exact: a decimal means the rational number that it denotes. The parser computes values while it reads the text;
-it builds no tree and executes nothing as code. (Python's `ast` fails for sums of several thousand terms, and for
-integers of 4300 digits.) FLINT ends the process when memory is exhausted and does not react to Ctrl-C, so the size of
-every result is compared with `ExpressionLimits` before FLINT is called.
+All numbers are exact: a decimal denotes a rational number. The parser computes values while it reads the text; it
+builds no tree and executes nothing as code. (Python's `ast` fails for sums of several thousand terms, and for integers
+of 4300 digits.) FLINT ends the process when memory is exhausted and does not react to Ctrl-C, so the size of every
+result is compared with `ExpressionLimits` before FLINT is called.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 class ExpressionLimits:
     """Limits on the length of the text of an expression, and on the size of its value.
 
-    They apply to all intermediate values as well. The number of digits is bounded before each operation.
+    The limits apply to all intermediate values as well; the digits of a value are bounded before it is computed.
     """
 
     number_digits: int = 1_000_000  # digits of one number read by parse_number or parse_point
@@ -40,7 +40,7 @@ class ExpressionLimits:
     exponent: int = 1_000  # absolute value of an exponent
     digits: int = 100_000  # digits of a coefficient over the common denominator of its polynomial
     terms: int = 20_000  # terms of a polynomial
-    words: int = 5_000_000  # 64-bit words of all intermediate values; products of two terms count too
+    words: int = 5_000_000  # 64-bit words of all intermediate values and of all products of two terms
 
 
 LIMITS = ExpressionLimits()
@@ -141,7 +141,7 @@ def require_text(text: object, expected: str, hint: str) -> None:
 
 
 def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
-    """Return the error for a value of a wrong type: it names the type, what was `expected`, and a `hint`."""
+    """Return the error for a value of a wrong type; its message contains the type, `expected` and `hint`."""
     if isinstance(value, float):
         return InexactNumber(f"found the floating-point number {value!s}, expected {expected}: {hint}")
     return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")
@@ -194,7 +194,7 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
 
 
 def point_entries(text: str) -> list[tuple[int, int]]:
-    """Return begin and end of each entry of a point in its text; entries are separated by commas, or else by blanks.
+    """Return (begin, end) for each entry of a point in its text; commas or, if there are none, blanks separate entries.
 
     >>> point_entries("(1,2)"), point_entries("1 2"), point_entries("")
     ([(1, 2), (3, 4)], [(0, 1), (2, 3)], [])
@@ -253,7 +253,7 @@ def parse_rational_function(
 ) -> RationalFunction:
     """Parse a quotient of polynomials in `ring(variables)`; common factors are not canceled.
 
-    Raises like `parse_polynomial`.
+    Raises the errors of `parse_polynomial`.
 
     >>> from kahanmaps.algebra.printing import format_rational_function
     >>> format_rational_function(parse_rational_function("x/(y-1) + 1/(y-1)", ["x", "y"]))
@@ -274,7 +274,7 @@ def parse_rational_function(
 def parse_constant(
     text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: ExpressionLimits = LIMITS
 ) -> fmpq:
-    """Evaluate an expression in numbers and `constants`. Raises like `parse_polynomial`.
+    """Evaluate an expression in numbers and `constants`. Raises the errors of `parse_polynomial`.
 
     >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
     3/4
@@ -324,7 +324,7 @@ class _Polynomial(NamedTuple):
     `common_denominator` times `element` has integer coefficients of absolute value at most 2**`bits`.
 
     FLINT also stores one common denominator for all coefficients, so `bits` measures FLINT's representation as well.
-    Numbers are stored as fmpq, which is much faster than as constant polynomials.
+    A number is stored as fmpq, since operations with constant polynomials are much slower.
     """
 
     element: Any
@@ -335,14 +335,14 @@ class _Polynomial(NamedTuple):
 
 
 class _Quotient(NamedTuple):
-    """A quotient of polynomials. The denominator has degree at least 1 and leading coefficient 1, or is None for 1."""
+    """A quotient of polynomials. The denominator is monic of degree at least 1; None stands for the denominator 1."""
 
     numerator: _Polynomial
     denominator: _Polynomial | None
 
 
 class Token(str):
-    """A token, with its position `start` in the text; `kind` is "number", "name", "end", or the sign or bracket."""
+    """A token at position `start_pos` of the text; `kind` is "number", "name", "end", or the sign or bracket itself."""
 
     kind: str
     start_pos: int
@@ -401,7 +401,7 @@ def _parse(arithmetic: _Arithmetic) -> _Quotient:
 
 
 class _Parser:
-    """A recursive reader of sums of products of powers, from left to right.
+    """A recursive-descent parser of sums of products of powers.
 
     A sign binds more weakly than a power, so that -x^2 is -(x^2), and powers associate to the right, so that 2^3^2 is
     2^9. Only brackets lead to recursion, and their depth is limited.
@@ -455,7 +455,7 @@ class _Parser:
             return value
         if token.kind not in ("number", "name"):
             raise _syntax_error(token, self.arithmetic)
-        if self.next.kind in ("number", "name", "("):  # tested before the name is looked up, as sin(x) is a call
+        if self.next.kind in ("number", "name", "("):  # tested first: sin(x) is a call, not an unknown name
             raise _syntax_error(self.next, self.arithmetic)
         return self.arithmetic.number(token) if token.kind == "number" else self.arithmetic.name(token)
 
@@ -484,7 +484,7 @@ def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
 class _Arithmetic:
     """The operations in one expression; each raises an error before its result would exceed a limit.
 
-    `pieces` alternates between operands and tokens of operators; `quotients` says whether divisors may have variables.
+    In an argument `pieces`, operands and operators alternate; `quotients` says whether divisors may contain variables.
     """
 
     def __init__(

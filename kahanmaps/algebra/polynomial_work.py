@@ -1,7 +1,7 @@
 """Units of work (see work.py) for polynomials: in one variable modulo primes below 2^64, and in several over Q.
 
-A length is the number of coefficients, a size the number of terms. The formulas were fitted to FLINT 3 within a factor
-of two, for 2 to 100,000 coefficients: its classical products and remainders for small lengths, fast ones for larger.
+A length is a number of coefficients or terms. The formulas agree with times measured for FLINT 3 within a factor of
+two, for 2 to 100,000 coefficients; FLINT uses classical algorithms for small lengths, and fast ones for large lengths.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def product_units(length: int, other_length: int) -> float:
 
 
 def series_units(length: int) -> float:
-    """Return the units of work for the inverse of a series with this number of terms, or of a quotient of two."""
+    """Return the units of work for the inverse of a series with `length` terms, or for a quotient of two of them."""
     return 0.5 + 2 * product_units(length, length)
 
 

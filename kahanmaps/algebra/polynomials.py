@@ -125,7 +125,7 @@ def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
-    """Return the approximate number of digits of the longest coefficient if all have one common denominator.
+    """Return the approximate number of digits of the longest coefficient if all are written over one denominator.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> digits_of([x/3, 1000*y])
@@ -164,7 +164,7 @@ def over_one_denominator(
 
 
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
-    """Return (c, P) with polynomial = c P, where P has coprime integer coefficients and a positive leading one.
+    """Return (c, P) with `polynomial` = c P, where P has coprime integer coefficients, the leading one positive.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> primitive_part(x/2 - 3*y/4)
@@ -196,7 +196,7 @@ def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
 
 
 def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
-    """Return the value at `point`, whose entries are elements of `field`; coefficients are converted to the field.
+    """Return the value at `point`, a sequence of elements of `field`; the coefficients are converted to `field`.
 
     Raises `BadPrime` if the field is GF(p) and p divides the denominator of a coefficient.
     """
@@ -337,14 +337,14 @@ class RationalFunction(LatexDisplay):
     def __call__(self, *point: Any, **named: Any) -> Any:
         """Return the value at a point: exact for exact numbers, rounded if a coordinate is a float, None at a pole.
 
-        The arguments are the values of `names`, in order. For a function I the variables may be one point, I(x, eps) or
-        I("1,2", eps), and each name as a keyword: I(x, eps="1/10"), I(x, h="1/5"), I({"x": 1, "y": 2}, eps).
-        For several points, such as an orbit, the result is the array of values; for float points, NaN marks a pole.
+        The arguments are the values of `names`, in order. The variables may be one point: I(x, eps) for a function I,
+        with x such as "1,2" or {"x": 1, "y": 2}. Names may be keywords: I(x, eps="1/10"), I(x, h="1/5"). For several
+        points, such as an orbit, the result is the array of values; for float points, NaN marks a pole.
         """
         return import_module("kahanmaps.maps.values").function_value(self, point, named)
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
-        """Return the value at `point` over `field`, or None if the denominator is zero there."""
+        """Return the value at `point`, an element of `field`, or None if the denominator is zero at this point."""
         denominator = evaluate(self.denominator, field, point)
         if field.is_zero(denominator):
             return None

@@ -1,6 +1,6 @@
 """Exact values as text: numbers, polynomials and rational functions in several notations, and data for JSON and CSV.
 
-The text returned by a `format_...` function parses back to the same value within the limits of parsing.py.
+Within its limits, parsing.py reads the text returned by a `format_...` function back as the same value.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def format_rational_function(function: RationalFunction) -> str:
     denominator_text = format_polynomial(function.denominator)
     if len(function.numerator) > 1:
         numerator_text = f"({numerator_text})"
-    # Brackets are needed unless the denominator is a name or a power of one; a/2*y would be read as a*y/2.
+    # Brackets are needed unless the denominator is a name or a power of a name: a/2*y would be read as a*y/2.
     if any(sign in denominator_text for sign in "*+- "):
         denominator_text = f"({denominator_text})"
     return f"{numerator_text}/{denominator_text}"
@@ -119,7 +119,7 @@ def format_factored(function: RationalFunction) -> str:
 
 
 def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
-    """Return ([(P_i, e_i), ...], c): the function is c prod P_i^e_i, P_i primitive; None if this is no shorter text.
+    """Return ([(P_i, e_i), ...], c) with function = c prod P_i^e_i, P_i primitive; None if this form is not shorter.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
     Common factors of numerator and denominator are canceled.
@@ -140,7 +140,7 @@ def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, 
             index = next((n for n, (factor, _) in enumerate(factors) if factor == g), None)
             if index is None:
                 factors.append((g, sign * k))
-            else:  # a common factor, since rational functions are not reduced
+            else:  # a common factor of numerator and denominator
                 factors[index] = g, factors[index][1] + sign * k
     return ([(g, k) for g, k in factors if k], constant) if is_shorter else None
 
@@ -192,7 +192,7 @@ def numerator_and_denominator(
 
 
 def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
-    """Return the first terms whose text has at most about this number of characters, perhaps none or all of them.
+    """Return the sum of the first terms that fit into about this number of characters; it may be 0 or `polynomial`.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
@@ -212,11 +212,11 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
 
 @dataclass(frozen=True)
 class Notation:
-    """How a language writes formulas: `name`, `number` and `power` write a name, a positive number and a power.
+    """The notation of a language: `name`, `number` and `power` format a name, a positive number and a power of a name.
 
-    `signs` are the minus of the first term, the plus and the minus of others. `gap` is between terms, `times` between
-    factors. `enclosed` puts brackets around a sum, `fraction` joins numerator and denominator, `row` groups a sum or a
-    product. Terms are in the order of the ring. If `eps_first` is True, eps is the first factor of each term.
+    `signs` are the minus of the first term, the plus and the minus of later terms. `gap` separates terms, `times`
+    factors. `enclosed` puts brackets around a sum, `fraction` formats a quotient, `row` groups a sum or a product.
+    Terms are in the order of the ring. If `eps_first` is True, eps is the first factor of each term.
     """
 
     name: Callable[[str], str]
@@ -245,7 +245,7 @@ class Notation:
         for monomial, coefficient in terms_of(polynomial):
             powers = ((variables[k], monomial[k]) for k in order if monomial[k])
             factors = [name if exponent == 1 else self.power(name, exponent) for name, exponent in powers]
-            if not factors or abs(coefficient) != 1:  # the coefficients 1 and -1 are printed only without factors
+            if not factors or abs(coefficient) != 1:  # 1 and -1 are printed as constant terms only
                 factors.insert(0, self.number(abs(coefficient)))
             sign = (minus if terms else first_minus) if coefficient < 0 else plus if terms else ""
             terms.append(sign + self.times.join(factors))
@@ -296,8 +296,8 @@ PLAIN = Notation(str, str, "{}^{}".format)
 def integer_fraction(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_mpoly]:
     """Return (is_negative, P, Q): the quotient is -P/Q if `is_negative`, else P/Q.
 
-    P and Q have integer coefficients and a positive first term. For a polynomial P the result is (False, P, 1),
-    whatever the coefficients and signs of P.
+    P and Q have integer coefficients and a positive first term. If the quotient is a polynomial P, the result is
+    (False, P, 1), even if P has fractions as coefficients or a negative first term.
     """
     numerator, denominator = function.numerator, function.denominator
     if function.is_polynomial or numerator.is_zero():
@@ -361,7 +361,7 @@ def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:
     return {key: plain(getattr(value, attribute)) for key, attribute in attribute_of.items()}
 
 
-# An integer, p/q or a decimal. The bound on the exponent keeps 1e999999999 from filling the memory of a reader.
+# An integer, p/q or a decimal. The exponent is bounded: a program that reads 1e999999999 would run out of memory.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)")
 # Text that a spreadsheet would run as a formula. An apostrophe before it marks it as text. If text already has such
 # apostrophes, one more is added, so that removing one apostrophe always restores the original.

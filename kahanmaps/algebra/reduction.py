@@ -1,6 +1,6 @@
 """Primes of bad reduction of elliptic curves over Q, and of the curves in the planes of a member of the family.
 
-Those in the planes may be over number fields. Integers are factored within a bound; unfactored cofactors are reported.
+The latter may be over number fields. Integers are factored within bounds; unfactored cofactors are reported.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ _MAX_FACTORED_BITS = 140  # a cofactor with at most this number of bits is facto
 
 @dataclass(frozen=True)
 class BadPrimes:
-    """The primes of bad reduction of an elliptic curve over Q, or the primes of Q below those of a number field.
+    """The primes of bad reduction of an elliptic curve; for a curve over a number field, the primes of Q below these.
 
     At the primes `bad` the reduction is bad (proved); at `undecided` this is not known. `bad_cofactors` are unfactored
-    composite integers all of whose prime factors are bad; of `undecided_cofactors` some prime factors may be bad. At
-    all other primes the reduction is good (proved). `minimal_discriminant` is for a curve over Q, None if not known.
+    composite integers all of whose prime factors are bad; `undecided_cofactors` may have bad prime factors. At all
+    other primes the reduction is good (proved). `minimal_discriminant` is None if unknown.
     """
 
     bad: tuple[int, ...]
@@ -54,7 +54,7 @@ class BadPrimes:
 
 
 def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
-    """Return the prime factors found of a nonzero integer, and its remaining composite factors.
+    """Return the prime factors of a nonzero integer found within the bounds, and the unfactored composite factors.
 
     >>> factor_within_bound(fmpz(-12))
     ({2, 3}, set())
@@ -121,7 +121,7 @@ def bad_primes_of_plane(gamma: Any) -> BadPrimes:
         curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         return bad_primes(curve, [gamma.p, gamma.q, delta.p])
     K, denominator = gamma.field, norm_of_denominator(gamma)
-    # The primes below the denominator of j are bad. They are the primes that divide the norm of this denominator.
+    # The primes below the denominator of j are bad; they are the primes that divide the norm of this denominator.
     norm_of_j_denominator = norm_of_denominator(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
     primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
     bad, undecided = list[int](), list[int]()
@@ -154,7 +154,7 @@ def norm_of_denominator(element: Any) -> fmpz:
 
 
 def newton_slopes(polynomial: fmpq_poly, p: int) -> set[fmpq]:
-    """Return the p-adic valuations of the roots of a polynomial whose coefficient c_0 is not 0.
+    """Return the p-adic valuations of the roots of a polynomial whose constant coefficient is not 0.
 
     >>> newton_slopes(fmpq_poly([25, 0, 1, 0, 5]), 5) == {fmpq(1), fmpq(-1, 2)}
     True

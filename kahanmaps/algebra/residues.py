@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from flint import fmpq, fmpz, fmpz_mat
 
 _MAX_LATTICE_RESIDUES = 7  # residues in one lattice: heights up to m^(7/8) for the modulus m; Wang's bound is m^(1/2)
-_SPARE_BITS = 4  # a common denominator must be shorter by this number of bits than for random residues
+_SPARE_BITS = 4  # a common denominator must be shorter by this number of bits than one of random residues
 
 
 def random_prime(rng: random.Random, bits: int = 61) -> int:
@@ -94,7 +94,7 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     sample = [residues[i] for i in nontrivial_indices[::step]]
     denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(sample)
     if k > 1:
-        # The least q > 0 with small q r modulo `modulus` for each residue r, unless random residues have such a q.
+        # Find q > 0 such that q r modulo `modulus` is small for each residue r, smaller than for random residues.
         rows = [[1, *sample], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
@@ -130,9 +130,9 @@ def from_residues(
 ) -> list[tuple[fmpq, ...]] | None:
     """Return the simplest fractions with the residues `modulo(prime)`, found with some primes, tested with another.
 
-    `modulo` returns lists: the fractions of one list probably share a denominator. Returns None if `modulo` does, or
-    if `max_primes` primes do not suffice. Every call uses the same primes: since the result is checked, an unsuitable
-    prime costs only time.
+    `modulo` returns lists of residues; the fractions for one list probably share a denominator. The result is None if
+    `modulo` returns None, or if `max_primes` primes do not suffice. Every call uses the same primes: since the result
+    is checked, an unsuitable prime costs only time.
 
     >>> numbers = (fmpq(355, 113), fmpq(-7, 3**40))
     >>> from_residues(lambda p: [[int(x.p % p) * pow(int(x.q), -1, p) % p] for x in numbers], 5)
@@ -157,7 +157,7 @@ def from_residues(
         ]
         modulus *= prime
         candidates = []
-        if count >= next_count:  # not after each prime, since a guess takes longer than evaluating modulo a prime
+        if count >= next_count:  # not after each prime, since a guess takes longer than a call of `modulo`
             for group in residues:
                 fractions = rational_vector(group, modulus)
                 if fractions is None:

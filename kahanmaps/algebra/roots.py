@@ -24,7 +24,7 @@ from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
-MAX_DEGREE = 12  # of the minimal polynomial of an algebraic number
+MAX_DEGREE = 12  # maximal degree of the minimal polynomial of an algebraic number
 _ROOT_TEXT = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
 _SQUARE_ROOT_TEXT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
 _GUARD_BITS = 64  # bits of working precision beyond the requested ones
@@ -54,7 +54,7 @@ class Root:
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
             with suppress(InputError):  # the error is raised later, when the real number is needed
-                # Replace `near` by the root to 4, 8, ... digits, the first that suffice: equal roots get equal text.
+                # Replace `near` by the root to 4, 8, ... digits, the fewest that select it: equal roots get equal text.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -85,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # The root is b/q for an algebraic integer b; Cauchy's bound holds for all conjugates of b.
+            # q times the root is an algebraic integer b; Cauchy's bound holds for all conjugates of b.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
@@ -94,7 +94,7 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; 0 if it vanishes at the root."""
+        """Reduce a polynomial modulo `self.polynomial` in its k-th variable; the result is 0 if the root is a zero."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
@@ -117,7 +117,7 @@ class Root:
 
     @property
     def decimal(self) -> str:
-        """The real root as text, `, about 1.41421356237310`; empty if no real root is determined."""
+        """Text such as `, about 1.41421356237310` for the real root; empty if no real root is determined."""
         try:
             return f", about {self._real(64).str(15, radius=False)}"
         except InputError:

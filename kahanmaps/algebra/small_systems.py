@@ -2,9 +2,9 @@
 
 The solver branches on the factors of an equation and substitutes linear equations. If no equation factors, it computes
 a Groebner basis of bounded size. If the solutions are finite in number, it then uses the matrix of multiplication by a
-linear form in the quotient ring, whose rational eigenvalues are the values of the form at the rational solutions. The
-result also contains linear families with free variables, equations that could not be solved, and descriptions of the
-solutions that are not rational. No step discards a rational solution.
+linear form in the quotient ring: the values of the form at the rational solutions are rational eigenvalues of the
+matrix. The result also contains linear families with free variables, equations that could not be solved, and
+descriptions of the solutions that are not rational. No step discards a rational solution.
 
 FLINT cannot be interrupted, so each operation is bounded in size: Groebner bases are computed one S-polynomial
 after the other, and polynomials in several variables are factored only up to a bounded number of terms. All operations
@@ -29,8 +29,8 @@ from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, 
 from kahanmaps.algebra.work import SPENT, Budget, count_work
 
 MAX_BASIS = 120  # polynomials in a Groebner basis
-MAX_TERMS = 400  # terms of one of these polynomials
-MAX_BITS = 4_000  # bits of one of their coefficients
+MAX_TERMS = 400  # terms of a polynomial in a Groebner basis
+MAX_BITS = 4_000  # bits of a coefficient in a Groebner basis
 MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored (about 20 ms)
 MAX_PARTS = 400  # points, families and unsolved parts together
 MAX_QUOTIENT = 130  # dimension of the quotient ring: the number of complex solutions with multiplicity
@@ -81,7 +81,7 @@ class Solutions:
     unsolved: list[SolutionComponent] = field(default_factory=list)
     conjugate: list[SolutionComponent] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
-    without_basis: list[SolutionComponent] = field(default_factory=list)  # unsolved as the Groebner basis was too large
+    without_basis: list[SolutionComponent] = field(default_factory=list)  # parts whose Groebner basis was too large
     reason: str = ""  # why some part is unsolved
 
     @property
@@ -167,12 +167,12 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
 
 
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
-    """Return T for which the cubic forms at T y, y of `count` variables, may decouple; None if none was found.
+    """Return T such that the cubic forms may decouple in the `count` variables y, x = T y; None if no T was found.
 
-    If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all its
-    elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic
-    polynomial of the quotient of two Hessians. The caller may use any invertible matrix, so a wrong answer cannot make
-    its result false; the matrix returned is checked with a third Hessian.
+    If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all
+    forms in the span are block diagonal in these coordinates. The blocks are the kernels of p(M), where M is the
+    quotient of two Hessians and p a factor of its characteristic polynomial. Any invertible T is a correct answer for
+    the caller; the T returned is checked with a third Hessian.
     """
     if not forms or count < 2:
         return None
@@ -217,7 +217,7 @@ class _Solver:
         self.stop_reason = ""
 
     def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], is_basis: bool = False) -> None:
-        """Add the solutions of `equations` to the result; `is_basis` says that these form a Groebner basis."""
+        """Add the solutions of `equations` to the result; `is_basis` says that they are a Groebner basis."""
         if self.stop_reason:  # the reason is already in the result
             return
         count_work(50)
@@ -246,11 +246,11 @@ class _Solver:
                 new_equations = [q.compose(*gens, ctx=context) for q in original_equations]
                 self.solve(new_equations, tuple(q.compose(*gens, ctx=context) for q in values))
                 return
-        # Equations that factor, as x f, y g, z h, may have a basis whose elements do not factor: factor both.
+        # Equations that factor (such as x f, y g, z h) may have an echelon basis that does not factor, so try both.
         factors = _factors_to_branch_on(equations) or _factors_to_branch_on(original_equations)
         if factors is not None:
             for factor in sorted(factors, key=lambda q: (degree(q), str(q))):
-                # Use remainders: otherwise the solver would branch on the same product again.
+                # Pass on remainders modulo the factor: otherwise the solver would branch on the same product again.
                 self.solve([factor, *(divmod(p, factor)[1] for p in original_equations)], values)
             return
         for p in equations:
@@ -355,7 +355,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         return sum(e << 16 * i for i, e in enumerate(monomial))
 
     def add(p: fmpz_mpoly) -> bool:
-        """Add p and return True, unless a limit is exceeded."""
+        """Add p to the basis and return True; return False if a limit is exceeded."""
         nonlocal bits
         bits = max(bits, *(abs(c).bit_length() for c in p.coeffs()))
         if len(basis) >= MAX_BASIS or len(p) > MAX_TERMS or bits > MAX_BITS:
@@ -384,8 +384,8 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         lcm_degree, _, i, j = heappop(pairs)
         pending_pairs.remove((i, j))
         count_work(4 + len(basis) / 10)
-        # Buchberger's chain criterion: skip the pair if a third leading monomial divides the least common multiple of
-        # its leading monomials, and both pairs with the third polynomial are done.
+        # Buchberger's chain criterion: skip the pair i, j if the leading monomial of a third polynomial k divides the
+        # least common multiple of those of i and j, and the pairs i, k and j, k are done.
         guarded_lcm = pack(map(max, leads[i], leads[j])) + guard
         if any(
             (guarded_lcm - lead) & guard == guard
@@ -411,7 +411,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
 def quotient_monomials(basis: Sequence[fmpq_mpoly], unknowns: Sequence[int]) -> list[tuple[int, ...]] | None:
     """Return the monomials in the unknowns that no leading monomial of the basis divides; None for infinitely many.
 
-    `unknowns` are indices of variables. A list of more than 4 `MAX_QUOTIENT` monomials is incomplete.
+    `unknowns` are indices of variables. A list of more than 4 times `MAX_QUOTIENT` monomials is incomplete.
     """
     leads = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     for i in unknowns:

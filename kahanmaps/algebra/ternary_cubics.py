@@ -55,7 +55,7 @@ def aronhold_invariants(K: Field, cubic: Cubic) -> tuple[Any, Any]:
 
 
 def hessian(K: Field, cubic: Cubic) -> Cubic:
-    """Return the determinant of the second derivatives of the cubic, divided by 216: a ternary cubic as well."""
+    """Return the determinant of the second derivatives of a cubic, divided by 216; it is a ternary cubic again."""
     derivatives = {(i, j): [cubic[_sorted_indices(i, j, k)] for k in range(3)] for i in range(3) for j in range(3)}
     coefficients = dict.fromkeys(cubic, K.zero)
     for p in itertools.permutations(range(3)):

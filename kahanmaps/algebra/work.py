@@ -1,11 +1,11 @@
-"""Counted work. It bounds a search instead of a clock, so that a search has the same result on every machine.
+"""Counted work: it limits a search in place of a clock, so that a search has the same result on every machine.
 
 A unit of work is about a microsecond of field operations on a laptop of 2020. Expensive operations call `count_work`
 in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work that is
 counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
 Trap: a result from a module-level cache would cost no work the second time, so the outcome would depend on earlier
-calls. `counted_cache` counts the work of a cached result again. Caches that end with a search need no such care.
+calls. `counted_cache` counts the work of a cached result again. A cache for one search only needs no such care.
 """
 
 from __future__ import annotations
@@ -81,14 +81,14 @@ class Budget:
     def share(self, weights: Sequence[float]) -> Iterator[Budget]:
         """Yield budgets for stages, in proportion to their weights; each is created when the stage begins.
 
-        Units that a stage leaves are available to the later stages.
+        Units that a stage does not use are available to the later stages.
         """
         for k, weight in enumerate(weights):
             yield self.part(weight / sum(weights[k:]))
 
 
 def units_at(effort: int, units: float) -> float:
-    """Return the units for an effort: `units` for effort 1, twice as many per step up, half as many per step down.
+    """Return the units for an effort: `units` for effort 1, doubled for each step up and halved for each step down.
 
     Raises InputError for an effort that is not an integer from -20 to 40.
 

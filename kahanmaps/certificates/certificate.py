@@ -67,7 +67,7 @@ TENSOR = "poisson"  # the claim that a Poisson tensor is invariant and satisfies
 ENTROPY = "entropy"  # the claim of positive algebraic entropy, hence of nonintegrability
 DETERMINANT = "determinant"  # the claim that dx/det(I - eps f') is invariant, if the file claims another density
 UNPROVED = "Pi"  # the claim that J - eps^2 f'^2 J is invariant, if no theorem implies it
-ASSOCIATES = "associates"  # given as the other system: the associated systems of a member of the commuting family
+ASSOCIATES = "associates"  # stands for the associated systems of a member of the commuting family
 
 
 class Certificate(str):
@@ -236,7 +236,7 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
 
 
 def certificate_of(result: Any, checker: str, *, command: str = "") -> Certificate:
-    """Write a proof for another program to check, of what a check or a search has proved about a map.
+    """Write what a check or a search has proved about a map as a proof for another program to check.
 
     Args:
         result: the result of `analyze`, `verify`, a check or a search, valid for every eps, or one finding of a report.
@@ -302,7 +302,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                 claims += prove()
             except FalseClaim:
                 raise
-            except InputError as error:  # of an analysis, results with too long identities are omitted
+            except InputError as error:  # results of an analysis with too long identities are omitted
                 if sub_results == [result]:
                     raise
                 skipped.append(f"{name}: {error}")
@@ -326,7 +326,7 @@ def _prepare(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tup
 
 
 def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
-    """The claims that maps commute, in coordinates that separate the planes if possible; `label` begins their names."""
+    """The claims that maps commute, in coordinates that separate the planes if possible; names begin with `label`."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
@@ -379,7 +379,7 @@ def _equivalence_claim(file: SystemFile, data: MapData, other: SystemFile, by: S
 def _known_claims(
     formulas: Formulas, planes: _Planes, checker: str = ""
 ) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
-    """Yield pairs (name, function that returns the claims of this name): those of the file, then those of theorems."""
+    """Yield (name, function that returns the claims with this name): claims of the file, then claims of theorems."""
     H, file, data = formulas.H, formulas.file, planes.data
 
     def single_claim(prove: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
@@ -424,7 +424,7 @@ class _Planes:
         return coordinates, affine_symmetry(planar_data, "coordinates", coordinates.T, [fmpq(0)] * n, target=self.data)
 
     def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
-        """The claims that `prove` returns for a function; for a function of one plane, for the map of this plane."""
+        """Return the claim that `prove` returns for a function, in one plane if possible, after the claims it needs."""
         if self.separation is not None:
             coordinates, change = self.separation
             plane_function = coordinates.function(function)
@@ -445,7 +445,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         integrals = [integral for integral in result.integrals if integral.verdict is proved]
         return [claim for I in integrals for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
-        densities = [density for density in result.shown if density.verdict is proved]  # all others: integrals times it
+        densities = [density for density in result.shown if density.verdict is proved]  # others: integrals times it
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
     if isinstance(result, PoissonSearch):
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
@@ -453,7 +453,7 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
     if isinstance(result, DarbouxSearch):
         planes = planes or _Planes(result.file, data)
         polynomials = [P for space in result.spaces if space.verdict is proved for P in space.polynomials]
-        # If P is a factor of det M, its cofactor has P in the denominator: it is no polynomial over D^k.
+        # If P has a common factor with D = det M, the cofactor C in P(x~) = P C/D^k need not be a polynomial.
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
         return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]
@@ -480,7 +480,7 @@ _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
 
 
 def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:
-    """Pi = J - eps^2 f'^2 J."""
+    """The Poisson tensor Pi = J - eps^2 f'^2 J."""
     assert formulas.file.hamiltonian is not None
     context, J, n = ring((*formulas.names, "eps")), formulas.file.hamiltonian.J, formulas.dim
     *generators, eps = context.gens()

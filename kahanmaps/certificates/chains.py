@@ -1,8 +1,8 @@
 """Claims about compositions of maps: two maps commute, or an iterate is the identity.
 
-Every point that a composition passes through is written as a vector of rational functions of x, and the equation of the
-map is verified for each step. For Phi_f and Phi_g let y = Phi_f(x), z = Phi_g(x). One vector w satisfies M_g(y) w =
-r_g(y) and M_f(z) w = r_f(z): hence w is both Phi_g(y) and Phi_f(z), and only this one vector is stored for both.
+Each point of a composition is written as a vector of rational functions of x, and the equation of the map is verified
+for each step. Let y = Phi_f(x) and z = Phi_g(x) for maps with the equations M_f x~ = r_f and M_g x~ = r_g. One vector w
+with M_g(y) w = r_g(y) and M_f(z) w = r_f(z) is both Phi_g(y) and Phi_f(z), and is stored once.
 """
 
 from __future__ import annotations
@@ -89,13 +89,13 @@ def periodic(f: MapData, period: int) -> Chain:
     """Return the identities that prove that an iterate of the map is the identity.
 
     Raises:
-        FalseClaim: if it is not the identity; a random point modulo a prime is tried before products are expanded.
+        FalseClaim: if the iterate is not the identity; before any expansion, a point modulo a prime is tested.
         InputError: for a period above 1000, or if the identities have too many terms.
     """
     if period > MAX_PERIOD:
         raise InputError(f"found period = {period}, expected at most {MAX_PERIOD} for a certificate")
     # First try a random point modulo a prime. The equation is over Z, so if det M is not 0 at x modulo the prime, then
-    # x~ modulo the prime is the image of x modulo the prime: if the iterate is the identity, it moves no such point.
+    # x~ modulo the prime is the image of x modulo the prime: if the iterate is the identity, it fixes each such x.
     n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
     residues = [rng.randrange(_PRIME) for _ in f.names]
     x = residues[:n]
@@ -103,7 +103,7 @@ def periodic(f: MapData, period: int) -> Chain:
         rows = [[int(entry(*x, *residues[n:]).p) for entry in row] for row in f.rows]
         M, r = nmod_mat([row[:-1] for row in rows], _PRIME), nmod_mat([row[-1:] for row in rows], _PRIME)
         if M.det() == nmod(0, _PRIME):
-            break  # the orbit ends here: the identities decide
+            break  # the image is undefined modulo the prime: the identities decide
         x = [int(entry) for entry in M.solve(r).entries()]
     else:
         if x != residues[:n]:

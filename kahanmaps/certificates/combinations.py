@@ -44,7 +44,7 @@ class OrbitIntegral(EquationClaim):
 
 @dataclass(frozen=True)
 class AffineSymmetry(EquationClaim):
-    """The affine map T(x) = `image`/`divisor` takes the map `data` to the map `target`, the same for a symmetry.
+    """The affine map T(x) = `image`/`divisor` takes the map `data` to the map `target`; they are equal for a symmetry.
 
     For e(x, y) = M(x) y - r(x) of `data` and e' of `target`, k e'(T x, T y) = R e(x, y), or k e'(T y, T x) = R e(x, y)
     if `reversing`: then T takes `data` to the inverse of `target`. k is `multiple`, R is `matrix`.

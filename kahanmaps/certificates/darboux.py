@@ -1,8 +1,8 @@
 """Darboux polynomials and their cofactors in factored form, so that no large product is expanded.
 
-P is a Darboux polynomial of degree k of the map x~ = N/D if D^k P(N/D) = C P. If P is a product of Darboux polynomials
-P_i, then C is the product of their cofactors C_i and a power of D. The C_i often have common factors c_1, c_2, ... Only
-the identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all further identities compare monomials in D and the c_j.
+P is a Darboux polynomial of the map x~ = N/D, with degree k and cofactor C, if D^k P(N/D) = C P. If P is a product of
+Darboux polynomials P_i, C is the product of their cofactors C_i and a power of D. The C_i often have common factors
+c_1, c_2, ... Only the identities D^(k_i) P_i(N/D) = C_i P_i are expanded; the others compare monomials in D and c_j.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class DarbouxPolynomial(Claim):
 
 @dataclass(frozen=True)
 class InvariantVolume(Claim):
-    """The volume form dx/phi, phi = P/Q, is invariant: P(x~) Q(x) det M = P(x) Q(x~) det L.
+    """The volume form dx/phi, phi = P/Q, is invariant: P(x~) Q(x) det M = P(x) Q(x~) det L, with M and L of `data`.
 
     `fraction` contains P and Q as products of Darboux polynomials. It is None if the identity holds for arbitrary
     points x and x~, as for Hamiltonian systems.
@@ -188,7 +188,7 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
 
 
 def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> DarbouxPolynomial:
-    """Return the identity that proves that a function, which is a polynomial, is a Darboux polynomial of the map.
+    """Return the identity that proves that `function`, a polynomial, is a Darboux polynomial of the map.
 
     Raises:
         FalseClaim: if it is not a Darboux polynomial.
@@ -247,7 +247,7 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
         cofactors = []  # each cofactor C, with D^k f(N/D) = C f, as a monomial in D and the common factors so far
         for _, k, _, C in factors:
             power, cofactor = 0, C
-            if D.is_constant():  # the powers of D in C are numbers; count at most k of them, as in D^k
+            if D.is_constant():  # D is a number: count how often it divides C, up to k times, as in D^k
                 number, divisor = abs(int(D.coeffs()[0].p)), gcd(*(int(c.p) for c in C.coeffs()))
                 while divisor % number == 0 and power < k:
                     power, divisor, cofactor = power + 1, divisor // number, cofactor / D

@@ -5,8 +5,8 @@ with D_n = deg f^n and dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2
 Q(eps). An upper bound of D_n and a lower bound of D_2n are needed:
 
 * forms F_1, ..., F_n over Z[eps] with F_1(F_k) = c F_(k+1) show D_n <= deg F_n;
-* modulo a prime and for a residue eps, 2n steps map a line to a curve, whose degree without common factors is
-  at most D_2n: the forms of f^(2n) map the line to a multiple of this curve, unless a step gives 0.
+* modulo a prime and for a residue eps, 2n steps map a line to a curve of degree at most D_2n (without common factors),
+  since the forms of f^(2n) map the line to a multiple of this curve, unless a step gives 0.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
 PRIME = 2**61 - 1
 EPS = 1234567  # the residue of eps
 LINE = ((3, 5), (7, 11), (1, 0))  # the points (3 + 5 t : 7 + 11 t : 1)
-_MAX_TERMS = 100  # maximal number of terms of a form of the iterate before the last one
+_MAX_TERMS = 100  # forms F_n with more terms are not composed further
 _MAX_DEGREE = 600  # maximal degree of the image of the line
 _MAX_STEPS = 5  # the largest n
 
 
 @dataclass(frozen=True)
 class PositiveEntropy(Claim):
-    """The proof that the dynamical degree is above `lower`; `forms` are F_1, ..., F_n, `inverse` is F_1 of the inverse.
+    """The proof that the dynamical degree is above `lower`; `forms` are F_1, ..., F_n, `inverse` is F_1 for f^-1.
 
     They are forms in the variables and a last, homogenizing variable. c_1 F_1 is (N : D), c_(k+1) F_(k+1) is F_1(F_k),
     where `factors` are the c_k. `degree` is deg F_n, `line_degree` is that of the 2n-th image of `LINE`.
@@ -51,7 +51,7 @@ class PositiveEntropy(Claim):
 def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) -> PositiveEntropy:
     """Return degrees that prove that the dynamical degree of a map of the plane, with this inverse, is above 1.
 
-    They give the best lower bound within the limits, or, if `is_short`, the first one above 1.
+    These degrees give the best lower bound within the limits, or, if `is_short`, the first lower bound above 1.
 
     Raises:
         InputError: if no such degrees are found within the limits; this proves nothing about the map.

@@ -40,13 +40,13 @@ MAX_PRODUCTS = 20_000_000  # products of terms to expand one side: some ten seco
 
 @dataclass
 class Limits:
-    """`multiple` is the factor of MAX_TERMS and MAX_PRODUCTS, `terms` the number of terms of all sides so far."""
+    """`multiple` is a factor for MAX_TERMS and MAX_PRODUCTS, `terms` counts the terms of all sides checked so far."""
 
     multiple: float = 1.0
     terms: int = 0
 
 
-_LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039  # terms count within `limited` only
+_LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039  # terms count in `limited` only
 
 
 @contextmanager
@@ -154,7 +154,7 @@ class MapData:
         return at_x, at_image
 
     def with_rows(self, rows: Sequence[Row]) -> MapData:
-        """Return the map in the same variables with the equation M x~ = r, given the rows of (M | -r)."""
+        """Return another map in the same variables: `rows` are those of (M | -r) in its equation M x~ = r."""
         return map_data([[*row[:-1], -row[-1]] for row in rows], self.variables, self.new, self.names)
 
     def _solve(self, right_side: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:

@@ -50,7 +50,7 @@ class _Script:
 
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
-        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are defined by the script itself
+        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # the script itself defines a11, e1, ...
         # `xs`, `ys`, `zs` are the letters of x, its image y and the image z of y; `x`, `y`, `z` join them by blanks.
         self.xs = [self.letters[name] for name in data.variables]
         self.ys = [self.letters[name] for name in data.new]
@@ -68,7 +68,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """Return texts of det(M) x~_i: if `at_n` the names n1, ..., else products that Cramer's rule makes n1, ..."""
+        """Return det(M) x~_1, ... as texts: n1, ... if `at_n`, else products that Cramer's rule turns into n1, ..."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.ys)]
 
     @property
@@ -82,7 +82,7 @@ class _Script:
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
-        """Define the equation of the map as a relation between arbitrary points, with the residuals e1, e2, ..."""
+        """Define the relation M x~ - r = 0 between points x and x~, and the entries e1, e2, ... of its left side."""
         rows, arguments = (data or self.data).rows, " ".join([*self.xs, *self.ys])
         lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
         for i, row in enumerate(rows):
@@ -594,8 +594,8 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
         claims: the statements to be proved, each in a section of its own.
         header: the lines of the initial comment.
     """
-    # Nothing in a comment may end it, or begin another one or a string.
-    # Commands quote ' as '"'"', which is written without the quotation marks of strings.
+    # A header line must not end the comment, or begin a comment or a string. Commands quote ' as '"'"', which is
+    # written here without the quotation marks.
     unquoted_lines = (line.replace("'\"'\"'", "'\\''").replace('"', "'") for line in header)
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )") for line in unquoted_lines)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]

@@ -1,9 +1,9 @@
 """Certificates for PARI/GP and for SymPy: each identity is expanded, and `true` is printed if it holds.
 
 The map is given by M(x) x~ = r(x). The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D
-if det M is not 0. That a polynomial P of degree k satisfies P(x~) = P C/D^k, for instance, is the identity
-D^k P(N/D) = C P of polynomials, and the script computes both sides. It ends with status 1 if an identity does not hold.
-Both languages get functions with the same names, so that the text of the checks differs only in the notation of powers.
+if det M is not 0. For instance, P(x~) = P C/D^k for a polynomial P of degree k means that the polynomials D^k P(N/D)
+and C P are equal; the script computes both. The script ends with status 1 if an identity does not hold. Both languages
+get functions with the same names, so that the text of the checks differs only in the notation of powers.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def new(
     """Return a random member of the family.
 
     Args:
-        m: half the dimension; A then has random integer eigenvalues, or a random chi if `generic` is True.
+        m: half the dimension; the matrix A then has random integer eigenvalues, or a random chi if `generic` is True.
         eigenvalues: the eigenvalues of A, m exact numbers.
         chi: the polynomial with det(t - A) = chi(t)^2, as text such as "(t - 1)*(t^2 - 2)".
         size: a bound for the random integer coefficients of the cubic in the normal form.

@@ -1,8 +1,8 @@
 """Members of the family and their associated systems.
 
-For signs s, the matrix B_s is the polynomial in A that acts as s_i on the part of A belonging to the i-th irreducible
-factor of chi. Then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps of associated
-systems commute. Source: petrera-suris-2016, Sect. 5; for every m and any chi, docs/mathematics.md.
+Let chi^2 = det(t - A), chi the product of irreducible p_i^e_i, and f_0 = J grad H. For signs s, the polynomial B_s in A
+acts as s_i on the kernel of p_i(A)^e_i. Then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H.
+The Kahan maps of all f_s commute. Source: petrera-suris-2016, Sect. 5; for every m and chi, docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 @dataclass(frozen=True, eq=False)
 class AssociatedSystem(HtmlDisplay, ResultPart):
-    """An associated system f_s = B^T f_0 = J grad K: the signs, B, its coefficients as polynomial in A, the cubic K."""
+    """An associated system f_s = B^T f_0 = J grad K: signs s, matrix B, coefficients of B in powers of A, cubic K."""
 
     signs: tuple[int, ...]
     coefficients: tuple[fmpq, ...]
@@ -58,7 +58,7 @@ class AssociatedSystem(HtmlDisplay, ResultPart):
 
 @dataclass(frozen=True, eq=False)
 class ConjugateAssociate:
-    """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at the `root` of g.
+    """An associated system over Q[t]/g whose signs agree at all roots of each factor of chi, except at one `root` of g.
 
     For the `coefficients` c_i in Q[t]/g, B is the sum of c_i A^i, and K is the sum of c_i H_i over the `chain` of H.
     """
@@ -180,7 +180,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
     @cached_property
     def roots(self) -> dict[int, Root]:
-        """One root of each factor with degree at least 2 and multiplicity 1, by the index of the factor."""
+        """One root of each factor of degree at least 2 and multiplicity 1, as {index of the factor: root}."""
         factors = enumerate(self.factors)
         return {k: Root(f.polynomial) for k, f in factors if f.multiplicity == 1 and 2 <= f.degree <= MAX_DEGREE}
 
@@ -189,7 +189,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
         There is one over Q[t]/g for every such g with multiplicity 1 and every choice of the signs at the remaining
         factors, up to an overall sign. Its matrix B has one conjugate for each root of g; the product of two conjugates
-        has opposite signs at both roots. If chi has no repeated root, these B and the rational B_s generate all B_s.
+        changes the signs at both roots. If chi has no repeated root, these B and the rational B_s generate all B_s.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
@@ -198,7 +198,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():
-            quotient = [root.number_field.one]  # the coefficients of chi(x)/(x - t), leading one first
+            quotient = [root.number_field.one]  # the coefficients of chi(x)/(x - t), leading coefficient first
             for c in chi(self.A).coeffs()[-2:0:-1]:
                 quotient.append(quotient[-1] * root.number_field.generator + c)
             value_at_root = sum(
@@ -238,7 +238,7 @@ class FamilyMember(HtmlDisplay, ResultPart):
 
 
 def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
-    """Return the polynomial of degree < m that is the i-th sign modulo the i-th factor to its multiplicity.
+    """Return the polynomial of degree < m that is s_i modulo p_i^e_i, for factors p_i of multiplicity e_i, signs s_i.
 
     Its square is 1 modulo chi, and chi(A) = 0. So B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
     even if chi has repeated roots.

@@ -1,6 +1,6 @@
 """The cubics that belong to a skew-Hamiltonian A: A (Hess H) = (Hess H) A^T.
 
-They form a vector space, of dimension 4m for generic A, and come in chains: grad H_i = A grad H_{i-1}.
+They form a vector space, of dimension 4m for generic A. Each H = H_0 starts a chain: grad H_i = A grad H_{i-1}.
 Source: petrera-suris-2016, eqs. (d2H), (grad K), (grad L) and the proposition on dimension 12 for m = 3.
 """
 
@@ -23,7 +23,7 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 class CubicSpace:
     """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    `basis`: primitive integer cubics; `unknowns`: number of monomials; `rank`: of the linear system; `expected`: 4m.
+    `basis` has primitive integer cubics, `unknowns` and `rank` belong to the linear system, `expected` is 4m.
     """
 
     basis: tuple[fmpq_mpoly, ...]
@@ -59,7 +59,7 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     zero = fmpq(0)
     coefficients: list[fmpq] = []
     equation_count = 0
-    # The matrix A Hess - Hess A^T is skew and linear in x: it gives one equation for each i < j and each variable x_l.
+    # A Hess(H) - Hess(H) A^T is skew and linear in x: it gives one equation for each entry i < j and each variable x_l.
     for i in range(n):
         for j in range(i + 1, n):
             for l in range(n):
@@ -133,7 +133,7 @@ def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
 
 
 def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq, fmpq]]:
-    """Yield (i, j, l, a, b) if A T_l has the entry a and T_l A^T another entry b at (i, j); T_l = d(Hess H)/dx_l."""
+    """Yield all (i, j, l, a, b) with the entries a of A T_l and b != a of T_l A^T at (i, j); T_l = d(Hess H)/dx_l."""
     n = A.nrows()
     for l, T in enumerate(third_derivatives(H)):
         left = A * T

@@ -1,17 +1,17 @@
 """The normal form of a member: one planar cubic over the algebra K = Q[t]/chi, for every chi without repeated roots.
 
-f' commutes with A^T, so Q^{2m} is a free K-module of rank 2, with t acting as A^T. For a basis e1, e2 let S have the
-columns e1, A^T e1, ..., (A^T)^{m-1} e1, e2, A^T e2, ...; then x = S z, and z contains the coefficients of two elements
-X, Y of K. Let l(a) be the coefficient of t^(m-1) in a. Since A^T is self-adjoint for J, x^T J y = l(W(x, y)) for one
+Q^{2m} is a free K-module of rank 2 with t acting as A^T; f'(x) is K-linear. For a basis e1, e2 let S have the columns
+e1, A^T e1, ..., (A^T)^{m-1} e1, e2, A^T e2, ...; then x = S z, where z contains the coefficients of two elements X, Y
+of K. Let l(a) be the coefficient of t^(m-1) in a. Since A^T is self-adjoint for J, x^T J y = l(W(x, y)) for one
 K-bilinear alternating W; e1 and e2 are chosen with W(e1, e2) = 1. Likewise, H(x) = l(h(X, Y)) for one binary cubic
 h = a X^3 + b X^2 Y + c X Y^2 + d Y^3 over K. The system x' = J grad H(x) becomes X' = dh/dY, Y' = -dh/dX, and its Kahan
-map, with the Hessian determinant D = h_XX h_YY - h_XY^2,
+map is, with the Hessian determinant D = h_XX h_YY - h_XY^2,
 
     X~ = (X + 2 eps dh/dY) / (1 + eps^2 D(X, Y)),     Y~ = (Y - 2 eps dh/dX) / (1 + eps^2 D(X, Y)).
 
 At a rational root r of chi, X, Y and h have the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a separate
 planar system over Q. If chi splits, there are m such systems, and H is the sum of h_r(u, v)/chi'(r), since l(a) is the
-sum of a(r)/chi'(r) (Euler, Jacobi). Elements of K are polynomials of degree < m.
+sum of a(r)/chi'(r) (Euler, Jacobi). Elements of K are stored as polynomials of degree < m.
 """
 
 from __future__ import annotations
@@ -287,7 +287,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
         vectors = [fmpq_mat(n, 1, columns[0]), fmpq_mat(n, 1, columns[m])]
         hessians = [combination_of(columns[0], tensors), combination_of(columns[m], tensors)]
         elements = []
-        # From l(t^k 6a) = H'''(t^k e1, e1, e1), l(t^k 2b) = H'''(t^k e1, e1, e2), and so on.
+        # The coefficients of h follow from l(t^k 6a) = H'''(t^k e1, e1, e1), l(t^k 2b) = H'''(t^k e1, e1, e2), ...
         for divisor, i, j, k in ((6, 0, 0, 0), (2, 0, 0, 1), (2, 0, 1, 1), (6, 1, 1, 1)):
             values = (krylov_rows[i] * (hessians[j] * vectors[k])).entries()
             products = (value * element for value, element in zip(values, dual_basis, strict=True))
@@ -301,10 +301,10 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """For each unit vector, add small multiples of few others until it generates a free K-module; yield the sum.
+    """Yield, for each unit vector, its sum with small multiples of a few others that generates a free K-module.
 
-    For all but at most m numbers c, v + c w generates the largest module that two vectors v and w allow: on the part
-    that belongs to an irreducible factor of chi, K acts as a field, and at most one c fails.
+    For all but at most m numbers c, v + c w generates a module of the largest dimension that v and w allow: K acts as a
+    field on the kernel of p(A^T) for each irreducible factor p of chi, where at most one c fails.
     """
     n = t.nrows()
     m = n // 2
@@ -325,9 +325,9 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
 def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
-    The integer vectors (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank
-    m. The weights exceed the bounds of LLL for short vectors of both lattices. So the first m vectors of a reduced
-    basis have s = 0, and the next vector has the least s > 0, up to sign; then e2 = y/s.
+    The integer vectors (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1; those with s = 0 form a
+    lattice of rank m. By the bounds of LLL, the weights of s and of the equations are so large that the first m vectors
+    of a reduced basis have s = 0 and the next vector has the least s > 0, up to sign; then e2 = y/s.
     """
     n = t.nrows()
     m = n // 2

@@ -1,9 +1,9 @@
 """Random members of the family, reproducible from a seed.
 
 In the normal form, A = diag(W^T, W) with W = diag(eigenvalues) or W the companion matrix of chi, and the cubics of A
-are known explicitly. In the first case they are sums of planar cubics; in the second case they are the coefficients of
-t^(m-1) in cubic forms over Q[t]/chi in X = q_1 + q_2 t + ... and Y, with coordinates p_i in the dual basis. A random
-symplectic integer matrix transforms the normal form, so that all numbers are small integers for every m.
+are known explicitly. In the first case they are sums of planar cubics. In the second case they are the coefficients of
+t^(m-1) in cubic forms over Q[t]/chi in X and Y; X = q_1 + q_2 t + ..., and Y has the coordinates p_i in the dual basis.
+A random symplectic integer matrix transforms the normal form, so that all numbers are small integers for every m.
 """
 
 from __future__ import annotations

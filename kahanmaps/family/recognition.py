@@ -5,9 +5,9 @@ x' = J grad H(x), with a homogeneous cubic H and a constant invertible skew J, b
     A^T J = J A   and   A Hess(H) = Hess(H) A^T.
 
 These are linear conditions on the skew matrix S = J A: S T_l J is symmetric for each l, where T_l is the derivative of
-Hess(H) along x_l. The multiples of I are always solutions. If H depends on all variables, the solutions form a
-commutative algebra, whose factors give the finest splitting of H. Otherwise solutions need not commute, and idempotents
-are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
+Hess(H) along x_l. The multiples of I are always solutions. If H depends on all variables, the solutions A form a
+commutative algebra, whose primitive idempotents give the finest splitting of H. Otherwise solutions need not commute,
+and idempotents are split one after the other. docs/mathematics.md, "Hidden members", has the proofs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns in dimension n
 _DRAWS = 24  # number of random combinations of a basis that are tried besides the basis itself
-_TRIAL_DIVISION = 1000  # limit of the trial divisions of a gcd
+_TRIAL_DIVISION = 1000  # number of primes by which a gcd is divided
 _T = fmpq_poly([0, 1])
 
 
@@ -62,7 +62,7 @@ class FamilyStructure(ResultPart):
 
     @cached_property
     def A(self) -> fmpq_mat:
-        """The matrix A in the coordinates x: T^{-T} A_y T^T."""
+        """The matrix A in the coordinates x, T^{-T} A_y T^T for the matrix A_y of `member`."""
         return self.T.inv().transpose() * self.member.A * self.T.transpose()
 
     @property
@@ -152,12 +152,12 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
 
 
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
-    """Search for a matrix A that makes the system a member of the family, with as many distinct roots as possible.
+    """Search for an A that makes the system a member of the family, with as many distinct eigenvalues as possible.
 
     Returns None if H is not a homogeneous cubic, J is not invertible, or only multiples of I satisfy A Hess(H) =
     Hess(H) A^T. (In dimension 2 the result is A = I for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
-    r. The member is verified exactly. If H depends on all variables, no A has more distinct roots (proved). Otherwise
-    this is not proved, since only some combinations of solutions A are tried.
+    r. The member is verified exactly. If H depends on all variables, no A has more distinct eigenvalues (proved).
+    Otherwise this is not proved, since only some combinations of solutions A are tried.
 
     Raises InputError above dimension 32.
 
@@ -206,7 +206,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
-    """Return H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if no such H exists.
+    """Return the H without constant term with x' = J grad H for J = [[0, I], [-I, 0]]; None if no such H exists.
 
     The result is exact. Other structures J are not tried.
 
@@ -275,9 +275,9 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
 
 @dataclass(frozen=True)
 class _Block:
-    """An idempotent E of the space, not split further, and X = E X E, which is zero, nilpotent, or generates a field.
+    """An idempotent E in the space of matrices A, not split further, and X = E X E, nilpotent or generating a field.
 
-    The distinct roots of X on the image of E are the roots of `factor`, which is t if X is zero or nilpotent.
+    The distinct eigenvalues of X on the image of E are the roots of `factor`, which is t if X is nilpotent.
     """
 
     E: fmpq_mat
@@ -299,7 +299,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
     if len(block_basis) == 1:
         yield _Block(E, E * 0, _T)
         return
-    # In a commutative algebra, the rank of the form tr(X Y) is the number of distinct roots of a generic element.
+    # In a commutative algebra, the rank of the form tr(X Y) is the number of distinct eigenvalues of a generic element.
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(block_basis, 2))
     rows, rows_of_transposes = (
         fmpq_mat([M.entries() for M in matrices]) for matrices in (block_basis, [X.transpose() for X in block_basis])
@@ -307,7 +307,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
     target_degree = rank(QQ, rows * rows_of_transposes.transpose()) if is_commutative else 0
     candidates: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     rng = random.Random(len(block_basis))
-    # First the basis is tried, then random combinations of it, with coefficients that grow slowly.
+    # First the elements of the basis are tried, then random combinations of them with slowly growing coefficients.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
     combinations = (combination_of([rng.randint(-bound, bound) for _ in block_basis], block_basis) for bound in bounds)
     for index, X in enumerate(itertools.chain(block_basis, combinations)):
@@ -330,7 +330,7 @@ def _split_idempotent(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Block
 
 
 def _split_by_factors(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
-    """Return the idempotents into which X = E X E splits E, one for each irreducible factor; E if there is only one."""
+    """Split E into idempotents by X = E X E, one for each irreducible factor of X on the image of E; [E] for one."""
     factors = _factors_on_image(X, E)
     if len(factors) == 1:
         return [E]
@@ -352,7 +352,7 @@ def _factors_on_image(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
 
 
 def _equivalent_generators(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
-    """Yield X and Y = (X - a E)/b, each with its irreducible polynomial; integers a, b keep that of Y integral."""
+    """Yield X, then Y = (X - a E)/b, each with its irreducible polynomial; integer coefficients stay integral."""
     yield X, polynomial
     d = polynomial.degree()
     if d == 1:

@@ -144,7 +144,7 @@ def diagnosis(A: fmpq_mat) -> str:
 
 
 def minimal_degree(A: fmpq_mat) -> int:
-    """Return the degree of the minimal polynomial of A; it is m, or less if A is derogatory.
+    """Return the degree of the minimal polynomial of A, at most m; A is called derogatory if it is less than m.
 
     >>> minimal_degree(fmpq_mat([[3, 0], [0, 3]]))
     1
@@ -216,7 +216,7 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
 
 
 def bits_of(number: fmpq) -> int:
-    """Return the bit length of a rational number: 1 for the number 1, and 0 for 0."""
+    """Return the bits of numerator and denominator together, minus 1: the result is 1 for 1, and 0 for 0."""
     return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
 
 

@@ -1,4 +1,4 @@
-"""The normal form of a system, which makes orbits fast and gives the n-th iterate directly.
+"""The normal form of a system, for fast orbits and for the n-th iterate without the iterates before it.
 
 A member of the family has a normal form if chi has no repeated root. A system that is not declared as a member is
 recognized as a member if linear algebra finds a matrix A for its Hamiltonian (recognition.py).
@@ -25,7 +25,7 @@ _MAX_DIMENSION = 32  # largest dimension in which a normal form is searched for
 
 @dataclass(frozen=True, eq=False)
 class SystemNormalForm(ResultPart):
-    """The normal form `form` of a system, with x = T S z for a point x and its matrix S; `T` is None if T = I.
+    """The normal form `form` of a system in coordinates z: x = T S z with the matrix S of `form`; `T` is None if T = I.
 
     `declared` says whether the system was given as a member of the family; `text` describes its membership.
     """

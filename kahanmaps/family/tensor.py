@@ -1,7 +1,7 @@
 """Systems over an algebra K = Q[t]/(chi) as systems over Q, and the search for such a structure.
 
 A quadratic system in n variables over K is a system in n m variables over Q, m = deg chi: each variable is written as
-x = x_0 + x_1 t + .... Its Kahan map is the Kahan map over K and inherits the properties of this map, even if chi has
+x = x_0 + x_1 t + .... The Kahan map of this system is the Kahan map over K and inherits its properties, even if chi has
 repeated roots: docs/mathematics.md, "The tensor theorem". A system over Q arises in this way if and only if there is a
 matrix C that commutes with f'(x) for all x and makes Q^(n m) a free module over Q[C].
 """
@@ -221,7 +221,7 @@ def components(
 
 
 def _as_matrices(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:
-    """Return (F, P, Q): P and Q are multiplication on K by numerator and denominator, matrices over the field F."""
+    """Return (F, P, Q): P, Q are the matrices over the field F of multiplication by numerator and denominator on K."""
     m = int(chi.degree())
     variables = split_names(function.names[:-1], m)
     names = (*variables, "eps")

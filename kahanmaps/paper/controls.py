@@ -1,4 +1,4 @@
-"""Negative controls: input that violates exactly one hypothesis; the claims that need this hypothesis must fail.
+"""Negative controls: objects that violate exactly one hypothesis, so that the claims that need it must fail.
 
 A control takes the paper's objects and returns them with one random change. A claim names the controls that must refute
 it; a claim that no control can refute would check nothing.
@@ -80,7 +80,7 @@ CONTROLS: dict[str, Control] = {
     # Add v_1 times a random matrix to f'' v.
     "f''": Control("f'' is not the derivative of f'", lambda o: o.replace(error_of_second=_random_rank_1_matrix(o))),
     "B": Control("B^2 = I fails: B_i(lambda_i) = 2", broken_B),
-    # Set B_i(lambda_i) = 1: then every B_i is I, and all associated systems are f.
+    # Set B_i(lambda_i) = 1: then every B_i is I, and every associated system is f.
     "B=I": Control(
         "all B_i are I", lambda o: o.replace(B_at_root=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
     ),
@@ -93,7 +93,7 @@ CONTROLS: dict[str, Control] = {
         lambda o: o.replace(roots=tuple(root + o.scalar(f"break {i}") for i, root in enumerate(o.lam))),
     ),
     "repeated": Control("chi has a repeated root", repeated_root, least_m=2),
-    # A := B_1, so that H_1 is associated to H_0.
+    # With A = B_1, H_1 is the Hamilton function of a field associated to f_0.
     "A=B": Control("A itself has A^2 = I", lambda o: o.replace(A=o.B(0)), least_m=2),
     "H0": Control("H = 0", lambda o: o.replace(d3H=o.zeros(o.n * o.n, o.n), base=None)),
     "linear": Control("f is linear", linear_f),

@@ -1,9 +1,9 @@
 """Formal proofs of the facts (5)-(12), which hold for every quadratic f and every cubic H in every dimension.
 
-A proof in coordinates would have too many of them in dimension 6. The facts follow without coordinates from a few
-identities between multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any symmetric
-trilinear form and J any skew matrix. Each function yields the pairs of expressions that have to be equal;
-docs/mathematics.md, "Formal proofs", says how the claims follow from them.
+In dimension 6, a proof in coordinates would need too many indeterminates. The facts follow without coordinates from a
+few identities between multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any
+symmetric trilinear form and J any skew matrix. Each function yields the pairs of expressions that have to be equal;
+docs/mathematics.md, "Formal proofs", says how the claims follow from these identities.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly
 
-# A term is a letter, ("x",), or a map of terms, ("Q", ("x",), ("y",)); a word is a product of letters, ("J", "S").
+# A term is a letter, ("x",), or a map applied to terms, ("Q", ("x",), ("y",)), or a word of letters, ("J", "S").
 Term = tuple[Any, ...]
 Scalar = fmpq_poly  # a polynomial in eps
 Pairs = Iterator[tuple["Expression", "Expression"]]
@@ -46,7 +46,7 @@ class Expression:
     __rmul__ = __mul__
 
     def times(self, other: Expression) -> Expression:
-        """Return the product of two combinations of words; the product of two words joins them."""
+        """Return the product of two linear combinations of words; the product of two words is their concatenation."""
         pairs = product(self.coefficients.items(), other.coefficients.items())
         return combine([(left + right, a * b) for (left, a), (right, b) in pairs])
 
@@ -66,7 +66,7 @@ def letter(name: str) -> Expression:
 
 @dataclass(frozen=True)
 class Multilinear:
-    """A multilinear map of which only the symmetry is known: 1 means symmetric, -1 skew, 0 none."""
+    """A multilinear map of which only `symmetry` is known: 1 means symmetric, -1 skew-symmetric, 0 neither."""
 
     name: str
     symmetry: int = 0
@@ -163,8 +163,8 @@ def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -
 def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:
     """Yield the identities that imply (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
 
-    Transposition gives det(I + eps J S) = det(I - eps S J). Two products of block matrices, with factors of determinant
-    1 on one side, show that det(I - eps S J) = det(I - eps J S).
+    Transposition gives det(I + eps J S) = det(I - eps S J). The products of one block matrix with a shear, in both
+    orders, are block triangular with determinants det(I - eps S J) and det(I - eps J S), which are hence equal.
     """
     one, zero = Expression({(): fmpq_poly([1])}), Expression({})
     J, S = letter("J"), letter("S")

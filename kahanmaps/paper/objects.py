@@ -1,4 +1,4 @@
-"""The objects that the paper denotes by letters, at a point x over a field; claims are functions of these objects.
+"""The objects that the paper denotes by letters, at a point x over a field K; claims are functions of the objects.
 
 The notation is that of the paper: A, J, H (with the chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated
 g and K, x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`: the rationals, GF(p), rational
@@ -51,8 +51,8 @@ class PaperObjects:
 
     `d3H` are the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw` gives
     x and other vectors by name (random at a point, indeterminate in a proof). `step_eps` is the eps of the maps;
-    `B_at_root` is the value of B_i at lambda_i. Controls change these two, `method` (to the explicit Euler method),
-    and `error_of_second`, an error of the tensor f''.
+    `B_at_root` is the value of B_i at lambda_i. Controls change `step_eps`, `B_at_root`, `method` (to the explicit
+    Euler method), and `error_of_second`, an error of f''.
 
     A method whose name ends with an underscore takes the paper's index: `f_i(i)` is f_i, and `H_tilde_(i, x)` is H~_i.
     """
@@ -77,7 +77,7 @@ class PaperObjects:
     associate_matrices: tuple[Any, ...] | None = None  # their matrices B, if given without the roots of chi
     indices_to_test: tuple[int, ...] | None = None  # indices i for which a claim "for all i" is tested; None: all
     order: int = 3  # order in eps^2 up to which series are expanded
-    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 of lower terms of H
+    lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient at 0 of the terms added to H
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi in K, constant term first
     varied: bool = True  # whether variations are applied; False for the control
 
@@ -116,7 +116,7 @@ class PaperObjects:
         return self.vector("x")
 
     def vector(self, name: str) -> Any:
-        """Return the independent vector with this name: the point x, another point, or a direction."""
+        """Return the vector with this name, independent of others: the point x, another point, or a direction."""
         if name not in self._cache:
             self.used.add(name)
             self._cache[name] = self.draw(name)
@@ -130,7 +130,7 @@ class PaperObjects:
                 del self._cache[key]
 
     def scalar(self, name: str) -> Any:
-        """Return an independent number with this name."""
+        """Return the number with this name, independent of others."""
         return self.vector(name)[0, 0]
 
     @cache_by_id
@@ -388,7 +388,7 @@ class PaperObjects:
         return product
 
     def associates(self) -> Iterator[Any]:
-        """Yield the matrices B of the associated systems J B nabla H_0, one of B and -B, without I."""
+        """Yield the matrices B of the associated systems J B nabla H_0: one of each pair B, -B, except for I, -I."""
         if self.associate_matrices is not None:
             yield from self.associate_matrices
             return
@@ -660,8 +660,8 @@ class PaperObjects:
     def symplectic_normal_form(self) -> tuple[Any, Any]:
         """Return S and the companion matrix W of chi, for which A S = S diag(W, W^T) and S^T J S = J.
 
-        A is self-adjoint for the form u^T J w. Hence e, A e, ..., A^{m-1} e span an isotropic space, and so do h, A h,
-        ..., from whose span the basis dual to e, A e, ... is taken.
+        A is self-adjoint for the form u^T J w. Hence e, A e, ..., A^{m-1} e span an isotropic space for any vector e.
+        The basis dual to e, A e, ... is taken from the isotropic space spanned by h, A h, ... for another vector h.
         """
         m, K = self.m, self.K
         e, h = self.vector("e"), self.vector("h")
@@ -700,8 +700,7 @@ class PaperObjects:
         rows = []
         for a, b, c in itertools.combinations_with_replacement(range(n), 3):
             row = [K.zero] * (n * len(index_of_pair))
-            # The Hesse matrix of x_a x_b x_c contains x_l in the entries (j, k) and (k, j), where {j, k, l} = {a, b,
-            # c}.
+            # The entries (j, k) and (k, j) of the Hesse matrix of x_a x_b x_c contain x_l for {j, k, l} = {a, b, c}.
             for j, k, l in set(itertools.permutations((a, b, c))):
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # add A_ij to entry (i, k) of A nabla^2 H and to entry (k, i) of nabla^2 H A^T

@@ -6,8 +6,7 @@ points over GF(p), at exact points over Q, over rational functions (a proof), ov
 balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the file of its section,
 with a title and a formula as its docstring.
 
-Formulas are printed for every m for which the statement makes sense. If the paper states a formula for m = 3 only, the
-general formula reduces to it.
+The formulas hold for general m. If the paper states a formula for m = 3 only, the general formula reduces to it.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ class ClaimKind(StrEnum):
 
     EQUAL = "equal"  # both sides are equal at all points
     DIFFERENT = "different"  # each pair differs at some point: one point for all pairs is a proof
-    # The maximal rank of the left side is the right side. One point over Q or GF(p) proves "not smaller", since
-    # ranks do not grow modulo p; "not larger" needs a reason (`at_most`).
+    # The maximum of the left side, a rank, is the right side. One point over Q or GF(p) proves that it is not smaller,
+    # since ranks do not grow modulo p; that it is not larger needs a reason (`at_most`).
     ATTAINED = "attained"
     EXISTS = "exists"  # both sides are equal for some choice of the free vectors: one point over Q is a proof
 
@@ -74,16 +73,16 @@ class Claim:
     at_most: str = ""  # for a claim that a rank is attained: why the rank cannot be larger
     least_m: int = 1
     only_m: int | None = None
-    in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing
-    distinct_roots: bool = False  # needs distinct roots, as all claims that contain the roots
+    in_general: bool = False  # stated for generic A and H: a special member for which it fails does not refute it
+    distinct_roots: bool = False  # needs distinct roots, as do all claims that contain the roots
     # A claim about a product of planar systems follows from the same claim about one block (blockwise) or about any
     # two blocks (pairwise); docs/mathematics.md gives the reason, and lists these claims.
     blockwise: bool = False
     pairwise: bool = False
     symplectic: bool = True  # invariant under symplectic changes of coordinates and extensions of the field
-    theorem: str = ""  # a theorem that proves it without expansion; its hypotheses hold by construction
+    theorem: str = ""  # a theorem that proves the claim without expansion, with hypotheses that hold by construction
     formal: Callable[[], Pairs] | None = None  # identities of formal_proofs.py that prove it in every dimension
-    certified: str = ""  # the names of its claims in `certificate`, with {} for 0, ..., m - 1
+    certified: str = ""  # the claims of `certificate` that prove it, by name; {} stands for 0, ..., m - 1
     statement: str = ""  # for a claim tested for several variations: the statement, and the variation
     variation: str = ""
     misprint: str = ""  # if not empty: why the formula, quoted as printed, is wrong
@@ -188,10 +187,10 @@ def outcomes(
     points: Iterable[PaperObjects | None],
     change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
 ) -> Iterator[ClaimOutcome]:
-    """Yield the outcomes of a claim at the points after `change`, except those at which the claim is undefined."""
+    """Yield the outcomes of a claim for `change` of each point, except those for which the claim is undefined."""
     for objects in points:
         if objects is not None:
-            with suppress(*UNDEFINED, LookupError):  # LookupError: the roots of chi are needed but not in K
+            with suppress(*UNDEFINED, LookupError):  # LookupError: the claim needs the roots of chi, which are not in K
                 yield evaluate(claim, change(objects))
 
 

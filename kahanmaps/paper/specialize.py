@@ -36,7 +36,7 @@ from kahanmaps.systems.quadratic import SystemOver
 Draw = Callable[[str], Any]
 
 _SHEAR_COUNT = 5  # symmetric shears, alternately upper and lower: products of 5 give every symplectic matrix
-# If there are more sign vectors, a sample is tested: those with one sign -1, and random ones.
+# If there are more sign vectors than this, a sample is tested: those with one sign -1, and random ones.
 MAX_SIGN_VECTORS = 32
 
 
@@ -180,8 +180,8 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
             shear[position], inverse_shear[position] = value, -value
         S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, inverse_shear) * S_inverse
     A, d3H = _normal_form(K, roots, cubics)
-    # x = S z: A becomes S^{-T} A S^T, and S^{-1} acts on each of the three indices of the third derivatives: on the
-    # last index, which then becomes the first, three times.
+    # x = S z: A becomes S^{-T} A S^T, and S^{-1} acts on each of the three indices of the third derivatives. The loop
+    # applies it three times to the last index, which then becomes the first.
     for _ in range(3):
         d3H = K.matrix(n * n, n, (d3H * S_inverse).transpose().entries())
     eps = _random_nonzero(K, rng)
@@ -198,9 +198,9 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
     """Return the normal form with indeterminate roots, planar cubics, eps, and vectors with the names `vectors`.
 
-    A change of determinant 1 of each block moves the point to (u, v) = (1, 0) and makes the coefficient of u^2 v in h
-    vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated, since the system stands for
-    one block of a larger system.
+    In each block, a linear change of coordinates of determinant 1 moves the point to (u, v) = (1, 0) and makes the
+    coefficient of u^2 v in the cubic h vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as
+    associated, since the system stands for one block of a larger system.
     """
     n = 2 * m
     lower_letters = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
@@ -224,7 +224,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
             return K.column([K.one] * m + [K.zero] * m)
         return K.column([by_name[symbol] for symbol in symbols[name]])
 
-    # Blocks may be permuted, and signs act block by block: sign vectors with -1 on the first blocks represent all.
+    # Permutations of the blocks permute the signs: sign vectors with -1 on the first blocks represent all sign vectors.
     signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
     objects = PaperObjects(
         K=K,
@@ -313,7 +313,7 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
     n = member.dim
     chi = chi_of(member.A)
     if rational_roots(member) is None:
-        # If d is the common denominator of chi, d times a root is an algebraic integer; Cauchy's bound bounds all its
+        # If d is the common denominator of chi, d times a root is an algebraic integer. Cauchy's bound holds for all
         # conjugates.
         denominator = chi.denom()
         root_bound = denominator * (2 + max(abs(chi[k]) for k in range(member.m)))
@@ -336,7 +336,7 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
     """Return objects of degree bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m
-    # The shears have entries of degree 1, so entries of S and S^{-1} have degree 5: each is a sum of m^4 monomials.
+    # The shears have entries of degree 1, so entries of S and S^{-1} are sums of m^4 monomials of degree 5.
     S = K.polynomial(_SHEAR_COUNT, (_SHEAR_COUNT - 1) * math.log2(m) + _SHEAR_COUNT)
     root, coefficient = K.variable(), K.variable()
     A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
@@ -394,5 +394,5 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
 
 
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
-    """Return the two sign vectors with the most factors B_i: bounds for them hold for all pairs; None for m = 1."""
+    """Return the two sign vectors with the most factors B_i: bounds for these hold for all pairs; None for m = 1."""
     return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))

@@ -1,7 +1,7 @@
 """Variations of the hypotheses of the paper: other H, J, A or time steps.
 
-Like a control, a variation takes the paper's objects and returns changed objects; but statements may hold or fail for
-them. With `varied=False` the objects are not changed, which is the control for statements that fail.
+Like a control, a variation takes the paper's objects and returns changed objects, but a statement may hold or fail for
+the changed objects. With `varied=False` the objects are not changed, which is the control for statements that fail.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
     S, _ = o.symplectic_normal_form()
     A = -(S * o.block_diagonal(o.companion(chi)) * o.J * S.transpose() * o.J)
     p = o.replace(A=A, known_chi=chi, base=None, draw=o.vector)
-    # H is a sum of l(M_a(x)^3), a cubic of A: the functional l on Q[t]/chi makes t^k and C_k(t) dual bases.
+    # H is a sum of cubics l(M_a(x)^3) of A; t^k and C_k(t) are dual bases for the functional l on Q[t]/chi.
     terms = []
     for name in ("d1", "d2", "d3"):
         powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]

@@ -70,8 +70,8 @@ from kahanmaps.version import __version__
 MAX_M = 8  # largest m, half the dimension
 # Maximal number of products of terms in a proof: enough for all claims up to m = 6; at m = 8 a few claims exceed it.
 PROOF_BUDGET = 50_000_000
-_MAX_INDETERMINATES = 64  # in a proof for one member
-_MAX_UNDEFINED = 40  # points at which a claim is undefined, before it is given up
+_MAX_INDETERMINATES = 64  # maximal number of indeterminates in a proof for one member
+_MAX_UNDEFINED = 40  # after so many points at which it is undefined, a claim is given up
 _POINT_COUNT = 4  # number of points for statements that objects differ or have full rank
 _MIN_LARGE_M = 5  # for m >= 5, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
@@ -119,16 +119,16 @@ def verify(
     """Verify all claims of the paper, for a member of the family or for the generic member.
 
     Args:
-        system: a member of the family, with m at most 8; None for the generic member. settings: eps (None: every eps,
-            an indeterminate), the seed and the error bound. options: the claims to be verified, and the method. m: half
-            the dimension of the generic member, 1 to 8. Its roots, cubics, coordinates, x and eps are random over
-            GF(p), and the error bound is for the probability that a claim is false for the generic member. A claim that
-            is also proved in normal form is `proved`, for every member with distinct roots. eps: half the time step, an
-            exact number that replaces the eps of the settings; not for the generic member. time_step, h: the time step
-            2 eps, instead of eps.
+        system: a member of the family, with m at most 8; None for the generic member.
+        settings: eps (None: every eps, an indeterminate), the random seed and the error bound.
+        options: the sections to be verified, the order of series, complex balls, and whether controls are evaluated.
+        m: half the dimension of the generic member, 1 to 8, with random data over GF(p). The error bound is for the
+            probability that a claim is false for it; a claim proved in normal form holds if the roots are distinct.
+        eps: half the time step, an exact number that replaces the eps of the settings; not for the generic member.
+        time_step, h: the time step 2 eps, instead of eps.
 
     Returns:
-        A `Report` with one `Finding` for each claim, in the order of the paper. All but `supported` claims are exact.
+        A `Report` with one `Finding` for each claim, in the order of the paper. All verdicts but `supported` are exact.
 
     Raises:
         InputError: if the system is not of kind [family], and if m is not between 1 and 8.
@@ -207,7 +207,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """Return a finding for each claim; with controls, instead, one for each control of a claim, and one for all."""
+        """Return a finding for each claim; with controls, a finding for each control of a claim, and one for all."""
         sections = self.options.sections
         applicable_claims = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected_claims = [c for c in applicable_claims if sections is None or c.section in sections]
@@ -222,7 +222,7 @@ class Verifier:
                     unrefuted_keys.append(claim.key)
             else:
                 findings.append(self.verify_claim(claim))
-            for objects in self._points.values():  # otherwise the objects would cache the values of all claims
+            for objects in self._points.values():  # free memory: the objects cache the values of each claim
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
@@ -237,7 +237,7 @@ class Verifier:
 
     def point(self, needs_roots: bool, number: int) -> PaperObjects | None:
         """Return random point `number` over GF(p); None if the roots of chi are needed and not found."""
-        # For the generic member, and if chi splits over Q, all claims use the same points.
+        # All claims use the same points for the generic member, and for a member whose chi splits over Q.
         must_split = needs_roots and self.member is not None and self.roots is None
         key = (must_split, number)
         if key not in self._points:
@@ -255,7 +255,7 @@ class Verifier:
                 with suppress(BadPrime):
                     if must_split:
                         self.settings.progress("looking for a prime at which chi splits")
-                        # chi splits at 1/m! or more of all primes, so the search fails with probability at most e^-40.
+                        # chi splits modulo 1/m! or more of all primes: the search fails with probability at most e^-40.
                         split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if split_field is None:
                             return None
@@ -280,7 +280,7 @@ class Verifier:
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, needs_roots: bool) -> int:
-        """Return a bound for the degree over Q of a field with all coefficients, and the roots of chi if needed."""
+        """Return a bound for the degree over Q of a field with all coefficients and, if needed, the roots of chi."""
         if self.member is None or not needs_roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
@@ -591,7 +591,7 @@ class ClaimAtPoints:
                 reason = "chi splits" if self._needs_roots else "all denominators are units, so it fails over Q"
                 text = f"fails at a point over {outcome.objects.K.name}, where {reason}"
                 evidence = Evidence("point over GF(p)", text)
-                # A rational point is easier to read.
+                # If the claim also fails at a rational point, report this point, which is easier to read.
                 points = (self._verifier.exact_point(self._needs_roots, k) for k in range(12))
                 if failure := next((result for result in outcomes(self._claim, points) if not result.holds), None):
                     outcome = failure
@@ -632,7 +632,7 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     """
     claim = next(claim_ for claim_ in claims() if claim_.key == key)
     bounds = specialize.universal_bound_objects(blocks, order)
-    for _ in claim.function(bounds):  # the evaluation records the objects that are used
+    for _ in claim.function(bounds):  # the evaluation records the names of the vectors used
         pass
     vectors = sorted(bounds.used - {"roots"})
     try:

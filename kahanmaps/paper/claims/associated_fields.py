@@ -161,7 +161,7 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation
     B_i = alpha_i I + beta_i A + gamma_i A^2"""
     for i in o.tested_indices:
-        # This side does not use Lagrange's formula: I - 2 E_i, E_i the projector onto the eigenspace of lambda_i.
+        # The right side I - 2 E_i does not use Lagrange's formula; E_i projects onto the eigenspace of lambda_i.
         E = o.projector(i)
         yield o.B(i), o.I - E * o.number(2)
         yield o.A * E, E * o.lam[i]

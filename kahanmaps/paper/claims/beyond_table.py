@@ -23,10 +23,10 @@ from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, cla
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
-_MAX_ONES = 7  # numbers that are 1 in a counterexample
+_MAX_ONES = 7  # maximal number of numbers that are 1 in a counterexample
 _NEGATION = "not "
 
-Slot = tuple[str, tuple[int, ...]]  # a number that may be 1: "H", exponents; "J", index pair; "x", one index
+Slot = tuple[str, tuple[int, ...]]  # the place of a number: "H" and exponents, "J" and an index pair, "x" and an index
 
 
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
@@ -82,7 +82,7 @@ def table(report: Report) -> str:
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
-    """Return (text, witness) of objects that refute a statement; None if none with at most seven ones do."""
+    """Return (text, witness) of objects that refute a statement; None if no objects with at most seven ones do."""
     m, roots, slots, further_objects = _SEARCH_SPACES[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
@@ -108,7 +108,7 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 
 
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **further_objects: Any) -> PaperObjects:
-    """Return objects in normal form: A = diag(roots, roots), H and x sums of monomials and unit vectors `ones`.
+    """Return objects in normal form: A = diag(roots, roots), H and x sums of the monomials and unit vectors in `ones`.
 
     If `ones` contains index pairs (i, j) of J, J has the entry 1 there, -1 at (j, i), and 0 elsewhere.
     """
@@ -152,7 +152,7 @@ def _slots(m: int, degrees: Sequence[int], is_planar: bool = True) -> list[Slot]
     return slots + [("x", (i,)) for i in range(2 * m)]
 
 
-# Where a variation is tried: m, the roots of chi, the slots that may be 1, and the matrices B.
+# The objects tried for each variation: m, the roots of chi, the slots that may be 1, and the matrices B.
 _SEARCH_SPACES: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]]] = {
     "inhomogeneous": (1, (1,), _slots(1, (3, 2, 1)), {}),
     "steps": (1, (1,), _slots(1, (3,)), {"associate_matrices": (QQ.identity(2) * fmpq(-2),)}),

@@ -33,7 +33,7 @@ def commutativity(o: PaperObjects) -> Pairs:
     """The Kahan maps of any two associated vector fields commute
     Phi_f o Phi_g = Phi_g o Phi_f"""
     fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
-    if len(fields) > 8:  # (f_s, f_t) is (f, f_{st}) of another member: test f with all, and neighbours
+    if len(fields) > 8:  # (f_s, f_t) is (f, f_{st}) of another member: test f with all fields, and neighbors
         index_pairs = [(0, k) for k in range(1, len(fields))] + [(k, k + 1) for k in range(1, len(fields) - 1)]
     else:
         index_pairs = [(j, k) for k in range(len(fields)) for j in range(k)]

@@ -137,8 +137,7 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
         x = o.projector(i).transpose() * o.x
         fx, x_tilde = o.value(o.f, x), o.step(o.f, x)
         square = o.eps * o.eps
-        # The numerator has degree 5 in l and vanishes at 0, 1, -1; so N is the quadratic given by its values at 2, 3,
-        # 4.
+        # The numerator (l^3 - l) N has degree 5 in l, so N is a quadratic, determined by its values at 2, 3, 4.
         values = []
         for l in (2, 3, 4):
             denominator = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
