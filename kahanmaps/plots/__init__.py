@@ -1,4 +1,4 @@
-"""Pictures of results: each module plots values that the library has computed before.
+"""Pictures of results; each module plots values that other modules have computed.
 
 style             sizes in centimetres, fonts, colors that color-blind readers and gray prints distinguish
 figures           an empty figure in a style, texts and legends; output as a file (PDF, SVG, PNG) or as SVG in a page
