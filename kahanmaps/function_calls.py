@@ -63,7 +63,7 @@ class CallError(InputError, TypeError):
 
 
 def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Return the public version of a function, which checks its arguments; `name` is its public name."""
+    """Return the public version of a function: it checks its arguments, and `name` is its public name."""
     signature = inspect.signature(function)
     annotation_of = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
     takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())
@@ -112,7 +112,7 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
 
 
 class CallableModule(ModuleType):
-    """A subpackage with the name of a command; calling it calls its function `command`, which the command calls too."""
+    """A callable subpackage: `km.systems(...)` and `km.family(...)` call the function `command` of the subpackage."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         return public_function(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)

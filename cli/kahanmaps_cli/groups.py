@@ -1,4 +1,4 @@
-"""Command groups that suggest commands for misspelt names, and click's errors reworded like all other messages."""
+"""Command groups that suggest commands for misspelt names; errors of click reworded like all other messages."""
 
 from __future__ import annotations
 

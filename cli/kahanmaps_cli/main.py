@@ -1,4 +1,4 @@
-"""The entry point: the lazily loaded commands, and the conversion of errors to messages and exit statuses.
+"""The entry point of the command line: it loads commands on demand and turns errors into messages and statuses.
 
 Exit statuses: 0 the claim holds or the work is done; 1 a claim is refuted (no other cause); 2 usage error or invalid
 input; 3 undecided, stopped early, or output lost; 70 internal error; 130 interrupted by Ctrl-C or SIGTERM.

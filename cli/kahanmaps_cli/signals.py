@@ -15,9 +15,9 @@ _REPEAT_SECONDS = 1.0  # CPU time in seconds between two KeyboardInterrupts afte
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
     """Set a handler for one signal and return the previous handler; a second signal of this kind ends the process.
 
-    Python runs a handler only after the current call into C returns, which may take FLINT minutes for long numbers.
-    So the handler is installed with System V semantics: the arrival of the first signal restores the default action.
-    If the C library has no sysv_signal, a second signal also waits until the call returns.
+    Python runs a handler only after the current call into C returns, and a call of FLINT with long numbers may take
+    minutes. So the handler is installed with System V semantics: the arrival of the first signal restores the default
+    action. If the C library has no sysv_signal, a second signal also waits until the call returns.
     """
     previous = signal.signal(number, handler)
     C = ctypes.CDLL(None)
@@ -46,7 +46,7 @@ def end_interrupts() -> None:
 
 @contextmanager
 def interruptible(interrupt: Callable[[], None]) -> Iterator[None]:
-    """Call `interrupt`, which requests the work to end, at the first Ctrl-C or SIGTERM; exit at once at the second."""
+    """Call `interrupt` at the first Ctrl-C or SIGTERM, to request the end of the work; exit at once at the second."""
 
     def handler(signum: int, frame: Any) -> None:
         handle(signum, raise_interrupt)

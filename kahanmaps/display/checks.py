@@ -191,7 +191,7 @@ def verdict_text(finding: Finding) -> str:
 
 
 def details(finding: Finding, printed_hypotheses: set[str], width: int | None = None) -> list[str]:
-    """Return the lines that are printed below a claim, without `printed_hypotheses`; add its own to this set."""
+    """Return the lines printed below a claim; omit the `printed_hypotheses`, and add its other ones to this set."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed_hypotheses))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
@@ -203,7 +203,7 @@ def details(finding: Finding, printed_hypotheses: set[str], width: int | None = 
 
 
 def summary(evidence: Evidence, printed_hypotheses: set[str] | None = None) -> str:
-    """Return the evidence as a sentence without the `printed_hypotheses`, to which its other hypotheses are added."""
+    """Return the evidence as a sentence; omit the `printed_hypotheses`, and add the other hypotheses to this set."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary

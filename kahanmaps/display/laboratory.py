@@ -233,7 +233,7 @@ def _structures(structures: ConstantStructures) -> Iterator[Line]:
 
 @lines_of.register
 def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
-    """Yield the lines of `DegreeGrowth.text`."""
+    """Yield the lines of the text of a degree growth or of a scan."""
     return (line.split("\t") for line in growth.text.split("\n"))
 
 

@@ -51,7 +51,7 @@ class BatchCommands(AttributeHints):
             return summarise(store.rows(missing=True), by, values)
 
     def export(self, db: str | Path, path: str | Path) -> None:
-        """Write the results to a .csv, .jsonl or .parquet file."""
+        """Write the results in a database to a .csv, .jsonl or .parquet file."""
         suffix = Path(path).suffix
         if suffix not in (".csv", ".jsonl", ".parquet"):
             raise InputError(f"found the suffix {suffix!r} of {path}, expected .csv, .jsonl or .parquet")

@@ -242,7 +242,7 @@ def confinement(
         "confinement": first.verdict if is_consistent else UNDECIDED,
         "status": "budget" if any(run.stopped for run in runs) else "complete" if is_consistent else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
-        "followed": first.followed,  # number of steps, if some singularity is not confined
+        "followed": first.followed,  # number of steps over which unconfined singularities were followed
         **fields(first, "map_degree", "critical_degree"),
         "exceptional_count": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
         "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),

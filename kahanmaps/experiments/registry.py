@@ -55,7 +55,7 @@ class TaskKind:
 
     @property
     def required(self) -> tuple[str, ...]:
-        """The options without a default."""
+        """The names of the options without a default."""
         return tuple(name for name in self.options if name not in self.defaults)
 
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:

@@ -91,7 +91,7 @@ def section_of(
 
     Args:
         ensemble: the orbits.
-        hyperplane: an affine function of the variables, which is 0 on the hyperplane.
+        hyperplane: an affine function of the variables that is 0 on the hyperplane.
         steps: the number of steps of each orbit.
         direction: "up" for crossings to positive values of this function, "down" to negative values, or "both".
         progress: called with the current step.
@@ -115,7 +115,7 @@ def section_of(
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
-    """Return the points of an orbit, interpolated, at which a function is 0, and the number of omitted points.
+    """Return the interpolated points of an orbit at which an affine function is 0, and the number of omitted ones.
 
     Args:
         points: the points of the orbit (count, dim). values: the values (count,) of an affine function at these points.

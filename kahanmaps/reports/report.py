@@ -63,7 +63,7 @@ def report_html(
         file: the system of the reports, whose equations and pictures are shown; an Analysis contains its system.
         title: the title of the page (default: the name of the system).
         pictures: whether to draw pictures; if matplotlib is missing, a note says how to install it.
-        command: the command line that creates the page, which the page shows.
+        command: the command line that creates the page; it is printed on the page.
         left_out: sentences on results that were omitted, printed as notes.
         certificate: the path, relative to the page, of a file that `certificate` wrote; the page links to it.
         explore: for an Analysis: show an orbit with sliders for eps and the initial point instead of the results.

@@ -24,7 +24,7 @@ _EXIT_STATUSES = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage er
 
 
 def command(name: str) -> click.Command:
-    """Return the command of a check."""
+    """Return the command for the check called `name`."""
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:

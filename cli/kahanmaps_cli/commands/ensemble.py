@@ -22,7 +22,7 @@ MAX_STEPS = 10**13  # maximal number of steps: more would take years
 FAILURES_SHOWN = 20  # maximal number of orbits that ended early and are listed in the output
 _MIN_COMPILED_WORK = 5_000_000  # orbits times steps: for less work, numpy is faster than loading and compiling code
 _MAX_SAMPLES = 100  # maximal number of steps at which integrals are evaluated, unless --every is given
-_MAX_VALUES = 200_000  # maximal number of values of integrals
+_MAX_VALUES = 200_000  # maximal number of sampled values of an integral, over all orbits
 
 
 @click.command("ensemble")

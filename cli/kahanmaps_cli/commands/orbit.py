@@ -116,7 +116,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     with interruptible(stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = {}
-        if options["integrals"]:  # this imports the checks
+        if options["integrals"]:  # imported only if needed: this call loads the checks
             functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         trajectory = lib.orbit(
             map_,

@@ -89,7 +89,7 @@ def _structured_facts(file: Any) -> dict[str, Any]:
 
 def _latex(file: Any) -> str:
     names = [lib.latex_name(name) for name in file.variables]
-    if isinstance(file.map, lib.KahanFamily):  # an adjusted discretization has eps in its coefficients
+    if isinstance(file.map, lib.KahanFamily):  # `file.system` would refuse eps in coefficients
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
         rows = [

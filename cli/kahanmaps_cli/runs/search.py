@@ -32,7 +32,7 @@ def search_options(section: str) -> Callable[[F], F]:
 
 
 def require_one_form(options: dict[str, Any]) -> None:
-    """Refuse more than one of --toml, --latex and --json, and --certificate with --eps."""
+    """Refuse --certificate with --eps, and more than one of --toml, --latex and --json."""
     if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
         raise click.UsageError("give one of --toml, --latex and --json")
     refuse_certificate_with_eps(options)

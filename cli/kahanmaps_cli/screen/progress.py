@@ -110,7 +110,7 @@ class Progress:
 
 
 class SearchProgress(Progress):
-    """Progress of a search with a time limit (--seconds), which also counts its units of work.
+    """Progress of a search with a time limit (--seconds); it also counts the units of work of the search.
 
     `options` are the options of the command: "quiet" and, if the command has them, "effort" and "seconds"; `since` is
     the reading of time.monotonic() from which the limit is counted (default: the start of the block). When the limit

@@ -34,7 +34,7 @@ def on_terminal() -> bool:
 
 
 def columns() -> int:
-    """The width of the terminal."""
+    """The width of the terminal in characters, at least 20."""
     from shutil import get_terminal_size  # imported here: shutil loads four modules for compression
 
     return max(20, get_terminal_size().columns)

@@ -6,7 +6,7 @@ text, and None or an absent entry is an empty cell. A table has the following co
     experiment number key task      always
     document m seed parameters.a    the entries of the system spec; entries of "family" without prefix
     eps steps                       options
-    outcome verdict                 always; a missing task has no outcome
+    outcome verdict                 always; empty for a task without a result
     dimension heights.max           entries of the result
     message                         always
     seconds peak_memory host finished   unless the export is stable
@@ -288,5 +288,5 @@ def row_data(row: Row) -> dict[str, Any]:
 
 
 def _json_line(record: Mapping[str, Any]) -> str:
-    """Return a dict as a line of JSON: its own order of keys is preserved, those of dicts inside it are sorted."""
+    """Return a dict as a line of JSON; its keys remain in their order, the keys of dicts inside it are sorted."""
     return "{" + ", ".join(f"{json.dumps(name)}: {_ENCODER.encode(value)}" for name, value in record.items()) + "}\n"

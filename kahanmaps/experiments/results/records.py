@@ -209,4 +209,4 @@ class Executor(Protocol):
         """Return the records of finished jobs as soon as there is one; an empty list after `timeout` seconds."""
 
     def close(self) -> None:
-        """Kill all jobs in flight without waiting for them. May be called twice."""
+        """Kill all jobs in flight without waiting for them. Closing twice has no effect."""

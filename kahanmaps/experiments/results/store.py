@@ -688,7 +688,7 @@ class Store(HtmlDisplay):
         return self._fetch(sql, (experiment.id,))
 
     def unplanned(self) -> int:
-        """Return the number of results of tasks that belong to no plan."""
+        """Return the number of results whose task belongs to no plan."""
         sql = """
             SELECT count(*) FROM result AS r INDEXED BY result_summary
             WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""

@@ -71,8 +71,8 @@ class ClusterWorkers(Executor):
     and has at most 200 jobs. `on_message` is called with messages about waiting for workers.
 
     At most two groups for each thread of the workers are in flight, so that the memory used here does not grow with the
-    number of tasks. A job without a record when its group ends is run again, in a group of its own, a few times before
-    it is lost.
+    number of tasks. If a group ends without the record of a job, the job is run again, alone in a group, a few times
+    before it is lost.
     """
 
     def __init__(
@@ -298,7 +298,7 @@ def on_one_line(error: BaseException | None) -> str:
 
 
 def connect(address: str, timeout: float) -> Any:
-    """Return a dask client of the scheduler that logs nothing. Raises InputError if the scheduler does not answer."""
+    """Return a dask client of a scheduler, without log output. Raises InputError if the scheduler does not answer."""
     try:
         client = import_module("distributed").Client  # this import takes a second
     except ModuleNotFoundError as error:
@@ -342,7 +342,7 @@ def connect(address: str, timeout: float) -> Any:
         ) from error
 
 
-# The command on a worker
+# The command that a worker runs for a group
 
 
 def run_group(source: IO[str], target: IO[str]) -> None:

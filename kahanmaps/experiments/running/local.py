@@ -2,8 +2,8 @@
 
 Tasks need processes of their own, since FLINT may abort the process, ignores Ctrl-C and allocates memory without bound.
 A worker runs tasks for some seconds and is then replaced. If a task fails unexpectedly, or kills its worker, after this
-worker has run other tasks, it is run again in a fresh worker, and the second outcome is recorded: so records do not
-depend on the order of tasks. A task whose worker is killed from outside is tried a few times before it is lost.
+worker has run other tasks, the task is run again in a fresh worker, and the second outcome is recorded: so records do
+not depend on the order of tasks. A task whose worker is killed from outside is tried a few times before it is lost.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class WorkersError(KahanmapsError):
     """Raised if worker processes cannot be started."""
 
 
-# In this process
+# Code of the parent process
 
 
 @dataclass
@@ -362,7 +362,7 @@ def ending(status: int | None) -> str:
     return f"{description}, from outside" + (" or for want of memory" if -status == SIGKILL else "")
 
 
-# In the worker
+# Code of the worker process
 
 
 @dataclass

@@ -72,7 +72,7 @@ def plot_comparison(
             if order not in line_starts or samples[0].error < line_starts[order][1]:
                 line_starts[order] = x[0], samples[0].error
         if show == "error":
-            # A dotted line for each order, a little below the best method of this order; a mark at the time step.
+            # Draw a dotted line for each order, a little below its best method, and a line at the time step.
             low, high = axes.get_ylim()
             for order, (step, error) in sorted(line_starts.items()):
                 y = error / 3

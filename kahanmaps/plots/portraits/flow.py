@@ -63,7 +63,7 @@ class Equilibrium:
 
 
 def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
-    """Find the real equilibria to which Newton's method converges from sixty initial points; each is returned once.
+    """Find the distinct real equilibria to which Newton's method converges from sixty initial points.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> sorted((equilibrium.point.round(6).tolist(), equilibrium.kind) for equilibrium in equilibria(pendulum))
