@@ -46,7 +46,7 @@ class BatchCommands(AttributeHints):
             return store.find(key)
 
     def summary(self, db: str | Path, by: Sequence[str] = (), values: Sequence[str] | None = None) -> Summary:
-        """Return counts and quantiles for each group of tasks; tasks with equal entries of names `by` form a group."""
+        """Return counts and quantiles for each group of tasks; tasks with equal entries named in `by` are a group."""
         with Store.open(db, readonly=True) as store:
             return summarise(store.rows(missing=True), by, values)
 

@@ -123,9 +123,9 @@ def task(
 def analysis(
     name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENT_NAMES, **defaults: Any
 ) -> Callable[[Summarizer], Summarizer]:
-    """Return a decorator: it registers a function of the laboratory, named "module:name", as a kind of task.
+    """Return a decorator that registers a function of the laboratory, given as "module:name", as a kind of task.
 
-    Its arguments are the system file (or the attribute `of`) and the options; `renamed` maps options to parameter
+    It is called with the system file (or its attribute `of`) and the options; `renamed` maps options to parameter
     names. The `defaults` are stated here rather than in the library, since they enter the keys of tasks.
     """
 

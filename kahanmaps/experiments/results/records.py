@@ -1,8 +1,8 @@
 """The data types of a batch: tasks and their keys, limits, and records of the outcomes of tasks.
 
-All are plain data that JSON can represent, since they are sent between processes and stored in databases, unlike
-matrices and polynomials of FLINT. The key of a task is a hash of its canonical text, so that equal tasks have equal
-keys in every batch and on every machine.
+All of them consist of plain data that JSON can represent, since they are sent between processes and stored in
+databases. Matrices and polynomials of FLINT can be neither sent nor stored. The key of a task is a hash of its
+canonical text, so that equal tasks have equal keys in every batch and on every machine.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def option_words(values: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """Limits of one task, None for no limit: `time` in seconds, `memory` in bytes beyond that of an idle worker.
+    """Limits of one task, None for no limit: `time` in seconds, `memory` in bytes beyond the memory of an idle worker.
 
     Limits are not part of the task or its key: a task that exceeded its time limit may be run again with a larger one.
     """

@@ -49,7 +49,7 @@ from kahanmaps.experiments.results.records import (
     encodable,
 )
 
-# To be increased when older versions of kahanmaps cannot read the file. Format 2 has two unused columns more than 1.
+# Increase the format if older versions cannot read the file. Format 2 is format 1 with two more columns, both unused.
 FORMATS = (1, 2)
 APPLICATION_ID = 0x4B61684D  # "KahM" in ASCII, which identifies databases of kahanmaps
 SKIPPED = "TABLE skipped (experiment INTEGER, system TEXT, reason TEXT, PRIMARY KEY (experiment, system))"
@@ -251,7 +251,7 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
-            # After a kill of the writer, opening the database rolls back the journal, even here, and has to write.
+            # After a kill of the writer, opening the file rolls back its journal, and so even a reader has to write.
             may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
             has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
             mode = "rw" if may_write or has_journal else "ro&immutable=1"

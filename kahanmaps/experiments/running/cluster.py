@@ -98,7 +98,7 @@ class ClusterWorkers(Executor):
         self._retries: deque[Job] = deque()  # jobs to be run again, each in a group of its own
         self._groups: dict[Any, list[Job]] = {}  # dask's future of a group -> jobs of this group
         self._mean_seconds: dict[str, float] = {}  # kind of a task -> mean seconds of recent tasks
-        self._jobs_without_record: set[str] | None = set()  # jobs in groups without records (None: some had one)
+        self._jobs_without_record: set[str] | None = set()  # jobs in groups without records (None: some group had one)
         self._groups_without_record = 0
         self._client = connect(address, connect_seconds)
         self._futures = import_module("distributed").as_completed(loop=self._client.loop)
@@ -262,8 +262,8 @@ class ClusterWorkers(Executor):
             self._tries[key] += is_alone
             failures.append((job, Record(key, Outcome.LOST, message=message, stderr=stderr)))
         if unfinished and has_ended_by_itself and self._jobs_without_record is not None:
-            # Jobs that never have a record mean a wrong installation, not thousands of lost tasks; but one task that
-            # crashes its group must not be mistaken for it.
+            # A wrong installation must not be reported as thousands of lost tasks, and a task that crashes must not be
+            # reported as a wrong installation.
             self._jobs_without_record |= unfinished.keys()
             self._groups_without_record += 1
             if self._groups_without_record >= MAX_SILENT_GROUPS and self._tries.keys() <= self._jobs_without_record:

@@ -380,7 +380,7 @@ _state = _WorkerState()
 def _begin(parent: int, output: Connection) -> None:
     """Prepare a worker process; pebble calls this function once, before the first task."""
     end_with_parent(parent)
-    os.setpgid(0, 0)  # ends with all processes that tasks start; a terminal sends Ctrl-C only to the parent
+    os.setpgid(0, 0)  # a kill of this group ends processes that tasks started; Ctrl-C reaches the parent only
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait until the current call of FLINT returns
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # undo that pebble ignores SIGINT
     # Output of tasks goes to a file, since records have a pipe of their own; the standard input of tasks is empty.
@@ -432,7 +432,7 @@ def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: 
         data |= failure(error)
     _limit_memory(None, idle)
     seconds = time.perf_counter() - begin
-    # Peak resident memory in bytes: of this task, or without /proc of the process.
+    # Peak resident memory in bytes since the task began; without /proc, since the process began.
     peak_memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     with suppress(OSError), open("/proc/self/status") as file:
         peak_memory = next((int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM:")), peak_memory)
