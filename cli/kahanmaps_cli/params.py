@@ -28,7 +28,7 @@ _MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # maximal number of digits of a number 
 
 
 class ParameterKind(OptionType):
-    """A type of option values: `read(text, *settings)` converts the text, and an InputError of `read` is the message.
+    """A type of option values: `read(text, *settings)` converts a text, and its InputError becomes a usage error.
 
     A value that is not a string is a default and is returned unchanged.
     """
@@ -48,7 +48,7 @@ class ParameterKind(OptionType):
 
 
 def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
-    """Read a number, or a point by `read`; the error for an invalid text has hints about frequent typing mistakes."""
+    """Read a number or, with `read`, a point; the error for an invalid text has hints on frequent typing mistakes."""
     try:
         return (read or lib.parse_number)(text)
     except ExpressionError as error:
@@ -175,7 +175,7 @@ def NameValue(name_is_optional: bool = False) -> ParameterKind:
 
 
 def _without_exponent(text: str) -> str:
-    """Write a number such as 2.5e3 as an integer without an exponent; return a text that is no such integer unchanged.
+    """Write an integer such as 2.5e3 without an exponent; return any other text unchanged.
 
     >>> _without_exponent("2.5e3"), _without_exponent("1e-1"), _without_exponent("2.5e0")
     ('2500', '1e-1', '2.5e0')

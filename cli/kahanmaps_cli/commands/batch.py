@@ -231,7 +231,7 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 batch, is_announced = lib.Batch(jobs, executor), False
                 with interruptible(batch.interrupt):
                     for records in batch:
-                        if batch.was_interrupted and not is_announced:  # a signal handler might split a line
+                        if batch.was_interrupted and not is_announced:  # not by the handler, which might split a line
                             is_announced = True
                             if executor.in_flight:
                                 running = _count_text(executor.in_flight)

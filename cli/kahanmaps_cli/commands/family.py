@@ -86,7 +86,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 
 def random_member_file(options: dict[str, Any]) -> lib.SystemFile:
-    """Return the random member given by the options as a system file; without a size option, m = 3."""
+    """Return the random member given by the options as a system file; m = 3 unless an option determines m."""
     member_options = {name: options[name] for name in MEMBER_OPTIONS}
     if member_options["m"] is None and member_options["eigenvalues"] is None and member_options["chi"] is None:
         member_options["m"] = 3

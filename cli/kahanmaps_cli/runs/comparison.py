@@ -38,7 +38,7 @@ def requested_comparison(options: dict[str, Any], progress: Callable[[str], None
     """Run the comparison that the options of `comparison_options` request; `extra` is passed on to `compare`."""
     starts_option = require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
-    _ = file.real_approximation.system  # raises an error, before points are read, for a map without this system
+    _ = file.real_approximation.system  # first refuse a map without a quadratic system
     starts = None if starts_option is None else options["start"] or requested_starts(file, options)
     return lib.compare(
         file,

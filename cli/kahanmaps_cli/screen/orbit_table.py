@@ -1,4 +1,4 @@
-"""Orbits on a terminal: numbers are shortened such that each row of the table has the width of one line."""
+"""Orbits on a terminal: numbers are shortened so that each row of the table fits on one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Output files of commands: before the computation a file is refused that is not writable or is also an input.
+"""Output files of commands: a file that is not writable, or is also an input, is refused before the computation.
 
 A Python audit hook records every file that a command opens for reading. Files are compared by device and inode
 instead of by name, so that links are recognized.
@@ -66,7 +66,7 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
-            # Refuse a file that is not writable before the computation starts.
+            # Before the computation starts, refuse a file that is not writable.
             folder, target = lib.resolve_path(path).parent, Path(path)
             if not path or not folder.is_dir():
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
@@ -89,7 +89,7 @@ class OutputFolder(click.Path):
             _recorded_files(ctx)  # start to record the files that the command reads
         if ctx is None or ctx.resilient_parsing:
             return path
-        # Refuse a folder that is not writable before the computation: create it if it is missing, and remove it again.
+        # Before the computation, refuse a folder that is not writable: create it if it is missing, and remove it again.
         folder = Path(os.fsdecode(path))
         missing = [directory for directory in (folder, *folder.parents) if not directory.exists()]
         try:

@@ -76,7 +76,7 @@ class Progress:
             _write(text + "\n")
             return
         with self._lock:
-            try:  # the line is cut: one that is longer than the terminal is wide could not be overwritten
+            try:  # cut the line: a line longer than the terminal is wide could not be overwritten
                 width = max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
             except (OSError, ValueError):
                 width = 80
