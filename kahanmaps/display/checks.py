@@ -191,7 +191,7 @@ def verdict_text(finding: Finding) -> str:
 
 
 def details(finding: Finding, printed_hypotheses: set[str], width: int | None = None) -> list[str]:
-    """Return the lines printed below a claim; omit the `printed_hypotheses`, and add its other ones to this set."""
+    """Return the lines printed below a claim; omit the `printed_hypotheses`, and add other hypotheses to this set."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed_hypotheses))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]

@@ -50,7 +50,7 @@ STATUS_LEGEND = (
 
 @dataclass(frozen=True)
 class HtmlCell:
-    """A cell that a notebook shows as `html()`; its text is shown elsewhere."""
+    """A cell with a text, which a notebook replaces by `html()`."""
 
     text: str
     html: Callable[[], str]
@@ -204,7 +204,7 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """Yield the equation of Darboux polynomials P, each cofactor with its polynomials P, or that there are none."""
+    """Yield the equation of Darboux polynomials, and each cofactor with its polynomials, or that there are none."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
     equation = f"P(x~) = C P(x){meaning}; spaces spanned by products of others are omitted"
     yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)
@@ -219,7 +219,7 @@ def _darboux(search: DarbouxSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _structures(structures: ConstantStructures) -> Iterator[Line]:
-    """Yield H, J and the Casimirs if f = J grad H with a constant matrix J, otherwise the reason why it is not."""
+    """Yield H, J and the Casimirs if f = J grad H with a constant matrix J, otherwise the reason why there is none."""
     if structures.hamiltonian is None:
         yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return

@@ -40,7 +40,7 @@ _ESCAPES = {
 
 
 def latex_name(name: str) -> str:
-    r"""Return a name as LaTeX: digits at its end become an index; eps and names of Greek letters become the letters.
+    r"""Return a name as LaTeX: digits at its end become an index; eps and names of Greek letters become these letters.
 
     A name that is not of the form letters-digits is set upright, and TeX's special characters in it are escaped.
     Different names have different LaTeX. Raises InputError for a text that is empty or not printable.

@@ -26,7 +26,7 @@ SYMBOLS = {
     "undecided": ("?", "#b8860b"),
 }
 _ALIGN_LEFT = 'style="text-align: left"'  # Jupyter aligns the cells of a table on the right
-_MAX_OPEN_ROWS = 12  # number of rows of a table that are visible before a click
+_MAX_OPEN_ROWS = 12  # number of rows of a table that are visible before a click on the others
 _MAX_CHARACTERS = 60  # maximal number of characters of a number or a name in HTML
 
 
@@ -42,7 +42,7 @@ def escape(text: object) -> str:
 
 
 def markdown(text: object) -> str:
-    """Escape a text for Markdown, where it is on one line.
+    """Escape a text for Markdown; the result is on one line.
 
     >>> markdown("<b>2*x*y|[a](b)</b>")
     '&lt;b>2\\\\*x\\\\*y\\\\|\\\\[a\\\\](b)&lt;/b>'
@@ -52,7 +52,7 @@ def markdown(text: object) -> str:
 
 
 def code(text: object) -> str:
-    """Return a text as a code span in Markdown, enclosed in backticks that do not occur in the text.
+    """Return a text as a code span in Markdown, enclosed in more backticks than occur in it in a row.
 
     >>> code("x < y"), code("`a`")
     ('`x < y`', '`` `a` ``')
@@ -87,7 +87,7 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table in HTML; `headings` and `caption` are text, cells are HTML. The last cell of a short row is wide.
+    """Return an HTML table; `headings` and `caption` are text, cells are HTML. The last cell of a short row fills it.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>

@@ -273,7 +273,7 @@ def period_html(period: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(period: OrbitPeriod) -> str:
-    """Return as text the period of an orbit, the periods in its planes, and whether it meets a pole."""
+    """Return as text the period of an orbit, the periods in its planes, and whether the orbit meets a pole."""
     lines = [f"period\t{_period_word(period)}"]
     for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]

@@ -52,9 +52,9 @@ def plot_degrees(
     """Plot the degrees d_n of the iterates against n; `growths` maps the names of systems to their degree growth.
 
     Marks are the measured degrees. A solid line shows degrees that satisfy a checked recurrence. A dotted line joins
-    degrees without a recurrence, whose growth is then an estimate. `scale` is "linear", "log" (straight lines are
-    exponential) or "loglog" (straight lines are powers; n begins with 1). By default it is "log" if some growth is, or
-    looks, exponential, and otherwise "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises
+    degrees without a recurrence, whose growth is then an estimate. `scale` is "linear", "log" (exponential growth is a
+    straight line) or "loglog" (a power is a straight line; n begins with 1). By default it is "log" if some growth is,
+    or looks, exponential, and otherwise "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises
     InputError unless there are 1 to 7 systems, and for an unknown scale.
 
     >>> from kahanmaps.laboratory.growth.degrees import degree_growth

@@ -131,7 +131,7 @@ class Plot(AttributeHints):
             eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
             axes: two variables or expressions; by default the variables along which the crossings are spread most.
-            direction: "up" for crossings from smaller to larger values, "down" for the others, or "both".
+            direction: "up" for crossings to larger values, "down" for crossings to smaller values, or "both".
         """
         from kahanmaps.plots.comparison.functions import requested_axis
         from kahanmaps.plots.section import curves_on, hyperplane_of, plot_section, section_of

@@ -48,7 +48,7 @@ class Section:
         return np.concatenate(self.crossings)
 
     def widest_axes(self, hyperplane: PointFunction) -> tuple[int, ...]:
-        """Return the two variables along which the crossings are spread most, both not constant on the hyperplane."""
+        """Return the two variables along which the crossings are spread most, neither constant on the hyperplane."""
         powers = [sum(column) for column in zip(*hyperplane.function.numerator.monoms(), strict=True)]
         dim = self.points.shape[1]
         free_indices = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
@@ -71,7 +71,7 @@ def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunctio
 def curves_on(
     file: SystemFile, eps: fmpq | None, hyperplane: PointFunction, axes: Sequence[PointFunction]
 ) -> list[PointFunction]:
-    """Return the restrictions of integrals to the hyperplane that depend only on the variables along the axes."""
+    """Return those integrals, restricted to the hyperplane, that depend only on the variables along the axes."""
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
@@ -147,7 +147,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
         low, high = np.zeros(len(coefficients)), np.ones(len(coefficients))
         t = np.clip(values[indices] / (values[indices] - values[indices + 1]), 0, 1)
         rising = values[indices] < values[indices + 1]
-        for _ in range(_NEWTON_STEPS):  # Newton's method or, outside the interval with the change of sign, bisection
+        for _ in range(_NEWTON_STEPS):  # Newton's method, or bisection if it leaves the interval with the zero
             value = (coefficients * t[:, None] ** powers).sum(axis=1)
             slope = (coefficients[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
             is_below = (value < 0) == rising

@@ -43,7 +43,7 @@ Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None: indeterminacy po
 
 @dataclass(frozen=True)
 class MapPair:
-    """Two maps to be compared; a system stands for its Kahan map, and a system with another eps is scaled.
+    """Two maps to be compared. A system stands for its Kahan map; a second system with another eps is scaled.
 
     `names` are the names of the two maps in the picture. `note` says how their variables are matched if they differ.
     """

@@ -284,8 +284,8 @@ def compare(
 
     Returns:
         A `Comparison`: for each function I the errors |I(x_n) - I(x_0)|/|I(x_0)| (maximum over all initial points and
-            the steps n in each of about 200 bins), and the errors of orbits against a Taylor solution in ball
-            arithmetic. All errors are measured.
+        the steps n in each of about 200 bins), and the errors of orbits against a Taylor solution in ball arithmetic.
+        All errors are measured.
 
     Raises:
         InputError: for invalid values, and for a function that is undefined at an initial point.

@@ -184,7 +184,7 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """Return the function that a name in `functions_of` or a formula denotes, free of eps if `eps` is None."""
+    """Return the function that a name in `functions_of` or a formula denotes; it has no eps if `eps` is None."""
     function = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if function is None else function
 

@@ -80,7 +80,7 @@ def plot_comparison(
                 axes.plot(
                     [step, end], [y, y * (end / step) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1
                 )
-                # The label of a line is at its small step end, where lines of different orders are far apart.
+                # The label of a line is at its end with small steps, where lines of different orders are far apart.
                 write_beside(axes, str(order), (end, y * (end / step) ** order), (13, 0), color="0.4", fontsize="small")
             axes.set_ylim(low, high)
             axes.axvline(abs(to_float(time_step(result.eps))), color="0.85", linewidth=0.8, zorder=0)

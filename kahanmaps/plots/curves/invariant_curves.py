@@ -53,7 +53,7 @@ class PlaneOrbit:
 
 @dataclass(frozen=True, eq=False)
 class InvariantPlane:
-    """A plane of the normal form: `root` is its root of chi, `root_text` the root as text, `orbits` has one per start.
+    """A plane of the normal form: its root of chi (`root`, as text `root_text`), and an orbit for each initial point.
 
     `h` are the coefficients of the cubic Hamiltonian h(u, v), complex if the root is; `shape` describes h by a constant
     of `plane_cubics`. `index` is the index of the plane in the splitting, `block` the planar Kahan map in the

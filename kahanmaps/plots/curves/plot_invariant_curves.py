@@ -135,7 +135,7 @@ class _Pen:
             if np.any(np.hypot(*(positions[:k] - positions[k]).T) < _MIN_DISTANCE):
                 continue
             shift = np.array([0.7, 0.7]) if normals is None else normals[k]
-            if np.any(np.abs(positions[k] + 2 * _MIN_DISTANCE * shift - 0.5) > 0.5):  # it would be outside
+            if np.any(np.abs(positions[k] + 2 * _MIN_DISTANCE * shift - 0.5) > 0.5):  # outside the panel
                 shift = -shift
             options = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
             write_beside(axes, str(k), (x[k], y[k]), tuple(8 * shift), 1.5, zorder=4, **options)

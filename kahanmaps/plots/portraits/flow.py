@@ -25,7 +25,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
-_MAX_DIMENSION = 20  # maximal dimension for more initial points of Newton's method than the origin and (1, ..., 1)
+_MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the origin and (1, ..., 1)
 _ZERO_TOLERANCE = 1e-7  # relative to the largest eigenvalue: smaller real or imaginary parts count as 0
 _ARROWS_PER_SIDE = 21  # number of arrows along each side of the window
 _STEPS_PER_WINDOW = 400  # number of steps in which a curve crosses the window
@@ -35,7 +35,7 @@ _MIN_SPEED_RATIO = 1e-4  # near an equilibrium: a curve ends below this fraction
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """An equilibrium `point` of f, the eigenvalues of the derivative f' there, and its eigenvectors as columns."""
+    """An equilibrium `point` of f, the eigenvalues of f' at this point, and the eigenvectors of f' as columns."""
 
     point: FloatArray
     values: NDArray[Any]
@@ -126,7 +126,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     with np.errstate(all="ignore"):
         arrows = np.where(lengths > 0, arrows / lengths, 0)
     all_equilibria = equilibria(system)
-    if len(all_equilibria) > 2**system.dim:  # more than if all are isolated (Bezout): they fill curves
+    if len(all_equilibria) > 2**system.dim:  # more than isolated equilibria can be (Bezout): they fill curves
         all_equilibria = []
     visible_equilibria = [
         equilibrium
@@ -165,8 +165,8 @@ def projected_solutions(
 def solution(f: VectorField, start: FloatArray, box: Window, time: float | None = None) -> FloatArray:
     """Return the solution through `start` as a curve (points, dim); it ends where it closes or leaves the box.
 
-    `box` has a range for each variable; a curve leaves the box when it is outside of a range by more than its length.
-    `time`, negative for the past, limits the time of the solution; None means no limit.
+    `box` has a range for each variable; a curve leaves the box when its distance from a range exceeds the length of the
+    range. `time`, negative for the past, limits the time of the solution; None means no limit.
 
     >>> rotation = VectorField(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
     >>> circle = solution(rotation, np.array([1.0, 0.0]), ((-2, 2), (-2, 2)))

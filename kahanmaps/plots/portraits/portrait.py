@@ -132,7 +132,7 @@ def _step_numbers(trajectories: Trajectories) -> FloatArray:
 
 
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
-    """Return the pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None if it is no curve.
+    """Return the pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None without a curve.
 
     Each point p is joined to its nearest neighbour q and to the nearest point r on the other side of p, that is, with
     (q - p).(r - p) < 0. If the points are dense enough, this reconstructs a smooth curve in any dimension and with any

@@ -70,7 +70,7 @@ def field_of(file: SystemFile) -> QuadraticSystem | None:
 def ensemble_of_file(
     file: SystemFile, eps: fmpq | None, starts: FloatArray, steps: int, *, backward: bool = False
 ) -> FloatEnsemble:
-    """Return the ensemble of orbits of the map of a file, in normal form if it has one; `eps` is None without eps."""
+    """Return the ensemble for the map of a file, in normal form if it has one; `eps` is None for a map without eps."""
     normal_form = float_normal_form(file)
     form = None if isinstance(normal_form, NoNormalForm) else normal_form.form
     return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
