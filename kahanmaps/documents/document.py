@@ -42,7 +42,7 @@ _STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number where a rational on
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
-    """Return the Kahan map of right-hand sides in variables, symbols and eps; if eps occurs, it is adjusted."""
+    """Return the Kahan map of right-hand sides in variables, symbols and eps; with eps it is an adjusted map."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
         return KahanFamily(QuadraticSystem(tuple(rhs), symbols))

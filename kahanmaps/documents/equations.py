@@ -51,7 +51,7 @@ class _Derivative(NamedTuple):
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Return the document with the equations in [system] replaced by right-hand sides and variables, and notes.
+    """Return (document, notes); right-hand sides and variables replace the equations in [system] of the document.
 
     Variables that are not given have the order of their equations, and velocities of second-order equations come last.
     A document without equations is returned unchanged. The notes are sentences on new names. Raises InputError for a

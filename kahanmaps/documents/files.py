@@ -355,7 +355,7 @@ def _matrix_rows(matrix: fmpq_mat) -> list[list[str]]:
 
 
 def match_variables(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
-    """Return the map of `other` in the variables of `file`, and a note on how variables are matched ("" if equal).
+    """Return the map of `other` in the variables of `file`, and a note on their matching ("" for equal variables).
 
     Variables are matched by name if both maps have the same names, otherwise by position. Raises InputError if the
     dimensions differ, and for a map that is no Kahan map if its variables are those of `file` in another order.
