@@ -201,7 +201,7 @@ def html_form(value: object) -> str:
 
 @singledispatch
 def text_form(value: object) -> str:
-    """Return the text that `print` shows, by the function that kahanmaps.display registered for the class."""
+    """Return the text that `print` shows for the value, by the function that is registered for its class."""
     return object.__repr__(value)
 
 

@@ -22,8 +22,8 @@ class TimeLimit(KeyboardInterrupt):
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Raise TimeLimit in the block after this number of seconds; None means no limit.
 
-    `seconds` is positive. Results that were stored before the limit remain. `as` gives a function that returns whether
-    the limit has expired. Raises InputError for an invalid limit, outside the main thread, and on Windows.
+    `seconds` is positive. Results stored before the limit remain. The value after `as` is a function that returns
+    whether the limit has expired. Raises InputError for an invalid limit, outside the main thread, and on Windows.
 
     >>> with time_limit(60) as is_over:
     ...     print(is_over())
