@@ -1,4 +1,4 @@
-"""Kahan (Hirota-Kimura) maps of quadratic systems, exactly: orbits, integrals, commutativity, with proofs.
+"""Kahan (Hirota-Kimura) maps of quadratic systems, in exact arithmetic: orbits, integrals, commutativity, proofs.
 
 >>> import kahanmaps as km
 >>> member = km.random_member_with_eigenvalues([1, -2, 3], seed=7)
@@ -25,7 +25,7 @@ from kahanmaps.version import __version__ as __version__
 
 # Type checkers read the public names from __init__.pyi.
 _load, _, _NAMES = attach_stub(__name__, __file__)
-_COMMANDS = {  # functions that have the name of a command
+_COMMANDS = {  # public name -> name of the function, for functions that have the name of a command
     "cycles": "cycle_census",
     "degrees": "degree_growth",
     "find_density": "find_densities",
@@ -36,7 +36,7 @@ _COMMANDS = {  # functions that have the name of a command
     "map": "map_at",
     "portrait": "plot_orbits",
 }
-# `import *` does not import `km.map`, which would hide Python's `map`.
+# `from kahanmaps import *` does not import `km.map`, which would hide Python's `map`.
 __all__ = sorted({*_NAMES, *_COMMANDS} - {"map", "map_at", "plot_orbits"})
 
 

@@ -1,4 +1,4 @@
-"""Atomic and durable writing of files."""
+"""Files that are written atomically and durably."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from typing import IO, Any
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """Open a temporary file that replaces `path` at the end of the block, or is removed if the block raises.
+    """Open a temporary file; it replaces the file `path` at the end of the block, or is removed if the block raises.
 
-    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: its
-    content is written at the end of the block. Raises OSError that names `path`.
+    At any time `path` is either the complete old file or the complete new file. A pipe or a device cannot be replaced:
+    it is written to at the end of the block. Raises an OSError that names `path`.
     """
-    from shutil import copyfileobj  # imported here: tempfile and shutil load modules for random numbers and compression
+    from shutil import copyfileobj  # loads modules for random numbers and compression
     from tempfile import NamedTemporaryFile, TemporaryFile
 
     with with_file_name(path):
@@ -30,12 +30,12 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                     copyfileobj(buffer, stream)
             return
         target = resolve_path(path)
-        os.umask(umask := os.umask(0o022))  # the umask cannot be read without setting it
+        os.umask(umask := os.umask(0o022))  # the umask can be read only by setting it
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
         try:
             prefix = f".{target.name}"[:100] + "."
             temporary = NamedTemporaryFile(dir=target.parent, prefix=prefix, delete=False)  # noqa: SIM115
-        except OSError as error:  # name the requested file, not the temporary one
+        except OSError as error:  # the error must name the requested file instead of the temporary one
             raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
         with temporary as new_file:
             try:
@@ -47,7 +47,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                 with suppress(OSError):
                     os.unlink(new_file.name)
                 raise
-        # Write the new directory entry to the disk too; some file systems do not support this.
+        # Write the new entry of the directory to the disk too, which some file systems do not support.
         with suppress(OSError):
             descriptor = os.open(target.parent, os.O_RDONLY)
             try:
@@ -58,9 +58,9 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
 
 @contextmanager
 def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
-    """Open a text file that grows in place; it is on the disk at the end of the block.
+    """Open a text file to append to it in place; at the end of the block the appended text is on the disk.
 
-    Raises OSError that names `path`.
+    Raises an OSError that names `path`.
     """
     with with_file_name(path), open(path, "w", encoding="utf-8", errors="backslashreplace") as stream:
         yield stream
@@ -69,7 +69,7 @@ def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
 
 @contextmanager
 def with_file_name(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Add the name of the file to an OSError raised in the block; Python's error for a full disk names no file."""
+    """Add the name of the file to an OSError that the block raises; Python's error for a full disk names no file."""
     try:
         yield
     except OSError as error:
@@ -78,23 +78,23 @@ def with_file_name(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file atomically. Raises OSError if it cannot be written."""
+    """Write `content` to the file `path` atomically. Raises OSError if it cannot be written."""
     with atomic_write(path) as stream:
         stream.write(content)
 
 
 def sync(stream: IO[Any]) -> None:
-    """Flush a stream and write its file to the disk; pipes and devices are only flushed."""
+    """Flush a stream and write its file to the disk; a stream to a pipe or a device is only flushed."""
     stream.flush()
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         os.fsync(stream.fileno())
 
 
 def resolve_path(path: str | os.PathLike[str]) -> Path:
-    """Resolve symbolic links. Raises OSError if they form a cycle, or if no file can have this name."""
+    """Return `path` without symbolic links. Raises OSError if the links form a cycle, or no file can have this name."""
     try:
         target = os.path.realpath(path)
-    except ValueError:  # the name contains a zero byte
+    except ValueError:  # the name contains a NUL character
         raise OSError(errno.EINVAL, os.strerror(errno.EINVAL), os.fspath(path)) from None
     if os.path.islink(target):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))

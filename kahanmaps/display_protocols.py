@@ -1,7 +1,7 @@
-"""Base classes of values that can be printed and displayed: `__str__`, `_repr_html_` and `_repr_latex_`.
+"""Base classes of values that are printed and displayed: `__str__`, `_repr_html_` and `_repr_latex_`.
 
-The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes themselves need not
-import these files. They are imported by name on first use: this is the only file that imports from a higher layer.
+The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes need not import
+these files. They are imported by name on first use: no other file imports from a higher layer.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class HtmlDisplay(AttributeHints):
 
 
 class WithoutTruthValue:
-    """Base class of results for which `if result:` raises TypeError.
+    """Base class of results for which `if result:` raises TypeError, since its meaning would be ambiguous.
 
-    A refuted claim and an empty search would otherwise count as true.
+    Without this class a refuted claim and an empty search would count as true.
     """
 
     __slots__ = ()
@@ -46,21 +46,21 @@ class WithoutTruthValue:
 
 
 class Certified:
-    """Base class of results with certificates: proofs that other programs can check."""
+    """Base class of results that can have certificates: proofs that other programs can check."""
 
     __slots__ = ()
 
     def certificate(self, checker: str) -> str:
-        """Return a script in which another program checks what this result proves about a map for every eps.
+        """Return a script with which another program checks what this result proves about a map for every eps.
 
         Args:
             checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
 
         Returns:
-            The exact text of the script, a str with the same attributes as the result of `km.certificate`.
+            The exact text of the script: a str that has the attributes of the result of `km.certificate`.
 
         Raises:
-            InputError: if there is no certificate; its message says why: for example, eps is fixed.
+            InputError: if there is no certificate. The message says why, for example since eps is fixed.
 
         >>> from kahanmaps.checks.conserve import check_integrals
         >>> check_integrals("euler_top").findings[0].certificate("gp").splitlines()[-1]
@@ -71,10 +71,10 @@ class Certified:
 
 
 class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
-    """Base class of results: `print` shows the lines that the command for such a result prints.
+    """Base class of results; `print` shows the lines that the command for this kind of result prints.
 
-    A result with parts is a sequence of its parts: `_parts` is the name of the attribute that holds them, and `_noun`
-    are the words for one part and for several.
+    A result with parts is a sequence of these parts: `_parts` is the name of the attribute that contains them. `_noun`
+    is a pair: the noun for a part in singular and in plural.
     """
 
     __slots__ = ()
@@ -90,10 +90,10 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
             cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # a dataclass prints all its fields
 
     def __repr__(self) -> str:
-        """Return the class name with the number of parts and their verdicts, or with the first line of the text."""
+        """Return the class name with number and verdicts of the parts or, without parts, the first line of the text."""
         if self._noun[0]:
             verdicts = sorted({str(part.verdict) for part in self if hasattr(part, "verdict")})
-            if hasattr(self, "verdict"):  # the verdict of all parts together
+            if hasattr(self, "verdict"):  # a single verdict of all parts together
                 verdicts = [str(self.verdict)]
             number = f"{len(self) or 'no'} {self._noun[len(self) > 1]}"
             return f"<{type(self).__name__}: {', '.join([number, *verdicts])}>"
@@ -117,18 +117,18 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
         return self._sequence()[index]
 
     def to_dict(self) -> Any:
-        """Return the result as plain data, like `to_json`: `json.dump(result.to_dict(), file)` writes it."""
+        """Return the result as plain data, as `to_json` does: `json.dump(result.to_dict(), file)` writes it."""
         return self.to_json()  # type: ignore[attr-defined]
 
     def to_pandas(self) -> Any:
-        """Return `rows()` as a DataFrame. Raises InputError if pandas is not installed or the result is no table."""
+        """Return `rows()` as a DataFrame. Raises InputError if pandas is not installed or the result has no rows."""
         if not hasattr(self, "rows"):
             raise InputError(f"a {type(self).__name__} is not a table: use print")
         return data_frame(self.rows())
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """Return rows as a DataFrame. Raises InputError if pandas is not installed."""
+    """Return the rows as a pandas DataFrame. Raises InputError if pandas is not installed."""
     try:
         pandas = import_module("pandas")
     except ImportError as error:
@@ -140,7 +140,7 @@ _TEXT_ATTRIBUTES = ("text", "sentence", "summary", "claim", "reason", "rhs")
 
 
 class ResultPart(AttributeHints, Certified):
-    """Base class of the parts of results. A part is shown by its first attribute in `_TEXT_ATTRIBUTES`."""
+    """Base class of parts of results; the first attribute in `_TEXT_ATTRIBUTES` that a part has is its text."""
 
     __slots__ = ()
 
@@ -155,7 +155,7 @@ class ResultPart(AttributeHints, Certified):
         return f"<{type(self).__name__}: {shorten(text.partition(chr(10))[0], 100)}>"
 
     def to_dict(self) -> Any:
-        """Return the part as plain data, like `to_json`."""
+        """Return the part as plain data, as `to_json` does."""
         return self.to_json()  # type: ignore[attr-defined]
 
 
@@ -169,14 +169,14 @@ class LatexDisplay(AttributeHints):
         return formula if formula.startswith("$") else rf"$\displaystyle {formula}$"
 
     def latex(self) -> str:
-        """Return the formula as LaTeX, without dollar signs."""
+        """Return the value as a formula in LaTeX, without dollar signs."""
         return latex(self).removeprefix(r"$\displaystyle ").removesuffix("$")
 
     def to_sympy(self) -> Any:
         """Return the exact formula in SymPy; for a system or a map, a dict from variables to formulas."""
         return import_module("kahanmaps.languages.to_sympy").sympy_form(self)
 
-    _sympy_ = to_sympy  # `sympy.sympify(value)` calls it
+    _sympy_ = to_sympy  # `sympy.sympify(value)` calls this method
 
 
 def latex(value: object) -> str:
@@ -186,7 +186,7 @@ def latex(value: object) -> str:
 
 
 def shorten(text: str, width: int) -> str:
-    """Shorten a long text to its first and last characters, and give its length: 12345...67890 (1234 chars)."""
+    """Shorten a long text to its first and last characters, followed by its length: 12345...67890 (1234 chars)."""
     if len(text) <= width:
         return text
     kept_length = max(4, (width - 18) // 2)
@@ -195,19 +195,19 @@ def shorten(text: str, width: int) -> str:
 
 @singledispatch
 def html_form(value: object) -> str:
-    """Return the value as HTML; each class has a function for this, registered in kahanmaps.display."""
+    """Return the value as HTML, by the function that a file of kahanmaps.display registered for its class."""
     raise TypeError(f"no HTML is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
 @singledispatch
 def text_form(value: object) -> str:
-    """Return the text that `print` shows; each class has a function for this, registered in kahanmaps.display."""
+    """Return the text that `print` shows for the value, by the function that is registered for its class."""
     return object.__repr__(value)
 
 
 @singledispatch
 def latex_form(value: object) -> str:
-    """Return the value as LaTeX; each class has a function for this, registered in kahanmaps.display."""
+    """Return the value as LaTeX, by the function that kahanmaps.display registered for its class."""
     raise TypeError(f"no LaTeX is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
@@ -215,8 +215,8 @@ _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}  # fol
 
 
 def _load_displays(value: object) -> None:
-    """Import the file of kahanmaps.display for the class of `value`; its name is in `_FILES`, or that of the folder."""
-    for base in type(value).__mro__:  # a user's subclass is displayed like its base class
+    """Import the file of kahanmaps.display for the class of `value`; `_FILES` or the folder of the class names it."""
+    for base in type(value).__mro__:  # base classes too: a user's subclass is displayed like its base class
         package, *folders = base.__module__.split(".")
         if package in ("kahanmaps", "flint"):
             is_formula = package == "flint" or folders[0] == "algebra"

@@ -1,9 +1,9 @@
-"""The exceptions of kahanmaps, and helpers for messages.
+"""The exceptions of kahanmaps, and functions that help to write messages.
 
-An exception means that a request cannot be fulfilled. Events in the course of an orbit or a check, such as a singular
-point or an exhausted digit budget, are statuses, not exceptions.
+An exception means that a request cannot be fulfilled. An event along an orbit or during a check, such as a singular
+point or an exhausted digit budget, is reported as a status instead.
 
-Each exception is also a Python one, so that `except ValueError` in a script works.
+Each exception is also an exception of Python, such as ValueError, so that `except ValueError` in a script catches it.
 """
 
 from __future__ import annotations
@@ -15,33 +15,33 @@ from datetime import date, time
 from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
-_MISTAKES_SHOWN = 50  # number of mistakes in one message
-_CONTEXT_WIDTH = 72  # characters of a text that are shown around a mistake in it
-# Codes of the operating system for a full or broken disk, or for another exhausted resource.
+_MISTAKES_SHOWN = 50  # maximal number of mistakes that a message lists
+_CONTEXT_WIDTH = 72  # number of characters of a text that are shown around a mistake in it
+# Error codes of the operating system for a full or broken disk, or for another exhausted resource.
 _MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
-# Messages of the dynamic linker, and of libraries loaded with too little memory.
+# Parts of messages of the dynamic linker, and of libraries that were loaded with too little memory.
 _NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
-_MAX_WORD, _MAX_LINE, _MAX_LINES = 300, 1000, 200  # characters in a word, characters in a line, lines in a message
+_MAX_WORD, _MAX_LINE, _MAX_LINES = 300, 1000, 200  # maximal lengths of a word and of a line, maximal number of lines
 
 
 class KahanmapsError(Exception):
-    """Base class of the exceptions of kahanmaps. Long messages are shortened by `bounded`."""
+    """Base class of the exceptions of kahanmaps; `bounded` shortens messages that are too long."""
 
     def __str__(self) -> str:
         return bounded(super().__str__())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default an exception is unpickled by a call with its message only; some subclasses need more arguments.
+        # By default, unpickling calls the class with the message only, but some subclasses require more arguments.
         return _restore_error, (type(self), self.args), self.__dict__
 
 
 def _restore_error(kind: type[KahanmapsError], args: tuple[Any, ...]) -> KahanmapsError:
-    """Restore a pickled exception without calling its constructor; its attributes are not restored."""
+    """Restore a pickled exception without calling its constructor; pickle restores its attributes afterwards."""
     return kind.__new__(kind, *args)
 
 
 class InputError(KahanmapsError, ValueError):
-    """An invalid value; the message names the value, what was expected, and what to do."""
+    """An invalid value; the message says what was found, what was expected, and what to do."""
 
 
 class InexactNumber(InputError, TypeError):
@@ -49,9 +49,9 @@ class InexactNumber(InputError, TypeError):
 
 
 class ExpressionError(InputError):
-    """Text that cannot be parsed as the expected number, polynomial or rational function.
+    """A text that cannot be parsed as the expected number, polynomial or rational function.
 
-    Attributes: `text` (as given), `column` (0-based position of the mistake, or None).
+    Attributes: `text` (the text as given), `column` (the position of the mistake, counted from 0, or None).
     """
 
     def __init__(self, message: str, text: str = "", column: int | None = None) -> None:
@@ -59,11 +59,11 @@ class ExpressionError(InputError):
         self.text = text
         self.column = column
         if column is not None:
-            # Append the part of `text` around `column`, and below it a caret under the character at `column`.
+            # Append the part of `text` around `column`, and a line with a caret below the character at `column`.
             start = max(0, column - _CONTEXT_WIDTH // 2)
             end = min(len(text), start + _CONTEXT_WIDTH)
             before, after = "..." * (start > 0), "..." * (end < len(text))
-            # Print every character in one cell, so that the caret is aligned; escape sequences are removed as well.
+            # Print each character in one cell, so that the caret is aligned; this also removes escape sequences.
             context = "".join(c if c.isprintable() else " " for c in text[start:end])
             message += f"\n  {before}{context}{after}\n  {' ' * (len(before) + column - start)}^"
         super().__init__(message)
@@ -74,9 +74,9 @@ class UnknownName(ExpressionError):
 
 
 class SystemFileError(InputError):
-    """A system file with mistakes, which are all reported together, each with its key in the file.
+    """A system file with mistakes, which are reported together, each with its key in the file.
 
-    Attributes: `where` (the file), `mistakes` (pairs of key path and sentence).
+    Attributes: `where` (the name of the file), `mistakes` (pairs of key path and message).
     """
 
     def __init__(self, where: str, mistakes: Sequence[tuple[str, str]]) -> None:
@@ -95,7 +95,7 @@ class HypothesisError(InputError):
 
 
 class BadPrime(InputError):
-    """A prime that divides a denominator: there is no reduction modulo this prime. Attribute: `prime`."""
+    """A prime that divides a denominator, so that there is no reduction modulo it. Attribute: `prime`."""
 
     def __init__(self, message: str, prime: int) -> None:
         self.prime = prime
@@ -103,7 +103,7 @@ class BadPrime(InputError):
 
 
 class SingularStep(KahanmapsError, ZeroDivisionError):
-    """The Kahan map is undefined at a point: det(I - eps f'(x)) = 0. Attributes: `point`, `eps`."""
+    """The Kahan map is undefined at a point x: det(I - eps f'(x)) = 0. Attributes: `point` (x), `eps`."""
 
     def __init__(self, message: str, point: Any = None, eps: Any = None) -> None:
         self.point = point
@@ -116,30 +116,30 @@ class SingularMatrix(KahanmapsError, ZeroDivisionError):
 
 
 class PrecisionLost(KahanmapsError, ArithmeticError):
-    """A ball is too wide to decide whether its number is zero: a higher precision is needed."""
+    """The number in a ball may be zero or not, since the ball is too wide: a higher precision is needed."""
 
 
 class UnknownCurve(KahanmapsError):
-    """No curve was found that contains an orbit; whether there is one remains undecided."""
+    """No curve that contains an orbit was found; whether such a curve exists remains undecided."""
 
 
 def show(value: Any, width: int = 60) -> str:
-    """Format a value as in a file, shortened and with control characters escaped.
+    """Format a value as a file would contain it, shortened to `width` and with control characters escaped.
 
     >>> show(True), show("two"), show({"a": 1})
     ('true', "'two'", "{'a': 1}")
     """
-    if isinstance(value, date | time):  # datetime is a subclass of date
+    if isinstance(value, date | time):  # a datetime is a date too
         return value.isoformat()
     try:
         text = str(value).lower() if isinstance(value, bool) else repr(value)
-    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
+    except (RecursionError, ValueError):  # e.g. deeply nested tables, or integers with too many digits
         return "a value too large to show"
     return text if len(text) <= width else f"{text[: width - 20]}...{text[-15:]}"
 
 
 def quoted(text: str, width: int = 40) -> str:
-    """Return `text` in quotes, safe to print and shortened to `width`.
+    """Return `text` in quotes, shortened to `width` characters and with control characters escaped.
 
     >>> quoted("12345", 5), quoted("1" * 50, 5)
     ("'12345'", "'11111...'")
@@ -148,7 +148,7 @@ def quoted(text: str, width: int = 40) -> str:
 
 
 def printable(text: str) -> str:
-    """Escape the control characters of a text; line ends and tabs remain.
+    """Return a text with its control characters escaped, except line ends and tabs.
 
     >>> len(printable(chr(27) + "[31m")) - len("[31m")
     4
@@ -157,9 +157,9 @@ def printable(text: str) -> str:
 
 
 def bounded(message: str) -> str:
-    """Shorten very long words and lines of a message, and add their lengths.
+    """Return a message in which very long words and lines are shortened, with their lengths added.
 
-    Values of the user are already shortened where messages are written; this function catches the remaining cases.
+    Values given by the user are shortened where a message is written; this function is for the remaining cases.
 
     >>> len(bounded("there is no file " + "x" * 200_000))
     317
@@ -175,7 +175,7 @@ def bounded(message: str) -> str:
 
 
 def _cut(text: str, max_length: int) -> str:
-    """Shorten a text to `max_length` characters, mostly from its beginning, and add its length."""
+    """Shorten a text to `max_length` characters, most of them from its beginning; its length is added."""
     if len(text) <= max_length:
         return text
     length = f" ({len(text)} characters)"
@@ -185,9 +185,9 @@ def _cut(text: str, max_length: int) -> str:
 
 @contextmanager
 def reading(name: object) -> Iterator[None]:
-    """Add the name of the source that is being read to an unexpected exception raised in the block.
+    """Add the name of the source that is read to an unexpected exception that the block raises.
 
-    Without this name the exception would suggest a bug, although the source may be damaged.
+    Without the name the exception would suggest a bug in kahanmaps, although the source may be damaged.
     """
     try:
         yield
@@ -197,13 +197,13 @@ def reading(name: object) -> Iterator[None]:
 
 
 def note_source(error: BaseException, name: object) -> None:
-    """Add the source of the data to an unexpected exception."""
+    """Add a note to an unexpected exception: the name of the source that is read."""
     if isinstance(error, Exception) and not isinstance(error, (KahanmapsError, OSError, MemoryError)):
         error.add_note(str(name))
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Whether an exception means that memory is exhausted; it may come from a library that could not be loaded."""
+    """Whether an exception means that memory is exhausted, even if a library could not be loaded for this reason."""
     if isinstance(error, MemoryError):
         return True
     if isinstance(error, OSError) and error.errno == ENOMEM:
@@ -212,17 +212,17 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def is_machine_failure(error: OSError) -> bool:
-    """Whether the error is due to the state of the machine, so that the same request may succeed later or elsewhere."""
+    """Whether an error is due to the state of the machine: the same request may succeed later or elsewhere."""
     return error.errno in _MACHINE_ERRORS
 
 
 def counted(number: int, word: str) -> str:
-    """Return the number with the noun in singular or plural: 1 step, 2 steps."""
+    """Return a number with its noun in the singular or plural, such as 1 step, 2 steps."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def suggestion(value: Any, known: Sequence[str]) -> str:
-    """Return a hint that suggests similar known names, or an empty text.
+    """Return a hint with known names that are similar to `value`, or an empty text.
 
     >>> suggestion("alhpa", ["alpha", "beta"])
     '; did you mean alpha?'

@@ -1,7 +1,7 @@
-"""Calls of the public functions: wrong arguments are explained in a message, and notebooks show progress.
+"""Calls of public functions: messages explain wrong arguments, and notebooks show progress.
 
-`public_function` wraps a function of `import kahanmaps`. Its signature, annotations and docstring do not change, and no
-argument is changed.
+`public_function` wraps a function of `import kahanmaps`; its signature, annotations and docstring remain the same, and
+arguments are passed on unchanged.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.errors import InputError, suggestion
 from kahanmaps.hard_stop import TimeLimit
 
-_DELAY_SECONDS, _UPDATE_SECONDS = 2.0, 0.5  # seconds before the first message, and between two messages
+_DELAY_SECONDS, _UPDATE_SECONDS = 2.0, 0.5  # seconds before progress is first shown, and between two updates
 _ARGUMENT_HINTS = {
     **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
     **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
@@ -49,7 +49,7 @@ _ARGUMENT_HINTS = {
     ),
     "over": 'km.scan(system, over="a") varies a parameter',
 }
-_MISSING_HINTS = {  # what to type for a required argument
+_MISSING_HINTS = {  # name of a required argument -> what to type
     "checker": 'checker= is "sympy", "gp" or "rocq"',
     "other": "km.check_commute(system, other)",
     "language": 'km.convert(system, "latex")',
@@ -59,11 +59,11 @@ _MISSING_HINTS = {  # what to type for a required argument
 
 
 class CallError(InputError, TypeError):
-    """A call with a missing, unknown or superfluous argument; the message gives the arguments of the function."""
+    """A missing, unknown or superfluous argument of a call; the message lists the arguments of the function."""
 
 
 def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Return the public version of a function under its public name `name`; it checks its arguments."""
+    """Return the public version of a function: it checks its arguments, and `name` is its public name."""
     signature = inspect.signature(function)
     annotation_of = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
     takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())
@@ -78,12 +78,12 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
             if annotation_of[argument].startswith("bool"):  # any other value would count as true or false
                 _require_kind(argument, value, annotation_of[argument])
         try:
-            # A person waits for the answer in a notebook or at a Python prompt.
+            # At a Python prompt or in a notebook a user waits for the result.
             is_interactive = threading.current_thread() is threading.main_thread()
             is_interactive = is_interactive and (hasattr(sys, "ps1") or _in_notebook())
             return call_interactively(arguments, args, kwargs) if is_interactive else function(*args, **kwargs)
         except TypeError as error:
-            if not isinstance(error, InputError):  # the function did not check this argument
+            if not isinstance(error, InputError):  # check now what the function did not check
                 for argument, value in arguments.items():
                     _require_kind(argument, value, annotation_of[argument])
             raise
@@ -104,21 +104,21 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
                     raise KeyboardInterrupt from None
                 if hasattr(results[-1], "interrupt"):
                     results[-1].interrupt()
-                return results[-1]  # the results obtained before the interrupt
+                return results[-1]  # its results are those obtained before the interrupt
 
-    # Pickle finds the function by this name, as an attribute of `kahanmaps`.
+    # Pickle looks the function up under this name, as an attribute of `kahanmaps`.
     call.__module__, call.__qualname__ = "kahanmaps", name
     return call
 
 
 class CallableModule(ModuleType):
-    """A subpackage with the name of a command; calling it calls its function `command`, as the command does."""
+    """A callable subpackage: `km.systems(...)` and `km.family(...)` call the function `command` of the subpackage."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         return public_function(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        # Importing a submodule sets it as an attribute; a function of the same name must not be overwritten.
+        # Python sets an imported submodule as an attribute; it must not replace a function of the same name.
         if not (isinstance(value, ModuleType) and isinstance(vars(self).get(name), FunctionType)):
             super().__setattr__(name, value)
 
@@ -142,7 +142,7 @@ def _wrong_call(
 
 
 def _require_kind(name: str, value: Any, annotation: str) -> None:
-    """Raise InputError for a value that is not the integer, number, truth value or text that `annotation` requires."""
+    """Raise InputError unless `value` has the kind (int, float, bool, str) that `annotation` requires."""
     kind = annotation.removesuffix(" | None")
     if (value is None and kind != annotation) or kind not in ("int", "bool", "str", "float"):
         return
@@ -150,7 +150,7 @@ def _require_kind(name: str, value: Any, annotation: str) -> None:
         integer(value, name)
     elif kind == "float" and not (isinstance(value, int | float) and not isinstance(value, bool)):
         raise InputError(f"found {name} = {value!r}, expected a number")
-    elif kind in ("bool", "str") and type(value).__name__ not in (kind, f"{kind}_"):  # bool_ and str_ of numpy
+    elif kind in ("bool", "str") and type(value).__name__ not in (kind, f"{kind}_"):  # numpy's bool_ and str_
         expected = "True or False" if kind == "bool" else "a text"
         raise InputError(f"found {name} = {value!r}, expected {expected}")
 
@@ -163,9 +163,9 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def _catch_interrupts() -> Iterator[Callable[[], bool]]:
-    """Within the block Ctrl-C, or a notebook's stop button, ends a search as a time limit does: its results are kept.
+    """Let Ctrl-C, or the stop button of a notebook, end the search in the block like a time limit: its results remain.
 
-    A second interrupt raises KeyboardInterrupt. An interrupt handler installed by the caller is not replaced.
+    A second interrupt raises KeyboardInterrupt. An interrupt handler of the caller is not replaced.
     """
     interrupts: list[bool] = []
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -186,7 +186,7 @@ def _catch_interrupts() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
-    """Show the latest message below a notebook cell, from two seconds after the start until the block ends."""
+    """Show the latest message below a notebook cell, from two seconds after the start of the block to its end."""
     if not _in_notebook():
         yield lambda _: None
         return
@@ -197,7 +197,7 @@ def _show_progress(name: str) -> Iterator[Callable[[str], None]]:
     def show() -> None:
         if is_done.wait(_DELAY_SECONDS):
             return
-        with suppress(Exception):  # an error of the display must not end the search
+        with suppress(Exception):  # an error of the display must not end the computation
             handle = ipython.display(ipython.HTML(_progress_bar(messages[-1])), display_id=True)
             while not is_done.wait(_UPDATE_SECONDS):
                 handle.update(ipython.HTML(_progress_bar(messages[-1])))

@@ -1,7 +1,7 @@
-"""Hints for names that do not exist: what to type instead.
+"""Hints on what to type in place of a name that does not exist.
 
-`HINTS` lists terms of SciPy, SymPy and diffrax, and names of earlier releases. Other names are compared with the names
-that exist.
+`HINTS` contains terms of SciPy, SymPy and diffrax, and names of earlier releases. Any other name is compared with the
+existing names.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _ORBIT = "km.orbit(system, x0, eps, steps), in floating point with exact=False"
 _SYSTEM = 'km.System("x\' = y; y\' = x^2"), km.System({"x": "y", "y": "x^2"}) or km.load("euler_top")'
 _INTEGRALS = "km.find_integrals(system), or km.check_integrals(system, formula) for a claim"
 
-# Name -> what to type instead, where system, map, orbit and result stand for the user's values.
+# Unknown name -> what to type instead; system, map, orbit and result stand for values of the user.
 HINTS = {
     **dict.fromkeys(("parse", "parse_equations", "from_string", "from_sympy", "from_dict", "system", "ode"), _SYSTEM),
     **dict.fromkeys(("ODE", "QuadraticField", "VectorField", "vector_field", "from_text", "from_latex"), _SYSTEM),
@@ -63,7 +63,7 @@ HINTS = {
     "ensembles": "km.ensemble(system, x0, eps, steps)",
     "hamiltonian_structure": "km.constant_structures(system)",
     "to_parquet": 'orbit.write("orbit.parquet")',
-    # names of earlier releases
+    # names in earlier releases
     **dict.fromkeys(("GivenTensor",), "km.MatrixPoissonTensor"),
     **dict.fromkeys(("HiddenMember", "RecognisedMember"), "km.FamilyStructure"),
     **dict.fromkeys(("hidden_member", "recognised_member"), "km.find_family_structure(hamiltonian)"),
@@ -89,11 +89,11 @@ HINTS = {
 
 
 class MissingName(InputError, AttributeError):
-    """A name that does not exist; the message gives an existing one."""
+    """A name that does not exist; the message suggests an existing one."""
 
 
 def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
-    """Return the error for a missing attribute; its message says what to type instead.
+    """Return the error for a missing attribute `name` of `owner`; its message says what to type instead.
 
     >>> print(missing_name("module 'kahanmaps'", "equilibria", []))
     module 'kahanmaps' has no attribute 'equilibria': type km.fixed_points(system)
@@ -109,14 +109,14 @@ def missing_name(owner: str, name: str, known: Iterable[str]) -> MissingName:
 
 
 class AttributeHints:
-    """Base class of values whose error for a missing attribute suggests an existing one."""
+    """Base class of values for which the error for a missing attribute suggests an existing one."""
 
     __slots__ = ()
 
-    if not TYPE_CHECKING:  # a type checker that sees __getattr__ accepts every attribute
+    if not TYPE_CHECKING:  # for a type checker, __getattr__ would make every attribute valid
 
         def __getattr__(self, name: str) -> Any:
-            # Python, NumPy, SymPy and IPython look up such names by themselves.
+            # Python, NumPy, SymPy and IPython look up such names without a request of the user.
             if name[:1] == "_" or (name.startswith("is_") and name not in HINTS):
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             attributes = (attribute for attribute in dir(type(self)) if attribute[0] != "_")

@@ -1,6 +1,6 @@
-"""The names of the library that the command line uses, imported on first use so that --help is fast.
+"""The library as the command line uses it: its names are imported on first use, so that --help is fast.
 
-The names and their modules are listed in internals.pyi, which type checkers read as well.
+The file internals.pyi lists the names and their modules, for lazy-loader and for type checkers.
 """
 
 import sys
@@ -12,8 +12,8 @@ _load, __dir__, __all__ = attach_stub("kahanmaps", __file__)
 
 
 def __getattr__(name: str) -> Any:
-    # Some versions of lazy-loader also store what they load in the package. There it would replace public functions,
-    # which explain wrong arguments, and would make private names public.
+    # Some versions of lazy-loader also store a loaded value in the package `kahanmaps`. There it would replace a public
+    # function, which explains wrong arguments, or make a private name public.
     public = vars(sys.modules["kahanmaps"])
     is_stored, stored = name in public, public.get(name)
     value = _load(name)

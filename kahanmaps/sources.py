@@ -1,8 +1,8 @@
-"""The references cited in docstrings, catalogue files and evidence, by key.
+"""The references that docstrings, catalogue files and evidence cite by their keys.
 
-Definitions, propositions, lemmas and theorems of petrera-suris-2016 share one numbering: Theorem 9 is commutativity,
-Theorem 11 the integrals, Theorem 12 the Poisson structure. Displayed equations are cited by their label in the LaTeX
-source.
+In petrera-suris-2016 definitions, propositions, lemmas and theorems share one numbering: Theorem 9 is commutativity,
+Theorem 11 the integrals, Theorem 12 the Poisson structure. Displayed equations of this paper are cited by their labels
+in its LaTeX source.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ SOURCES: dict[str, str] = {
 
 
 def source(key: str) -> str:
-    """Return the full reference for a citation key.
+    """Return the full reference for the key of a citation.
 
     >>> source("kahan-1993")
     'W. Kahan. Unconventional numerical methods for trajectory calculations. Lecture notes, 1993'

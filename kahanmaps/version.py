@@ -1,3 +1,3 @@
-"""The version of the library, which every machine-readable output carries."""
+"""The version of the library, which machine-readable outputs contain, except stable exports of batches."""
 
 __version__ = "0.2.0"

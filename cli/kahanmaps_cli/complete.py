@@ -1,6 +1,6 @@
 """Shell completion of systems and files.
 
-Completion must be fast, so this module does not import the library. Errors are not reported, since a traceback would
+Completion must be fast, so this module does not import the library. It reports no errors, since a traceback would
 disturb the command line.
 """
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def complete_system(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return matching names of the catalogue and system files."""
+    """Return the catalogue names, TOML files and folders that start with `incomplete`."""
     from kahanmaps.documents.catalog import names
 
     return [*(name for name in names() if name.startswith(incomplete)), *complete_toml(context, parameter, incomplete)]
 
 
 def complete_toml(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return matching TOML files, and folders with a final slash."""
+    """Return the TOML files, and the folders with a final slash, that start with `incomplete`."""
     folder, slash, start = incomplete.rpartition("/")
     prefix = folder + slash
     matches = []

@@ -1,4 +1,4 @@
-"""Command groups that suggest commands for misspelt names, and click's errors reworded like all other messages."""
+"""Command groups that suggest commands for misspelt names; errors of click reworded like all other messages."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from kahanmaps.errors import quoted
 
 
 class SuggestingGroup(click.Group):
-    """A group that suggests similar commands for an unknown name, and replacements for removed commands."""
+    """A command group that suggests similar commands for an unknown name, and replacements for a removed command."""
 
-    removed: ClassVar[dict[str, str]] = {}  # name of a command -> what to use instead
+    removed: ClassVar[dict[str, str]] = {}  # name of a removed command -> what to use instead
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -26,13 +26,13 @@ class SuggestingGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def hint(self, written: str, names: list[str]) -> str:
-        """Return ' Did you mean ...?', or an empty text if no command is similar."""
+        """Return ' Did you mean ...?' with commands similar to `written`, or an empty text if there are none."""
         extensions = [name for name in names if len(written) > 2 and name.startswith(f"{written}-")]
         similar_names = extensions or similar_words_of(written, names, 0.5)
         return f" Did you mean {' or '.join(similar_names)}?" if similar_names else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands with complete first sentences, which click would cut."""
+        """Write the list of commands, each with its complete one-line help, which click would shorten."""
         commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
         rows = [
             (name, command.get_short_help_str(limit=1000))
@@ -44,7 +44,7 @@ class SuggestingGroup(click.Group):
 
 
 def similar_words_of(written: str, words: list[str], cutoff: float = 0.6) -> list[str]:
-    """Return up to three words of `words`: the word most similar to `written`, and words nearly as similar."""
+    """Return up to three of `words`: the word most similar to `written`, and others that are nearly as similar."""
     from difflib import SequenceMatcher, get_close_matches
 
     similar_words = get_close_matches(written, words, n=3, cutoff=cutoff)
@@ -70,7 +70,7 @@ REMOVED_OPTIONS = {
 
 
 def rephrase(error: click.ClickException) -> click.ClickException:
-    """Return an error of click in the form "found X, expected Y", with a suggestion for a misspelt choice."""
+    """Reword an error of click, usually to "found X, expected Y", with a suggestion for a misspelt choice."""
     if isinstance(error, click.NoSuchOption) and error.ctx is not None:
         command = error.ctx.command_path.removeprefix("kahanmaps ")
         replacement = REMOVED_OPTIONS.get((command, error.option_name))

@@ -1,7 +1,7 @@
-"""The entry point: the lazily loaded commands, and the conversion of errors to messages and exit statuses.
+"""The entry point of the command line: it loads commands on demand and turns errors into messages and statuses.
 
-Exit statuses: 0 the claim holds or the work is done; 1 refuted (never anything else); 2 usage error or bad input; 3
-undecided or stopped early, or the output was lost; 70 an internal error; 130 interrupted by Ctrl-C or SIGTERM.
+Exit statuses: 0 the claim holds or the work is done; 1 a claim is refuted (no other cause); 2 usage error or invalid
+input; 3 undecided, stopped early, or output lost; 70 internal error; 130 interrupted by Ctrl-C or SIGTERM.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SUCCESS, REFUTED, USAGE_ERROR, UNDECIDED, INTERNAL_ERROR = 0, 1, 2, 3, 70
 
-COMPLETION = "_KAHANMAPS_COMPLETE"  # environment variable, set by the shell to request completions
+COMPLETION = "_KAHANMAPS_COMPLETE"  # environment variable that a shell sets in order to request completions
 
 # Heading -> name of a command -> (its module in kahanmaps_cli.commands, its line in the list of commands).
 SECTIONS = {
@@ -102,7 +102,7 @@ eps is half the time step throughout: h = 2 eps."""
 
 
 class LazyGroup(SuggestingGroup):
-    """A group that imports a command only when it is needed, so that --help is fast."""
+    """A command group that imports the module of a command only when the command is needed, so that --help is fast."""
 
     removed: ClassVar = {
         "schema": "the keys of JSON are described in docs/cli.md",
@@ -197,25 +197,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return USAGE_ERROR
     except (click.Abort, KeyboardInterrupt) as stop:  # click turns KeyboardInterrupt into Abort
         return _report_interrupt(stop.__cause__ or stop)
-    except SystemExit as stop:  # raised by click: 0 after a completion, 1 after a broken pipe
+    except SystemExit as stop:  # raised by click with code 0 after a completion, and 1 after a broken pipe
         return UNDECIDED if stop.code else SUCCESS
     except BrokenPipeError:
         return UNDECIDED
     except Exception as error:
-        # Python turns Ctrl-C into RuntimeError while a class is being created during an import.
+        # Python turns a KeyboardInterrupt into a RuntimeError if a class is being created during an import.
         cause: BaseException | None = error
         while cause is not None and not isinstance(cause, KeyboardInterrupt):
             cause = cause.__cause__ or cause.__context__
         if cause is not None:
             return _report_interrupt(cause)
-        return INTERNAL_ERROR if os.environ.get(COMPLETION) else _report_error(error)  # completion prints nothing
+        return INTERNAL_ERROR if os.environ.get(COMPLETION) else _report_error(error)  # print nothing in a completion
     finally:
         discard_unwritable_output()
 
 
 def _report_interrupt(stop: BaseException) -> int:
     end_interrupts()
-    is_over = isinstance(stop, TimeLimit)  # the limit --seconds expired at the very end of a search
+    is_over = isinstance(stop, TimeLimit)  # the limit --seconds expired just after the end of a search
     print_stderr(f"stopped: {stop} (--seconds)" if is_over else "interrupted")
     return UNDECIDED if is_over else INTERRUPTED
 

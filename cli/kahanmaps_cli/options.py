@@ -29,7 +29,7 @@ def stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
 
 
 class RenamedOption(click.Option):
-    """An option with older names, which are accepted but not shown in the help."""
+    """An option whose older names are accepted, but not shown in the help."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         names, self.opts = self.opts, self.opts[:1]
@@ -46,7 +46,7 @@ system_argument: Callable[[F], F] = click.argument("system", required=False, she
 
 
 def _split_pairs(ctx: click.Context, param: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
-    """Split the values of all -p into pairs NAME=VALUE: one -p may set several parameters, as in -p a=1,b=2."""
+    """Return the pairs (NAME, VALUE) of all -p; one -p may set several parameters, as in -p a=1,b=2."""
     settings = []
     for name, value in pairs:
         text, *pieces = value.split(",")
@@ -163,7 +163,7 @@ backward_option: Callable[[F], F] = click.option(
 
 
 def integral_option(help_text: str, flag: str = "--integral", into: str = "integrals") -> Callable[[F], F]:
-    """Return the option --integral [NAME=]EXPR, whose values are pairs of a name (may be empty) and an expression."""
+    """Return the option --integral [NAME=]EXPR; its values are pairs (name, expression), and the name may be empty."""
     return click.option(
         flag, into, type=NameValue(name_is_optional=True), multiple=True, metavar="[NAME=]EXPR", help=help_text
     )
@@ -223,12 +223,12 @@ check_options: Callable[[F], F] = stack(
 
 
 def pick(options: Mapping[str, Any], *names: str, **renamed: str) -> dict[str, Any]:
-    """Return a dict of options as keyword arguments; with terms="max" the option max becomes the argument terms."""
+    """Return a dict of keyword arguments from the named options; `terms="max"` passes the option max as terms."""
     return {name: options[name] for name in names} | {argument: options[name] for argument, name in renamed.items()}
 
 
 def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
-    """Return eps from --eps or --time-step; None if neither option is given and eps is not `required`."""
+    """Return eps from --eps or --time-step; without either option, raise UsageError if `required`, else return None."""
     if eps is not None and time_step is not None:
         raise click.UsageError("give --eps or --time-step, not both (the time step is 2 eps)")
     if time_step is not None:
@@ -239,13 +239,13 @@ def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
 
 
 def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
-    """Return eps from --eps or --time-step, which is required if the map depends on eps; None for a map without eps."""
+    """Return eps from --eps or --time-step, one of which is required; for a map without eps return None."""
     eps = requested_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
 
 
 def are_equations(reference: str | None) -> bool:
-    """Whether the argument SYSTEM consists of equations rather than a name."""
+    """Whether the argument SYSTEM consists of equations: it contains a = and is not the name of a file."""
     return reference is not None and "=" in reference and not os.path.lexists(reference)
 
 
@@ -255,7 +255,7 @@ def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
 
 
 def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) -> tuple[str | None, str | None]:
-    """Return `system`, `other` as the first and second system; if the first is inline, `system` is the second one."""
+    """Return the arguments of the first and the second system; the first is None if options such as --rhs define it."""
     if is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":
@@ -266,7 +266,7 @@ def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) 
 def load_pair(
     reference: str | None, other: str | None, options: Mapping[str, Any]
 ) -> tuple[lib.SystemFile, lib.SystemFile | None]:
-    """Load one or two systems; -p sets a parameter in each system that has it."""
+    """Load one or two systems; -p sets a parameter in each system that has a parameter of this name."""
     values = dict(options.get("parameters", ()))
     if other is None or not values:
         without_parameters = {"quiet": options.get("quiet")}
@@ -281,7 +281,7 @@ def load_pair(
 
     first_parameters, second_names = options["parameters"], parameter_names(other)
     second_parameters = [pair for pair in options["parameters"] if pair[0] in second_names]
-    # If the first system is inline or on standard input, its parameters are not known yet.
+    # The names of the parameters of a first system that is inline or on standard input are not known yet.
     if reference is not None and reference != "-":
         first_names = parameter_names(reference)
         first_parameters = [pair for pair in first_parameters if pair[0] not in second_names or pair[0] in first_names]
@@ -295,7 +295,7 @@ def load_pair(
 def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
     """Load the system of a command line: a path, a catalogue name, `-` for standard input, equations, or options.
 
-    Unless `quiet`, notes on how equations were interpreted are printed on standard error.
+    Notes on how equations were interpreted are printed on standard error, unless the option `quiet` is set.
     """
     file = _load_without_notes(reference, options)
     if not options.get("quiet"):
@@ -351,9 +351,9 @@ def _load_without_notes(reference: str | None, options: Mapping[str, Any]) -> li
 def load_with_start(
     options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *arguments: str | None
 ) -> tuple[Any, Any]:
-    """Return the file or the two files that `load` loads, and the initial point, whose text may contain parameters.
+    """Return a pair: what `load` returns (one system or two), and the initial point, which may contain parameters.
 
-    An algebraic number given by -p that is not a parameter of the system is used only in the initial point.
+    An algebraic number given by -p whose name is no parameter of the system is used only in the initial point.
     """
     text = options["start"]
     if not isinstance(text, str):
@@ -365,7 +365,7 @@ def load_with_start(
         if argument is not None and argument != "-" and not are_equations(argument):
             parameter_names |= set(_load_without_notes(argument, {}).document.get("parameters", ()))
     inline_text = " ".join([*map(str, filter(are_equations, arguments)), *options["rhs"], *options["image"]])
-    # The parameters of a system on standard input are not known yet.
+    # The names of the parameters of a system on standard input are not known yet.
     parameter_names |= {name for name in roots if "-" in arguments or re.search(rf"\b{name}\b", inline_text)}
     start_roots = {name: root for name, root in roots.items() if root is not None and name not in parameter_names}
     loaded_files = load(
@@ -380,7 +380,7 @@ def load_with_start(
 
 
 def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
-    """Load a system by name or file; the error for a missing file suggests files with similar names."""
+    """Load a system from a path or the catalogue; the error for a missing file suggests files with similar names."""
     try:
         return lib.load(reference, parameters)
     except lib.InputError as error:
@@ -404,7 +404,7 @@ def _split_components(texts: Sequence[str]) -> list[str]:
 
 
 def settings_from(options: dict[str, Any], progress: Callable[[str], None], start: Any) -> lib.Settings:
-    """Return the settings of a check from the values of `check_options` and its initial point."""
+    """Return the settings of a check from the values of `check_options` and the initial point `start`."""
     steps = options["steps"]
     if isinstance(start, lib.AlgebraicPoint):
         start = start.over(start.root.number_field)

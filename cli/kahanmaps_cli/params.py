@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-import kahanmaps.internals as lib  # `from kahanmaps import` would first look for a public name and suggest others
+import kahanmaps.internals as lib  # `from kahanmaps import internals` would first look for a public name
 from kahanmaps.errors import ExpressionError, InputError, quoted
 from kahanmaps_cli.screen.terminal import color_option
 
@@ -24,13 +24,13 @@ HELP_OPTIONS = ["-h", "--help"]
 _NAME = re.compile(r"(?<![0-9.A-Za-z_])[A-Za-z_]")
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _HINTS = {"\u2212\u2013": "write the minus sign as -", ";": "separate the numbers of a point by commas"}
-_MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # maximal number of digits of a step number, and of any other integer
+_MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # maximal number of digits of a number of steps, and of any other integer
 
 
 class ParameterKind(OptionType):
-    """A type of option values: `read(text, *settings)` converts a text, and its InputError becomes the message.
+    """A type of option values: `read(text, *settings)` converts a text, and its InputError becomes a usage error.
 
-    Non-string values are defaults and are returned unchanged.
+    A value that is not a string is a default and is returned unchanged.
     """
 
     def __init__(self, name: str, read: Callable[..., Any], *settings: Any) -> None:
@@ -48,7 +48,7 @@ class ParameterKind(OptionType):
 
 
 def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
-    """Read a number or a point; the error has hints about characters that are often typed by mistake."""
+    """Read a number or, with `read`, a point; the error for an invalid text has hints on frequent typing mistakes."""
     try:
         return (read or lib.parse_number)(text)
     except ExpressionError as error:
@@ -59,15 +59,15 @@ def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
 ExactNumber = partial(ParameterKind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
 Arithmetic = partial(
     ParameterKind, "kind", lambda text: lib.Arithmetic.parse(text)
-)  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
+)  # exact, float, mod:P with a prime P, ball:BITS or ball:auto
 
 
 def PointText(has_names: bool = False) -> ParameterKind:
-    """Return the type of points: exact numbers separated by commas, which may contain names if `has_names`."""
+    """Return the type of points: exact numbers separated by commas; with `has_names` they may contain parameters."""
 
     def read(text: str) -> Any:
         if has_names and _NAME.search(text):
-            return text  # the names are evaluated when the system is loaded
+            return text  # the values of the parameters are inserted when the system is loaded
         return _read_number(text, lib.parse_point)
 
     return ParameterKind("point", read)
@@ -105,7 +105,7 @@ def Steps() -> ParameterKind:
 
 
 def Shard() -> ParameterKind:
-    """Return the type of texts I/N, which mean the I-th of N parts."""
+    """Return the type of texts I/N, which select the I-th of N parts of a batch."""
 
     def read(text: str) -> tuple[int, ...]:
         pieces = text.partition("/")[::2]
@@ -132,7 +132,7 @@ def Section() -> ParameterKind:
 
 
 def ShortInteger() -> ParameterKind:
-    """Return the type of integers of bounded length, which replaces `type=int` in all commands."""
+    """Return the type of integers of at most 100 digits, which replaces `type=int` in all commands."""
 
     def read(text: str) -> int:
         text = text.strip()
@@ -149,7 +149,7 @@ def Whole(minimum: int = 0) -> ParameterKind:
     def read(text: str) -> int:
         text = _without_exponent(text.strip())
         digits = text.removeprefix("-").removeprefix("+")
-        # Python's limit on digits would raise another error.
+        # The limit on digits avoids Python's own error for long integers.
         if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= minimum):
             raise InputError(f"found {quoted(text)}, expected an integer, {minimum} or more")
         return int(text)
@@ -162,7 +162,7 @@ def NameValue(name_is_optional: bool = False) -> ParameterKind:
 
     def read(text: str) -> tuple[str, str]:
         name, equals, value = (piece.strip() for piece in text.partition("="))
-        if name_is_optional and "," in name:  # the text is a formula without a name, followed by definitions of letters
+        if name_is_optional and "," in name:  # a formula without a name, then definitions of letters
             return "", text.strip()
         if equals and name and value and name.isprintable():
             return name, value
@@ -175,7 +175,7 @@ def NameValue(name_is_optional: bool = False) -> ParameterKind:
 
 
 def _without_exponent(text: str) -> str:
-    """Write 1e6 and 2.5e3 as integers without an exponent; return any other text unchanged.
+    """Write an integer such as 2.5e3 without an exponent; return any other text unchanged.
 
     >>> _without_exponent("2.5e3"), _without_exponent("1e-1"), _without_exponent("2.5e0")
     ('2500', '1e-1', '2.5e0')
@@ -187,13 +187,13 @@ def _without_exponent(text: str) -> str:
     return integer + decimals.ljust(exponent, "0") if len(decimals) <= exponent else text
 
 
-@cache  # the rules must be applied to a command only once
+@cache  # called more than once for a command, but the rules must be applied only once
 def with_common_rules(command: click.Command) -> click.Command:
-    """Give a command and its subcommands --color and integers of bounded length; refuse options given twice."""
+    """Add to a command and its subcommands: --color, a bound on the digits of integers, no repeated options."""
     parse_args = command.parse_args
 
     def parse_once(ctx: click.Context, args: list[str]) -> list[str]:
-        """Refuse an option with one value that is given twice: click would silently drop the first value."""
+        """Refuse an option for one value that is given several times: click would silently use the last value only."""
         _, _, order = command.make_parser(ctx).parse_args(args=list(args))
         for option in order:
             takes_one = isinstance(option, click.Option) and not (option.multiple or option.count or option.is_flag)
@@ -202,8 +202,7 @@ def with_common_rules(command: click.Command) -> click.Command:
         return parse_args(ctx, args)
 
     command.parse_args = parse_once  # type: ignore[method-assign]  # click has no hook for this check
-    # click copies the help option from the context in which it is first used, which need not be the context of the
-    # group.
+    # Otherwise click would take the names of the help option from the context in which the command is first used.
     command.context_settings.setdefault("help_option_names", HELP_OPTIONS)
     for parameter in command.params:
         if parameter.type is click.INT:

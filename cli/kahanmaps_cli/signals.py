@@ -1,4 +1,4 @@
-"""Interrupts: the first Ctrl-C or SIGTERM ends long work with valid output, the second ends the process at once."""
+"""Interrupts: the first Ctrl-C or SIGTERM ends a long computation with valid output, the second ends the process."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from typing import Any
 
 INTERRUPTED = 130  # the exit status
-_REPEAT_SECONDS = 1.0  # CPU time between two interrupts after one signal
+_REPEAT_SECONDS = 1.0  # CPU time in seconds between two KeyboardInterrupts after one signal
 
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
-    """Set a handler for one signal and return the previous one; a second signal ends the process at once.
+    """Set a handler for one signal and return the previous handler; a second signal of this kind ends the process.
 
     Python runs a handler only after the current call into C returns, and a call of FLINT with long numbers may take
-    minutes. So the handler is installed with System V semantics: the disposition is reset to the default when the
-    first signal arrives. If the C library has no sysv_signal, a second signal also waits for the call to return.
+    minutes. So the handler is installed with System V semantics: the arrival of the first signal restores the default
+    action. If the C library has no sysv_signal, a second signal also waits until the call returns.
     """
     previous = signal.signal(number, handler)
     C = ctypes.CDLL(None)
@@ -29,10 +29,10 @@ def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
 
 
 def raise_interrupt(signum: int, frame: Any) -> None:
-    """Raise KeyboardInterrupt, and again after each second of CPU time until `end_interrupts` is called.
+    """Raise KeyboardInterrupt, now and after every further second of CPU time, until `end_interrupts` is called.
 
-    An exception may be lost: if it is raised while a class is created, Python turns it into a RuntimeError, which an
-    `except Exception` around an import (in matplotlib, of three-dimensional axes) takes for a missing library.
+    One exception may be lost: if it is raised during the creation of a class, Python turns it into a RuntimeError, and
+    matplotlib's import of three-dimensional axes takes any exception for a missing library.
     """
     signal.signal(signal.SIGVTALRM, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_VIRTUAL, _REPEAT_SECONDS, _REPEAT_SECONDS)
@@ -46,7 +46,7 @@ def end_interrupts() -> None:
 
 @contextmanager
 def interruptible(interrupt: Callable[[], None]) -> Iterator[None]:
-    """Call `interrupt`, which requests the work to end, at the first Ctrl-C or SIGTERM; end at once at the second."""
+    """Call `interrupt` at the first Ctrl-C or SIGTERM, to request the end of the work; exit at once at the second."""
 
     def handler(signum: int, frame: Any) -> None:
         handle(signum, raise_interrupt)

@@ -1,6 +1,6 @@
-"""Claims and verdicts as text and as HTML for notebooks and pages; no information is given by color alone.
+"""Claims and verdicts as text, and as HTML for notebooks and pages; colors carry no information of their own.
 
-`print` shows a report as lines that start with a word and a tab, the same text that its command writes to a pipe.
+`print` shows a report as lines that start with a word and a tab, like the output of the command in a pipe.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_record_suffix
 
-_MAX_CLAIMS = 30  # maximal number of claims displayed in a notebook
-_MAX_TEXT = 400  # maximal number of characters of a displayed sentence
+_MAX_CLAIMS = 30  # maximal number of claims that a notebook displays
+_MAX_TEXT = 400  # maximal number of characters of a sentence in a notebook
 
 
 @dataclass(frozen=True)
 class DisplayLimits:
-    """Limits of a displayed claim: characters of a sentence, a formula and a number, and entries of a list."""
+    """Limits of a displayed claim: characters of a sentence, of a formula and of a number; entries of a list."""
 
     text: int
     formula: int
@@ -36,7 +36,7 @@ html_form.register(Certainty, markup.verdict)
 
 
 def verdict_html(finding: Finding) -> str:
-    """Return the verdict of a finding; for a control it says whether the verdict is as expected."""
+    """Return the verdict of a finding as HTML; for a control, with a note whether it is the expected one."""
     verdict = markup.verdict(finding.verdict)
     if finding.place.get("misprint"):
         return f"{verdict} as printed"
@@ -47,13 +47,13 @@ def verdict_html(finding: Finding) -> str:
 
 @html_form.register
 def finding_html(finding: Finding) -> str:
-    """Return a claim with its verdict, evidence and witness."""
+    """Return a claim as HTML, with its verdict, evidence and witness."""
     rows = [("verdict", verdict_html(finding)), *evidence_rows(finding)]
     return markup.block(markup.abbreviate(finding.claim, _MAX_TEXT), markup.definitions(rows))
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
-    """Return the details of a claim as pairs of a label and HTML: formula, evidence, witness, source."""
+    """Return the details of a claim as pairs (label, HTML): formula, evidence, witness, source."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
         rows.append(("formula", f"<code>{_escaped(finding.formula, limits.formula)}</code>"))
@@ -68,12 +68,12 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
 
 
 def reason(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
-    """Return the evidence of a claim as a sentence, with the verified hypotheses."""
+    """Return the evidence of a claim as a sentence in HTML; it lists the verified hypotheses."""
     return _escaped(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
 def verdict_counts(findings: Iterable[Finding]) -> str:
-    """Count the claims by verdict as text: 3 proved, 1 refuted."""
+    """Return the numbers of claims with each verdict as text, such as 3 proved, 1 refuted."""
     findings = list(findings)
     verdicts = Counter(str(f.verdict) for f in findings if f.applies and not f.control)
     phrases = [f"{number} {verdict}" for verdict, number in verdicts.items()]
@@ -85,7 +85,7 @@ def verdict_counts(findings: Iterable[Finding]) -> str:
 
 
 def eps_sentence(report: Report) -> str:
-    """Return a sentence that states the eps for which the report holds, and the time step."""
+    """Return a sentence that states the eps of a report and the time step; empty if no eps is stated."""
     context = report.context
     if "eps" not in context:
         return ""
@@ -94,20 +94,20 @@ def eps_sentence(report: Report) -> str:
 
 
 def ending_sentence(report: Report) -> str:
-    """Return a sentence that says why a requested orbit ended early; empty if no orbit ended early."""
+    """Return a sentence that says why the requested orbit ended early; empty if it did not."""
     if not report.ended_early:
         return ""
     return f"The requested orbit ended early: {report.context.get('orbit', {}).get('message', 'no reason given')}."
 
 
 def systems_sentence(report: Report) -> str:
-    """Return the names of the systems of the report."""
+    """Return the names of the one or two systems of a report."""
     return ", ".join(str(report.context[key]) for key in ("system", "other") if key in report.context)
 
 
 @html_form.register
 def report_html(report: Report) -> str:
-    """Return the findings of a check as a table; for many claims, counts by section and a table of unproved claims."""
+    """Return the findings of a check as a table in HTML; of many findings, counts by section and the unproved ones."""
     title = f"{report.check}: {systems_sentence(report)}"
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_escaped(verdict_counts(report.findings))})</p>"]
     shown_findings = list(report.findings)
@@ -130,7 +130,7 @@ def report_html(report: Report) -> str:
 
 
 def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
-    """Group the findings of `verify` by the titles of their sections; findings of other checks have an empty title."""
+    """Return a dict from the titles of sections of `verify` to their findings; the title is "" for other checks."""
     by_section: dict[str, list[Finding]] = {}
     for finding in findings:
         number, title = finding.place.get("section"), str(finding.place.get("section_title", ""))
@@ -155,7 +155,7 @@ def _escaped(text: str, width: int = _MAX_TEXT) -> str:
 
 @text_form.register
 def report_text(report: Report) -> str:
-    """Return all findings with their evidence, then the verdict."""
+    """Return all findings of a report with their evidence, and then the verdict of the report."""
     lines, printed_hypotheses = [headline(report)], set[str]()
     for finding in report.findings:
         lines.append(f"{verdict_text(finding)}\t{finding.claim}")
@@ -165,7 +165,7 @@ def report_text(report: Report) -> str:
 
 
 def headline(report: Report) -> str:
-    """Return the first line of a report: check, systems, values of parameters, eps."""
+    """Return the first line of a report: the check, the systems, the values of parameters, and eps."""
     context = report.context
     values = [
         ", ".join(
@@ -185,13 +185,13 @@ def headline(report: Report) -> str:
 
 
 def verdict_text(finding: Finding) -> str:
-    """Return the verdict, with (as expected) for a control that is refuted."""
+    """Return the verdict of a finding as text; "(as expected)" follows it for a control that is refuted."""
     verdict = str(finding.verdict)
     return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
 
 
 def details(finding: Finding, printed_hypotheses: set[str], width: int | None = None) -> list[str]:
-    """Return the lines printed below a claim, without `printed_hypotheses`, which were printed before."""
+    """Return the lines printed below a claim; omit the `printed_hypotheses`, and add other hypotheses to this set."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
     lines.append(summary(finding.evidence, printed_hypotheses))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
@@ -203,7 +203,7 @@ def details(finding: Finding, printed_hypotheses: set[str], width: int | None = 
 
 
 def summary(evidence: Evidence, printed_hypotheses: set[str] | None = None) -> str:
-    """Return the evidence as a sentence without `printed_hypotheses`, to which all other hypotheses are added."""
+    """Return the evidence as a sentence; omit the `printed_hypotheses`, and add the other hypotheses to this set."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary
@@ -216,7 +216,7 @@ def summary(evidence: Evidence, printed_hypotheses: set[str] | None = None) -> s
 
 
 def witness_lines(witness: Witness, width: int | None) -> list[str]:
-    """Return the lines of a witness, with numbers shortened to `width`."""
+    """Return the lines that show a witness; numbers are shortened to `width` characters (None: not shortened)."""
 
     def numbers(values: tuple[str, ...]) -> str:
         return ", ".join(value if width is None else shorten(value, width) for value in values)

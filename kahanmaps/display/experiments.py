@@ -1,4 +1,4 @@
-"""Databases of results and their summaries as HTML and Markdown."""
+"""Databases of results, and summaries of results, as HTML and Markdown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _MAX_ROWS = 40  # maximal number of rows of a table
 
 @html_form.register
 def store_html(store: Store) -> str:
-    """Return the progress of each experiment as a table."""
+    """Return the progress of each experiment in a database as a table in HTML."""
     try:
         status = store.status()
     except StoreError as error:  # the store is closed
@@ -35,7 +35,7 @@ def store_html(store: Store) -> str:
 
 @html_form.register
 def summary_html(summary: Summary) -> str:
-    """Return the tables of a summary as HTML."""
+    """Return the tables of a summary of results as HTML."""
     pieces = []
     for table in summary.tables(6):
         rows = [[markup.escape(cell) for cell in row] for row in table.rows[:_MAX_ROWS]]
@@ -46,7 +46,7 @@ def summary_html(summary: Summary) -> str:
 
 
 def summary_markdown(summary: Summary) -> str:
-    """Return the tables of a summary in Markdown."""
+    """Return the tables of a summary of results in Markdown."""
     tables = []
     for table in summary.tables(6):
         rule = ["---"] * table.words + ["---:"] * (len(table.columns) - table.words)

@@ -1,7 +1,7 @@
-"""Display of results of the laboratory: as lines in commands and `print`, as a table in notebooks.
+"""Display of the results of the laboratory: lines for commands and `print`, tables for notebooks.
 
-`lines_of` returns the lines of a result, each a sequence of cells. `print` separates cells by tabs; a notebook shows a
-table of bounded size, with typeset formulas and colored verdicts. Displaying a result computes nothing.
+`lines_of` returns the lines of a result; a line is a sequence of cells. `print` separates the cells by tabs; a notebook
+shows a table of bounded size, with typeset formulas and colored verdicts. Nothing is computed for the display.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _MAX_ROWS = 60  # maximal number of rows of a table in a notebook
 _MAX_TEXT_CHARACTERS = 300  # maximal number of characters of a cell in a notebook
-_MAX_CYCLE_LENGTHS = 12  # maximal number of cycle lengths in a line, the largest ones
+_MAX_CYCLE_LENGTHS = 12  # maximal number of cycle lengths that are listed, the largest ones
 STATUS_LEGEND = (
     "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
     "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
@@ -50,7 +50,7 @@ STATUS_LEGEND = (
 
 @dataclass(frozen=True)
 class HtmlCell:
-    """A cell that a notebook shows as `html()` instead of its text."""
+    """A cell with a text, which a notebook replaces by `html()`."""
 
     text: str
     html: Callable[[], str]
@@ -59,7 +59,7 @@ class HtmlCell:
         return self.text
 
 
-Line = Sequence[object]  # the cells of a line: `HtmlCell`, or objects that str() converts to text
+Line = Sequence[object]  # the cells of a line: each is an `HtmlCell` or converted to text by str()
 
 
 def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> HtmlCell:
@@ -86,23 +86,23 @@ def _found_tensor(result: FoundTensor | IntegralInIterates) -> str:
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
-    """Return a phrase with the eps of a result and the time step 2 eps; empty if no map depends on eps."""
+    """Return a phrase with the eps of a result and the time step 2 eps; empty if no map in `maps` depends on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
 
 @singledispatch
 def lines_of(result: object) -> Iterator[Line]:
-    """Yield the lines of a result that its command prints after the heading."""
+    """Yield the lines of a result, which its command prints below the heading."""
     raise TypeError(f"no display is registered for {type(result).__name__}")
 
 
 def result_text(result: object) -> str:
-    """Return the lines of a result as text, with cells separated by tabs."""
+    """Return the lines of a result as text; tabs separate the cells of a line."""
     return "\n".join("\t".join(map(str, line)) for line in lines_of(result))
 
 
 def result_html(result: Any, map_: MapFamily | None = None) -> str:
-    """Return the lines of a result as a table; `map_` is needed if the result does not contain its map."""
+    """Return the lines of a result as a table in HTML; `map_` is needed if the result does not contain its map."""
 
     def cell_html(cell: object) -> str:
         if isinstance(cell, HtmlCell):
@@ -126,7 +126,7 @@ def _html(text: str, width: int = _MAX_TEXT_CHARACTERS) -> str:
 
 
 def analysis_title(analysis: Analysis) -> str:
-    """Return the title of a report: the system, its dimension and parameters, and eps."""
+    """Return the title of the report on an analysis: the system, its dimension, its parameters, and eps."""
     eps_text = eps_suffix(analysis.eps, analysis.file.map)
     values = "".join(f", {name} = {value}" for name, value in analysis.file.parameters.items())
     formulas = f"; formulas for every {', '.join(analysis.symbols)}" if analysis.symbols else ""
@@ -134,13 +134,13 @@ def analysis_title(analysis: Analysis) -> str:
 
 
 def analysis_head(analysis: Analysis) -> str:
-    """Return the head of the report: the title, the equations, and explanations of the words for verdicts."""
+    """Return the beginning of the report: title, equations, and explanations of the words for verdicts."""
     return f"analyze: {analysis_title(analysis)}\n{analysis.file.map}\n{STATUS_LEGEND}"
 
 
 @text_form.register
 def analysis_text(analysis: Analysis) -> str:
-    """Return the complete report."""
+    """Return the complete report on an analysis as text."""
     lines = [analysis_head(analysis)]
     for title, statements in analysis.sections:
         lines += ["", title, *(f"{line.status}\t{line.text}" for line in statements)]
@@ -151,7 +151,7 @@ def analysis_text(analysis: Analysis) -> str:
 
 @html_form.register
 def analysis_html(analysis: Analysis) -> str:
-    """Return the verdict, then the statements, as HTML."""
+    """Return the verdict of an analysis and then its statements, as HTML."""
     conclusion = analysis.conclusion
     statements = [(title, line) for title, lines in analysis.sections for line in lines]
     rows = [(_html(title), markup.verdict(line.status), _html(line.text)) for title, line in statements[:_MAX_ROWS]]
@@ -170,19 +170,19 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """Yield each integral with its verdict and evidence, then the remarks on the search."""
+    """Yield each integral with its verdict and evidence, and then the remarks on the search."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
 @lines_of.register
 def _densities(search: DensitySearch) -> Iterator[Line]:
-    """Yield a density with its verdict and evidence, then other densities, or the reason why there is none."""
+    """Yield the densities shown with verdict and evidence, and then remarks: on others, or why there is none."""
     return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """Yield each Poisson tensor with its verdict and properties, then the remarks on the search."""
+    """Yield each Poisson tensor with its verdict and properties, and then the remarks on the search."""
     named_results = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named_results, (search.note, search.reason))
 
@@ -204,7 +204,7 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """Yield the equation of a Darboux polynomial and the polynomials for each cofactor, or say that there are none."""
+    """Yield the equation of Darboux polynomials, and each cofactor with its polynomials, or that there are none."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
     equation = f"P(x~) = C P(x){meaning}; spaces spanned by products of others are omitted"
     yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)
@@ -219,7 +219,7 @@ def _darboux(search: DarbouxSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _structures(structures: ConstantStructures) -> Iterator[Line]:
-    """Yield the form f = J grad H with a constant matrix J, or the reason why there is none."""
+    """Yield H, J and the Casimirs if f = J grad H with a constant matrix J, otherwise the reason why there is none."""
     if structures.hamiltonian is None:
         yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return
@@ -233,13 +233,13 @@ def _structures(structures: ConstantStructures) -> Iterator[Line]:
 
 @lines_of.register
 def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
-    """Yield the lines of `DegreeGrowth.text`."""
+    """Yield the lines of the text of a degree growth or of a scan."""
     return (line.split("\t") for line in growth.text.split("\n"))
 
 
 @lines_of.register
 def _heights(survey: HeightSurvey) -> Iterator[Line]:
-    """Yield a line on the heights of each orbit, and the conclusion from all orbits."""
+    """Yield a line on the heights along each orbit, and then the conclusion from all orbits."""
     for orbit in survey.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
         yield "orbit", *([f"eps {orbit.eps}"] if survey.has_eps else []), f"start {point}", orbit.growth.text
@@ -248,7 +248,7 @@ def _heights(survey: HeightSurvey) -> Iterator[Line]:
 
 @lines_of.register
 def _census(census: Census) -> Iterator[Line]:
-    """Yield the counts of cycles, and the longest cycles."""
+    """Yield the counts of cycles and the lengths of the longest ones."""
     if not census.examined:
         yield "points", census.points
         yield "stopped", "time limit, before the images of all points were known"
@@ -301,7 +301,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 @lines_of.register
 def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
-    """Yield one-parameter groups, a flow that rescales eps, generators of the finite group, completed searches."""
+    """Yield one-parameter groups, a flow that rescales eps, generators of the finite group, and completed searches."""
     for generator in symmetries.infinitesimal:
         kind = "linear" if generator.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(generator.rhs)})"
@@ -321,7 +321,7 @@ def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
 
 @lines_of.register
 def _commuting(systems: CommutingSystems) -> Iterator[Line]:
-    """Yield the fields g whose Kahan maps commute with that of f, except 0, f, -f, as options of a command."""
+    """Yield, as options of a command, the fields g whose Kahan maps commute with that of f, except 0, f and -f."""
     if systems.dimension is not None:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
@@ -357,7 +357,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
-    """Return g as options of a command, with the matrix B if g = B f; a notebook shows the equations of g."""
+    """Return g as options of a command, and the matrix B if g = B f; a notebook shows the equations of g instead."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:
@@ -372,12 +372,12 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 
 
 def _title(subject: str, result: Any, *subtitle: str) -> tuple[str, str]:
-    """Return the title, which contains the name of the system, and the subtitle, which ends with eps."""
+    """Return (title, subtitle) of a result: the title names the system, and the subtitle ends with eps."""
     phrases = (*subtitle, eps_sentence(result.eps, result.file.map))
     return f"{subject} of {markup.abbreviate(result.file.name)}", "; ".join(filter(None, phrases))
 
 
-# Titles and subtitles of the results that are displayed as lines.
+# Result type -> function that returns title and subtitle, for the results that are displayed as lines.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
     IntegralSearch: lambda result: _title("integrals", result, f"{result.formula_count} found; {result.count_text}"),
     DensitySearch: lambda result: _title("densities", result, "dx/phi is invariant"),

@@ -1,13 +1,13 @@
-r"""Names, polynomials and rational functions as LaTeX, and as formulas in HTML.
+r"""Names, polynomials and rational functions as LaTeX, or as formulas in HTML.
 
     x1 -> x_1    x12 -> x_{12}    eps -> \varepsilon    alpha2 -> \alpha_2    al -> al    my_H -> \mathrm{my\_H}
     x1~ -> \tilde{x_1}
 
-The LaTeX is for math mode. Factors are separated by spaces, so that formulas can be parsed again. In HTML a formula is
-enclosed in \( and \); notebooks typeset it, and pages convert it to MathML.
+The LaTeX is for math mode. Spaces separate factors, so that formulas can be parsed again. In HTML, \( and \) enclose a
+formula; notebooks typeset it, and pages convert it to MathML.
 
 Neither MathJax nor MathML breaks lines. Hence a long formula is a <span class="formula"> with one element for each
-term, and the browser breaks lines between elements; a long quotient is written with a slash.
+term, so that the browser can break lines between terms. A long quotient is written with a slash.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from kahanmaps.display.markup import escape
 from kahanmaps.display_protocols import latex_form
 from kahanmaps.errors import InputError, counted
 
-# TeX has no commands for Greek letters that look Latin, such as omicron and capital Alpha.
+# TeX has no commands for Greek letters that look like Latin ones, such as omicron and capital Alpha.
 GREEK_NAMES = (
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
@@ -40,10 +40,10 @@ _ESCAPES = {
 
 
 def latex_name(name: str) -> str:
-    r"""Return a name as LaTeX: final digits become an index; eps and names of Greek letters become these letters.
+    r"""Return a name as LaTeX: digits at its end become an index; eps and names of Greek letters become these letters.
 
-    A name that is not of the form letters, digits is set upright, with TeX's special characters escaped. Different
-    names give different text. Raises InputError for text that is empty or not printable.
+    A name that is not of the form letters-digits is set upright, and TeX's special characters in it are escaped.
+    Different names have different LaTeX. Raises InputError for a text that is empty or not printable.
 
     >>> print(latex_name("x1"), latex_name("eps"), latex_name("Gamma12"), latex_name("al"), latex_name("modified_H"))
     x_1 \varepsilon \Gamma_{12} al \mathrm{modified\_H}
@@ -76,7 +76,7 @@ def latex_number(value: fmpq) -> str:
 
 @latex_form.register
 def latex_polynomial(polynomial: fmpq_mpoly) -> str:
-    r"""Return a polynomial over Q as LaTeX, with its terms in the order of its ring.
+    r"""Return a polynomial over Q as LaTeX; the terms are in the order of its ring.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
@@ -87,7 +87,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
 
 @latex_form.register
 def latex_rational_function(function: RationalFunction) -> str:
-    r"""Return a rational function over Q as LaTeX, without nested fractions, and factored if this is shorter.
+    r"""Return a rational function over Q as LaTeX, without nested fractions; it is factored if this is shorter.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
@@ -99,7 +99,7 @@ def latex_rational_function(function: RationalFunction) -> str:
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
-    r"""Return a polynomial as LaTeX; if it exceeds about `characters`, return its beginning and its number of terms.
+    r"""Return a polynomial as LaTeX; if it is longer than about `characters`, cut it and give its number of terms.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
@@ -115,7 +115,7 @@ def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
 
 
 def latex_matrix(entries: fmpq_mat, max_size: int = 8) -> str:
-    r"""Return a matrix over Q, or its size if it has more than `max_size` rows or columns, or entries of over 100 bits.
+    r"""Return a matrix over Q as LaTeX; only its size if it is larger than `max_size`, or an entry has over 100 bits.
 
     >>> print(latex_matrix(fmpq_mat([[1, 0]])))
     \begin{pmatrix} 1 & 0 \end{pmatrix}
@@ -129,7 +129,7 @@ def latex_matrix(entries: fmpq_mat, max_size: int = 8) -> str:
 
 
 def latex_aligned(equations: Sequence[tuple[str, str]], max_rows: int = 12) -> str:
-    r"""Return at most `max_rows` aligned equations left = right, then dots; both sides are LaTeX.
+    r"""Return equations left = right, aligned, as LaTeX; dots replace those after the first `max_rows`.
 
     >>> print(latex_aligned([("x", "1"), ("y", "2")]))
     $\displaystyle \begin{aligned} x &= 1 \\ y &= 2 \end{aligned}$
@@ -155,16 +155,16 @@ LATEX = Notation(
 )
 
 
-# A formula with at most this number of characters as plain text fits on a phone, and is not broken.
+# A formula that has at most this number of characters as plain text fits on a phone without line breaks.
 _MAX_UNBROKEN = 32
 _ONE_LINE = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
 
 
 def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
-    r"""Return a polynomial or a rational function as HTML that wraps between its terms.
+    r"""Return a polynomial or a rational function as HTML that can be broken between its terms.
 
-    `left` is the name on the left-hand side: "I1" gives I_1 = ..., and "x1'" is a derivative. A formula of more than
-    about `characters` characters is cut, with its number of terms.
+    `left` is the left-hand side: "I1" gives I_1 = ..., and "x1'" a derivative. A formula of more than about
+    `characters` characters is cut, and its number of terms is given.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(formula(parse_polynomial("x^2", ["x"]), "H"))
@@ -185,12 +185,12 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
         name = latex_name(left) if left == "'" or not left.endswith("'") else f"{latex_name(left[:-1])}'"
         text = f"{name} = {text}"
     if r"\frac" in text and not is_long:
-        text = rf"\displaystyle {text}"  # without it, a fraction in a line of text is set in small type
+        text = rf"\displaystyle {text}"  # without it, TeX sets a fraction in a line of text in small type
     return typeset(text, is_long)
 
 
 def typeset(latex: str, is_long: bool = True) -> str:
-    r"""Convert a formula in LaTeX to HTML; if `is_long`, each term is an element of its own.
+    r"""Convert a formula in LaTeX to HTML; if `is_long`, every term is an element of its own.
 
     >>> print(typeset(r"\frac{x + 1}{2} - y = 0"))
     <span class="formula">\(\frac{x + 1}{2}\) \({}- y = 0\)</span>
@@ -199,7 +199,7 @@ def typeset(latex: str, is_long: bool = True) -> str:
     one_line = latex.replace(r"\left(", "(").replace(r"\right)", ")")
     for token in one_line.split(" ") if is_long else [one_line]:
         if token in ("+", "-") and depth == 0 and pieces[-1]:
-            pieces.append(f"{{}}{token}")  # the empty group makes the sign a binary operator, with spaces
+            pieces.append(f"{{}}{token}")  # after the empty group the sign is a binary operator, with spaces around it
         else:
             pieces[-1] += f" {token}" if pieces[-1] else token
         depth += token.count("{") - token.count("}")
@@ -208,12 +208,12 @@ def typeset(latex: str, is_long: bool = True) -> str:
 
 
 def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: int | None = None) -> str:
-    """Return the equations x' = f(x) as HTML, each on a line that wraps and is cut after `characters` characters."""
+    """Return the equations x' = f(x) as HTML, one a line; each can wrap, and is cut after about `characters`."""
     lines = (formula(f, f"{name}'", characters) for name, f in zip(variables, rhs, strict=True))
     return "<br/>\n".join(lines)
 
 
 def matrix(entries: fmpq_mat, left: str = "", max_size: int = 8) -> str:
-    """Return a matrix over Q as HTML, or its size if it is too large, as in `latex_matrix`; `left` is its name."""
+    """Return a matrix over Q with its name `left` as HTML; only its size if it is too large for `latex_matrix`."""
     text = latex_matrix(entries, max_size)
     return typeset(f"{latex_name(left)} = {text}" if left else text, False)

@@ -1,7 +1,7 @@
-"""HTML elements shared by notebooks and reports, as well-formed XML with reproducible bytes.
+"""HTML elements that notebooks and reports share; the HTML is well-formed XML, and its bytes are reproducible.
 
 The elements set neither background nor font, so that they fit into light and dark pages. Verdicts such as *proved* have
-a symbol and a color, so that they can be distinguished without colors.
+a symbol besides a color, so that they can be distinguished without colors.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from kahanmaps.errors import counted, printable
 from kahanmaps.maps.convention import eps_record_suffix
 
-# A symbol, and a color that is mixed with the text color; the contrast exceeds 4.5 : 1 on white and on near-black.
+# Verdict -> symbol and color; the color is mixed with that of the text, for a contrast above 4.5 on white and on black.
 SYMBOLS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
@@ -25,13 +25,13 @@ SYMBOLS = {
     "refuted": ("✗", "#e0353f"),
     "undecided": ("?", "#b8860b"),
 }
-_ALIGN_LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
-_MAX_OPEN_ROWS = 12  # rows of a table that are shown before a click
-_MAX_CHARACTERS = 60  # maximal number of characters of a displayed number or name
+_ALIGN_LEFT = 'style="text-align: left"'  # Jupyter aligns the cells of a table on the right
+_MAX_OPEN_ROWS = 12  # number of rows of a table that are visible before a click on the others
+_MAX_CHARACTERS = 60  # maximal number of characters of a number or a name in HTML
 
 
 def escape(text: object) -> str:
-    """Escape text for HTML; characters that XML forbids, such as control characters, become \\xNN escapes.
+    """Escape a text for HTML; characters that XML forbids, such as control characters, become escapes \\xNN.
 
     >>> escape('<b title="x">&')
     '&lt;b title=&quot;x&quot;&gt;&amp;'
@@ -42,7 +42,7 @@ def escape(text: object) -> str:
 
 
 def markdown(text: object) -> str:
-    """Escape text for Markdown, on one line.
+    """Escape a text for Markdown; the result is on one line.
 
     >>> markdown("<b>2*x*y|[a](b)</b>")
     '&lt;b>2\\\\*x\\\\*y\\\\|\\\\[a\\\\](b)&lt;/b>'
@@ -52,7 +52,7 @@ def markdown(text: object) -> str:
 
 
 def code(text: object) -> str:
-    """Return text as a code span in Markdown, enclosed in more backticks than it contains in a row.
+    """Return a text as a code span in Markdown, enclosed in more backticks than occur in it in a row.
 
     >>> code("x < y"), code("`a`")
     ('`x < y`', '`` `a` ``')
@@ -64,7 +64,7 @@ def code(text: object) -> str:
 
 
 def abbreviate(text: object, width: int = _MAX_CHARACTERS) -> str:
-    """Shorten a text that is longer than `width` to its beginning, its end and its length, without escaping it.
+    """Return a text of more than `width` characters as its beginning, end and length; it is not escaped.
 
     >>> abbreviate("1" * 100, 20)
     '11111111…11111111 (100 characters)'
@@ -77,7 +77,7 @@ def abbreviate(text: object, width: int = _MAX_CHARACTERS) -> str:
 
 
 def eps_phrase(record: Mapping[str, Any]) -> str:
-    """Return the eps of a record and the time step as text with shortened numbers.
+    """Return the eps and the time step of a JSON record as text; long numbers are shortened.
 
     >>> eps_phrase({"eps": "1/10", "time_step": "1/5"})
     'eps = 1/10 (time step 2 eps = 1/5)'
@@ -87,7 +87,7 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table; `headings` and `caption` are text, cells are HTML. The last cell of a short row fills the row.
+    """Return an HTML table; `headings` and `caption` are text, cells are HTML. The last cell of a short row fills it.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
@@ -108,7 +108,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str =
 
 
 def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Return a table that shows the first 12 rows; a click on the number of hidden rows shows all.
+    """Return a table in HTML that shows its first 12 rows; a click on the number of other rows shows all.
 
     >>> folded_table([["a"]]) == table((), [["a"]]), "<summary>3 more lines</summary>" in folded_table([["a"]] * 15)
     (True, True)
@@ -121,7 +121,7 @@ def folded_table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
-    """Return a table of two columns: a word (text) and its value (HTML)."""
+    """Return a table of two columns in HTML: in each row a word (text) and its meaning (HTML)."""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
         f"<td {_ALIGN_LEFT}>{value}</td></tr>"
@@ -131,12 +131,12 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def bullet_list(entries: Iterable[str]) -> str:
-    """Return an HTML list of entries, which are HTML."""
+    """Return an HTML list; the entries are HTML."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
 
 
 def verdict(word: object) -> str:
-    """Return a word such as *proved* with its symbol and color; other words unchanged.
+    """Return a verdict such as *proved* in HTML with its symbol and color; any other word has none.
 
     >>> verdict("note")
     '<span class="verdict">note</span>'
@@ -150,6 +150,6 @@ def verdict(word: object) -> str:
 
 
 def block(title: str, content: str, remark_text: str = "") -> str:
-    """Return a block of HTML with a title and an optional remark, both text."""
+    """Return a block of HTML; its title and the optional remark are text, its content is HTML."""
     remark = f" — {escape(remark_text)}" if remark_text else ""
     return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{content}\n</div>"

@@ -1,6 +1,6 @@
-"""Systems, members, maps and orbits as HTML and LaTeX for notebooks, bounded in size.
+"""Systems, members, maps and orbits as HTML and LaTeX for notebooks; the size of the display is bounded.
 
-Displaying a value computes nothing new.
+Nothing is computed for the display of a value.
 """
 
 from __future__ import annotations
@@ -38,35 +38,35 @@ from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-CHARACTERS = 300  # approximate limit for the length of one formula
-_MAX_TEXT = 200  # maximal number of characters of one value
+CHARACTERS = 300  # approximate maximal number of characters of one formula
+_MAX_TEXT = 200  # maximal number of characters of the text of one value
 _MAX_EQUATIONS, _MAX_LATEX_EQUATIONS = 12, 8
 
 
 @latex_form.register
 def system_latex(system: QuadraticSystem) -> str:
-    """Return the equations x' = f(x)."""
+    """Return the equations x' = f(x) of a system as LaTeX."""
     names = [rf"\dot{{{latex_name(name)}}}" for name in system.variables]
     rows = [(x, latex_cut(f, CHARACTERS)) for x, f in zip(names, system.rhs[: _MAX_LATEX_EQUATIONS + 1], strict=False)]
-    rows += [(x, "") for x in names[len(rows) :]]  # these rows are only counted
+    rows += [(x, "") for x in names[len(rows) :]]  # only counted by `latex_aligned`, not shown
     return latex_aligned(rows, _MAX_LATEX_EQUATIONS)
 
 
 @latex_form.register
 def hamiltonian_latex(hamiltonian: CubicHamiltonian) -> str:
-    """Return H and the equations x' = J grad H."""
+    """Return H and the equations x' = J grad H as LaTeX."""
     J = r"\begin{pmatrix} 0 & I \\ -I & 0 \end{pmatrix}" if hamiltonian.is_standard else latex_matrix(hamiltonian.J)
     return latex_aligned([("H", latex_cut(hamiltonian.H, CHARACTERS)), (r"\dot{x}", rf"J \nabla H, \quad J = {J}")])
 
 
 @latex_form.register
 def file_latex(file: SystemFile) -> str:
-    """Return the equations of a system file."""
+    """Return the equations of the system or map in a system file as LaTeX."""
     return birational_latex(file.map)
 
 
 def map_html(map_: MapFamily) -> str:
-    """Return the equations of the vector field of a Kahan map, or the equations of another map."""
+    """Return as HTML the vector field of a Kahan map, or the equations of any other map."""
     if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
     return "<br/>\n".join(markup.escape(markup.abbreviate(line, CHARACTERS)) for line in str(map_).split("\n"))
@@ -75,14 +75,14 @@ def map_html(map_: MapFamily) -> str:
 def equations_html(
     system: QuadraticSystem, characters: int | None = CHARACTERS, max_count: int = _MAX_EQUATIONS
 ) -> str:
-    """Return at most `max_count` equations as HTML, each cut after about `characters` characters."""
+    """Return at most `max_count` equations of a system as HTML; each is cut after about `characters` characters."""
     text = equations(system.variables[:max_count], system.rhs[:max_count], characters)
     return text if system.dim <= max_count else f"{text}<br/>\n… ({system.dim} equations)"
 
 
 @html_form.register
 def file_html(file: SystemFile) -> str:
-    """Return the equations, parameters and claims of a system file."""
+    """Return the equations, the parameters and the claims of a system file as HTML."""
     rows = [("equations", map_html(file.map))]
     if file.parameters:
         values = (f"{name} = {markup.abbreviate(format_number(v))}" for name, v in list(file.parameters.items())[:20])
@@ -103,7 +103,7 @@ def file_html(file: SystemFile) -> str:
 
 @html_form.register
 def member_html(member: FamilyMember) -> str:
-    """Return A, H, chi and the signs of a member."""
+    """Return A, H, chi and the signs of a member of the family as HTML."""
     factors = " ".join(
         f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
     )
@@ -119,7 +119,7 @@ def member_html(member: FamilyMember) -> str:
 
 @html_form.register
 def associated_html(system: AssociatedSystem) -> str:
-    """Return B, K and the equations of an associated system."""
+    """Return B, K and the equations of an associated system as HTML."""
     powers = [
         f"{markup.abbreviate(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
         for k, c in enumerate(system.coefficients[:12])
@@ -135,7 +135,7 @@ def associated_html(system: AssociatedSystem) -> str:
 
 @html_form.register
 def normal_form_html(form: NormalForm) -> str:
-    """Return chi, h, D and the planes over Q of a normal form."""
+    """Return chi, h, D and the planes over Q of a normal form as HTML."""
     texts = {"chi(t)": form.chi_text, "h(X, Y)": form.h_text, "D(X, Y)": form.D_text}
     rows = [(name, markup.escape(markup.abbreviate(text, _MAX_TEXT))) for name, text in texts.items()]
     rows.append(("S", matrix(form.S)))
@@ -147,14 +147,14 @@ def normal_form_html(form: NormalForm) -> str:
     return markup.block(f"normal form, m = {form.m}", markup.definitions(rows), remark)
 
 
-_COORDINATES = 8  # maximal number of coordinates in a row
-_POINTS = 6  # number of first points of an orbit that are displayed
-_MAX_DIGITS = 2_000  # longer numbers are not converted to text
+_COORDINATES = 8  # maximal number of coordinates in a row of a table
+_POINTS = 6  # number of points at the beginning of an orbit that are displayed
+_MAX_DIGITS = 2_000  # maximal number of digits of a number that is converted to text
 
 
 @latex_form.register
 def map_latex(kahan: KahanMap) -> str:
-    """Return the equation that defines a Kahan map."""
+    """Return as LaTeX the equation that defines a Kahan map."""
     system, field = kahan.system, kahan.field
     rows = []
     for name, f in zip(system.variables[:_MAX_LATEX_EQUATIONS], system.rhs, strict=False):
@@ -176,13 +176,13 @@ def map_latex(kahan: KahanMap) -> str:
 
 @latex_form.register
 def composition_latex(map_: Map) -> str:
-    """Return the text of a map other than Kahan's as LaTeX."""
+    """Return as LaTeX the text of a map that is not a Kahan map."""
     return rf"$\text{{{_tex(map_)}}}$"
 
 
 @latex_form.register
 def birational_latex(map_: MapFamily) -> str:
-    """Return the equations between a point and its image; for a Kahan map, its differential equation."""
+    """Return as LaTeX the equations between a point and its image, or the vector field of a Kahan map."""
     if isinstance(map_, KahanFamily):
         return system_latex(map_.system)
     if isinstance(map_, ComposedMap) and not map_.is_small:
@@ -193,7 +193,7 @@ def birational_latex(map_: MapFamily) -> str:
 
 
 def _polarized_component(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
-    """Return the polarization 2 f((x + x~)/2) - f(x)/2 - f(x~)/2 of one component f of the vector field as LaTeX."""
+    """Return as LaTeX the polarization 2 f((x + x~)/2) - f(x)/2 - f(x~)/2 of a component f of a quadratic field."""
     terms_shown = first_terms(polynomial, CHARACTERS // 2)
     context = ring((*variables, *(f"{name}~" for name in variables)))
     x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
@@ -212,7 +212,7 @@ def _tex(text: object) -> str:
 
 @html_form.register
 def orbit_html(orbit: Orbit) -> str:
-    """Return the first points of an orbit, its last computed point, and how it ended."""
+    """Return as HTML the first points of an orbit, the last point that is computed, and how the orbit ended."""
     variables = orbit.map.variables
     first_points, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
@@ -230,7 +230,7 @@ def orbit_html(orbit: Orbit) -> str:
         status = "no point computed yet: iterate over it"
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
-    eps, flow = orbit.map.eps, orbit.map.flow  # None for compositions of maps with different eps or vector fields
+    eps, flow = orbit.map.eps, orbit.map.flow  # None for a composition of maps with different eps or fields
     at_eps = "" if eps is None else f" eps = {markup.abbreviate(field.format(eps))},"
     at_eps += "" if flow is None else f" time step {markup.abbreviate(field.format(flow[1]))},"
     title = f"orbit{direction},{at_eps} over {field}"
@@ -239,7 +239,7 @@ def orbit_html(orbit: Orbit) -> str:
 
 @html_form.register
 def trajectory_html(orbit: Trajectory) -> str:
-    """Return the first points of an orbit, and its last point if all points were stored."""
+    """Return as HTML the first points of an orbit and, if all points are computed, the last one."""
     computed = vars(orbit).get("points")
     points_shown = orbit.preview(_POINTS) if computed is None else [*computed[:_POINTS], *computed[_POINTS:][-1:]]
     variables = orbit.variables
@@ -256,7 +256,7 @@ def trajectory_html(orbit: Trajectory) -> str:
 
 
 def _point_cells(point: OrbitPoint, count: int) -> list[str]:
-    """Return a row of a table: the step, the first few of `count` coordinates, and the number of digits."""
+    """Return the cells of a point: its step, the first of its `count` coordinates, its number of digits."""
     is_long = point.digits > _MAX_DIGITS
     texts = [t if len(t) <= 24 else f"{t[:10]}…{t[-10:]}" for t in (["(long)"] * count if is_long else point.text)]
     cells = texts[:_COORDINATES] + ["…"] * (count > _COORDINATES)
@@ -265,7 +265,7 @@ def _point_cells(point: OrbitPoint, count: int) -> list[str]:
 
 @html_form.register
 def period_html(period: OrbitPeriod) -> str:
-    """Return the period of an orbit and the periods in its planes."""
+    """Return as HTML the period of an orbit, and the periods of its projections to the planes."""
     sentence, *planes = period.text.split("\n")
     planes_html = markup.bullet_list(markup.escape(markup.abbreviate(line, 200)) for line in planes[:20])
     return markup.block(markup.abbreviate(sentence, 200), planes_html)
@@ -273,7 +273,7 @@ def period_html(period: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(period: OrbitPeriod) -> str:
-    """Return the period of an orbit, its periods in the planes, and whether the orbit reaches a pole."""
+    """Return as text the period of an orbit, the periods in its planes, and whether the orbit meets a pole."""
     lines = [f"period\t{_period_word(period)}"]
     for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]
@@ -290,13 +290,13 @@ def _period_word(period: OrbitPeriod | PlanePeriod) -> str:
 
 @text_form.register
 def geometry_text(geometry: LevelGeometry | OrbitCurve) -> str:
-    """Return the curves, translations and rotation numbers in the planes of an orbit."""
+    """Return as text the curves, translations and rotation numbers in the planes of an orbit."""
     return geometry.text
 
 
 @html_form.register
 def geometry_html(geometry: LevelGeometry | OrbitCurve) -> str:
-    """Return the curves, translations and rotation numbers in the planes of an orbit as an HTML list."""
+    """Return as an HTML list the curves, translations and rotation numbers in the planes of an orbit."""
     lines = (
         markup.escape(markup.abbreviate(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
     )

@@ -1,6 +1,6 @@
-"""Conversion of a document (plain data of a system file) to systems, members and claims, or a list of mistakes.
+"""Conversion of a document (the plain data of a system file) to the map, member and claims that it describes.
 
-Every part is read as far as possible, so that all mistakes of a file are reported together, each with its key.
+Every part is read as far as possible, so that all mistakes in a document are reported together, each with its key.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _MAX_NAME = 1000  # maximal number of characters of the name of a system
-_MAX_FACTORS = 64  # maximal number of maps in a composition, including maps of its parts
-_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number if a rational number reveals the same mistakes
+_MAX_FACTORS = 64  # maximal number of maps in a composition, including the maps of its parts
+_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number where a rational one reveals the same mistakes
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
-    """Return the Kahan map of right-hand sides (in the ring of variables, symbols and eps, but without eps)."""
+    """Return the Kahan map of right-hand sides in variables, symbols and eps; with eps it is an adjusted map."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
         return KahanFamily(QuadraticSystem(tuple(rhs), symbols))
     return KahanFamily(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
 
 
-# For each method: the function that constructs a map from right-hand sides (polynomials in the variables, the symbols,
-# then eps) and their degree, the default of the degree, and its largest value.
+# Method -> (constructor, default degree, maximal degree). The constructor makes a map from the right-hand sides, which
+# are polynomials in the variables, the symbols and eps, and from their degree.
 _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamily], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
@@ -61,7 +61,7 @@ Values = dict[str, RationalFunction]
 
 
 class _Part(NamedTuple):
-    """A map of a composition, its exponent, the values of its symbols, and its TOML table in the list of maps."""
+    """A part of a composition: its map, the exponent, functions for the symbols of the map, and its table in TOML."""
 
     map: MapFamily
     power: int
@@ -70,10 +70,10 @@ class _Part(NamedTuple):
 
 
 class DocumentReader(PartReader):
-    """Reads a document: every part as far as possible, while collecting mistakes. Each reader is used once."""
+    """Read a document and collect its mistakes. Each reader is used once."""
 
     def read(self) -> dict[str, Any]:
-        """Return the fields of a `SystemFile`. Raises SystemFileError with all mistakes of the document."""
+        """Return a dict of the fields of a `SystemFile`. Raises SystemFileError with all mistakes of the document."""
         try:
             self.document, notes = without_left_sides(self.document)
         except InputError as error:
@@ -90,7 +90,7 @@ class DocumentReader(PartReader):
         stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
         name = self.document.get("name", "".join(c if c.isprintable() else "_" for c in stem))
         if not isinstance(name, str) or not name.isprintable() or len(name) > _MAX_NAME:
-            # The name occurs in the first line of many outputs: it must not contain line ends or escape sequences.
+            # The name is in the first line of many outputs, so it must not contain line ends or escape sequences.
             self._report(
                 "name", f"found {show(name)}, expected printable text on one line, at most {_MAX_NAME} characters"
             )
@@ -117,7 +117,7 @@ class DocumentReader(PartReader):
             read_structured_facts(catalog, self.variables, self._report)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        # The document with the name and current parameter values; long integers become text, as JSON requires.
+        # The document contains the name and the current values of parameters; long integers are text, as JSON requires.
         document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": name, **document}
         if self.parameters:
@@ -141,7 +141,7 @@ class DocumentReader(PartReader):
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
     ) -> tuple[MapFamily | None, CubicHamiltonian | None, FamilyMember | None]:
-        """Return the map of the section [kind], its Hamiltonian and its member; each may be None: absent or invalid."""
+        """Return (map, Hamiltonian, member) of the section [kind]; each is None if it is absent or invalid."""
         if section is None:
             return None, None, None
         map_, hamiltonian, member = None, None, None
@@ -168,20 +168,20 @@ class DocumentReader(PartReader):
             if self.root is not None:
                 parameter, root = self.root
 
-                def map_at(value: fmpq) -> MapFamily:  # `value` approximates the algebraic number, for floats
+                def map_at(value: fmpq) -> MapFamily:  # `value` approximates the algebraic number
                     overrides = {**self.overrides, parameter: value}
                     reader = DocumentReader(self.document, self.where, overrides, self.look_up)
                     parsed_map: MapFamily = reader.read()["map"]
                     return parsed_map
 
                 map_ = AlgebraicMap(map_, root, map_at)
-            self.variables = map_.variables  # a polarised map has more variables than its system
+            self.variables = map_.variables  # a polarised map has more variables than the system in the file
             for name in set(self.variables) & set(self.parameters):
                 self._report(f"parameters.{name}", "is a variable of the map as well, expected distinct names")
         return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
-        """Return the map of the document with the parameters `symbols` symbolic. Raises InputError for a [family]."""
+        """Return the map of the document; the parameters `symbols` remain symbols. Raises InputError for a [family]."""
         if kind == "family":
             raise InputError(
                 f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
@@ -233,7 +233,7 @@ class DocumentReader(PartReader):
                 example = "\nan algebraic number is written: root of t^2 - 2"
                 hint = example if isinstance(raw_value, str) and "sqrt" in raw_value else ""
                 self._report(path, f"{error}{hint}")
-                self.parameters[name] = fmpq(1)  # so that its uses are not reported as further mistakes
+                self.parameters[name] = fmpq(1)  # any value, so that no use of the parameter is reported as a mistake
                 self.has_bad_parameter = True
         if self.root is not None:
             self.symbols = (self.root[0],)
@@ -330,7 +330,7 @@ class DocumentReader(PartReader):
         return self._make_checked_map(explicit_map, "map", self.variables, image, inverse)
 
     def _make_checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
-        """Return the map if it is defined and dominant, and a given inverse is correct; otherwise note a mistake."""
+        """Return the map that `make` constructs; if it is not dominant, or its inverse is wrong, note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None
@@ -359,7 +359,7 @@ class DocumentReader(PartReader):
         return None if H is None else hamiltonian
 
     def _read_symbolic_field(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """Return the Kahan map of f = J grad H, where J and H may contain symbols; None after a mistake."""
+        """Return the Kahan map of f = J grad H; J and H may contain symbols. After a mistake, return None."""
         H, n = self._read_polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [
@@ -394,10 +394,10 @@ class DocumentReader(PartReader):
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
             return self._refuse(f"family.{key}", message)
 
-    # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
+    # ---- [composition]: maps given by a file, by a catalogue name or in a table ------------------------------------
 
     def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """Read a composition; parts given by name are replaced by their content: the document is self-contained."""
+        """Read a composition. In the document, the parts given by file or name are replaced by their content."""
         entries = self._require("composition", section, "of")
         if not isinstance(entries, list) or not entries:
             if entries is not None:
@@ -459,9 +459,9 @@ class DocumentReader(PartReader):
         return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **other_entries})
 
     def _read_part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
-        """Return the values that a composition assigns to the parameters of one of its maps.
+        """Return the values that a composition assigns to the parameters of one of its maps, as two dicts.
 
-        The first dict contains the values that are rational numbers, the second one the functions of symbols.
+        The first dict contains those values that are rational numbers, the second one those that depend on symbols.
         """
         numbers: dict[str, fmpq] = {}
         values: Values = {}
@@ -470,7 +470,7 @@ class DocumentReader(PartReader):
             self._report(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
-        if isinstance(table, dict) and "parameters" not in table:  # the map can use the parameters of this file
+        if isinstance(table, dict) and "parameters" not in table:  # the map can use the outer parameters
             context = ring(self.symbols)
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
@@ -493,7 +493,7 @@ class DocumentReader(PartReader):
         return numbers, values
 
     def _make_part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
-        """Return the reader for a part of a composition."""
+        """Return the reader of a part of a composition: `key` says how `value` describes the part."""
         self.part_count[0] += 1
         if self.part_count[0] > _MAX_FACTORS:
             raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most {_MAX_FACTORS}")
@@ -501,7 +501,7 @@ class DocumentReader(PartReader):
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
-            # A table without its own parameters has the parameters of the file that contains it.
+            # A table without parameters has the parameters of the file that contains the table.
             outer_parameters = {name: format_number(number) for name, number in self.parameters.items()}
             document = {"parameters": {**outer_parameters, **dict.fromkeys(self.symbols, 1)}, **value}
         elif not isinstance(value, str):

@@ -1,11 +1,11 @@
-"""Conversion of differential equations in common notations to the right-hand sides of a system file.
+"""Conversion of differential equations in common notations to right-hand sides, as a system file contains them.
 
-A text is a list of equations separated by ; or , or line breaks, which may be enclosed in brackets. The left side of an
-equation is a derivative, the right side a formula, in which x(t) means x:
+A text is a list of equations separated by semicolons, commas or line breaks, perhaps in brackets. The left side of an
+equation is a derivative in one of the following notations. The right side is a formula, in which x(t) means x.
 
     x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
 
-The text is split into tokens and never evaluated; `kahanmaps.algebra.parsing` reads the formulas.
+The text is split into tokens and never executed; `kahanmaps.algebra.parsing` reads the formulas.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-MAX_CHARACTERS = 2_000_000  # number of characters of all equations together
+MAX_CHARACTERS = 2_000_000  # maximal number of characters of all equations together
 _OPEN, _CLOSE = ("(", "[", "{"), (")", "]", "}")
 _EQUALS = ("=", "==", ":=")
-# In decomposed Unicode a dot above a letter is a separate character; two dots or a double quote mean two primes.
+# Unicode can represent a dot or two dots above a letter as a separate character. A double quote means two primes.
 _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "″": 2, '"': 2, "\u0308": 2, "‴": 3}
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
-_MAX_TOKENS = 16  # maximal number of tokens of a derivative written without primes
+_MAX_TOKENS = 16  # maximal number of tokens of a derivative that is written without primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
-_CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
-# Patterns of derivatives (with blanks only between two words) and their orders; each is compiled when it is needed.
+_CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # in Maple, Mathematica, Modelica or SymPy
+# Pairs of a pattern of a derivative (with a blank only between two words) and its order, compiled when needed.
 _DERIVATIVE_PATTERNS = (
     (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
     (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
@@ -47,15 +47,15 @@ _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 class _Derivative(NamedTuple):
     name: str
     order: int
-    end: int  # index of the token after the derivative
+    end: int  # index of the first token after the derivative
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Replace equations in [system] by a list of right-hand sides and the variables.
+    """Return (document, notes); right-hand sides and variables replace the equations in [system] of the document.
 
-    If the variables are not given, they are ordered as their equations; velocities of equations of second order come
-    last. A document without equations is returned unchanged. The second entry lists notes on new names. Raises
-    InputError for a text that is not an equation, and for an equation of a variable that is not among the given ones.
+    Variables that are not given have the order of their equations, and velocities of second-order equations come last.
+    A document without equations is returned unchanged. The notes are sentences on new names. Raises InputError for a
+    text that is not an equation, and for an equation of a variable that is not among the given ones.
 
     >>> without_left_sides({"system": {"rhs": "x' = x*y, dy/dt = -x"}})
     ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
@@ -89,7 +89,7 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
 
 
 def tokens_of(text: str) -> list[str]:
-    """Split a text into tokens, including blanks. Raises InputError if the text is too long."""
+    """Split a text into tokens; blanks are tokens too. Raises InputError if the text is too long."""
     if len(text) > MAX_CHARACTERS:
         raise InputError(f"found equations of {len(text)} characters, expected at most {MAX_CHARACTERS}")
     decomposed = text if text.isascii() else unicodedata.normalize("NFD", text)
@@ -97,10 +97,10 @@ def tokens_of(text: str) -> list[str]:
 
 
 def pieces_of(text: str) -> list[list[str]]:
-    """Return a list of tokens for each equation or formula in a text. Raises InputError for unbalanced brackets."""
+    """Return the list of tokens of each equation or formula in a text. Raises InputError for unbalanced brackets."""
     tokens = tokens_of(text)
     positions = [k for k, token in enumerate(tokens) if not token.isspace()]
-    # Omit the name and the terminator of a list, as in eqs := [x' = y, y' = -x];
+    # Skip the name and the terminator of a list, as in eqs := [x' = y, y' = -x];
     while positions and tokens[positions[-1]] in (";", ":", ","):
         positions.pop()
     first_three = [tokens[k] for k in positions[:3]]
@@ -125,7 +125,7 @@ def pieces_of(text: str) -> list[list[str]]:
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
-    """Return the tokens without outer brackets, as in {x' = y, y' = -x}."""
+    """Return the tokens without brackets around all of them, as in {x' = y, y' = -x}."""
     positions = [k for k, token in enumerate(tokens) if not token.isspace()]
     if len(positions) < 2 or tokens[positions[0]] not in _OPEN or tokens[positions[-1]] not in _CLOSE:
         return tokens
@@ -144,15 +144,15 @@ def read_equations(
 
     Args:
         pieces: the tokens of each equation.
-        variables: the names of the variables and of the velocities of equations of second order; by default new names.
-        parameters: the names of parameters, which velocities must not have.
+        variables: the names of the variables, then of the velocities of second-order equations; by default new names.
+        parameters: the names of the parameters, which velocities must not have.
 
     Returns:
-        The right-hand sides by variable, in the order of the equations, the velocities last; the names of the
-        velocities; and sentences on new names.
+        A triple: the right-hand sides by variable, in the order of the equations and with the velocities last; the
+        names of the velocities; sentences that explain new names.
 
     Raises:
-        InputError: for a text that is not an equation, with what to write instead, and for two equations of a variable.
+        InputError: for a text that is not an equation (with what to write), and for two equations of one variable.
     """
     pieces, notes = _replace_indexed_names(pieces, parameters)
     orders, formulas = dict[str, int](), dict[str, list[str]]()
@@ -173,7 +173,7 @@ def read_equations(
         if derivative.name in orders:
             raise InputError(f"found two equations for {derivative.name}, expected one")
         orders[derivative.name], formulas[derivative.name] = derivative.order, piece[equals_at[0] + 1 :]
-    # The velocity of a variable with an equation of second order has a given name, or is vx for x.
+    # The velocity of a variable x with a second-order equation has the given name, or by default vx.
     second_order = [name for name, order in orders.items() if order == 2]
     extra_names = [name for name in variables if name not in orders]
     if len(extra_names) == len(second_order):
@@ -196,7 +196,7 @@ def read_equations(
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """Return the derivative (x', dx/dt, x_dot, diff(x(t), t)) that begins at a token; None if there is none."""
+    """Return the derivative (x', dx/dt, x_dot, diff(x(t), t)) that begins at token `start`, or None."""
     name = tokens[start] if start < len(tokens) else ""
     if not is_name(name):
         return None
@@ -206,7 +206,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
         order, end = order + _PRIMES[tokens[end]], end + 1
     if order:
         return _Derivative(name, order, _skip_argument(tokens, end))
-    text, last_token, ends = "", "", dict[int, int]()  # length of the text up to a token -> index of the next token
+    text, last_token, ends = "", "", dict[int, int]()  # length of the text up to some token -> index after this token
     for position, token in enumerate(tokens[start : start + _MAX_TOKENS], start + 1):
         needs_blank = (last_token[-1:].isalnum() or last_token[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
         text, last_token = f"{text}{' ' * needs_blank}{token}", token
@@ -219,18 +219,18 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
 
 
 def _skip_argument(tokens: Sequence[str], position: int) -> int:
-    """Return the position after an argument (t) or [t] that begins at `position`; without one, return `position`."""
+    """Return the position after an argument (t) or [t] at `position`; if there is none, return `position`."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
 def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
-    """Return the right-hand side of the equation for `name` as text, with x instead of x(t).
+    """Return the right-hand side of the equation for `name` as text, in which x replaces x(t).
 
-    `orders` has the order of the equation of each variable. The derivative x' of a variable with an equation of second
-    order is replaced by its name in `velocities`.
+    `orders` maps each variable to the order of its equation. The derivative x' of a variable with a second-order
+    equation is replaced by the name of the velocity in `velocities`.
     """
     words = [token for token in tokens if not token.isspace()]
-    blanks, blank = list[str](), ""  # keep the blank before a word: "x y" must not become "xy"
+    blanks, blank = list[str](), ""  # blank before each word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
             blank = " "
@@ -241,7 +241,7 @@ def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], veloc
     k = 0
     while k < len(words):
         derivative = derivative_at(words, k)
-        # x_dot is the derivative of x unless a variable is called x_dot.
+        # x_dot is the derivative of x, unless x_dot is a variable.
         if derivative and derivative.name in orders and (words[k] not in orders or words[k] == derivative.name):
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
@@ -259,7 +259,7 @@ def _formula_text(name: str, tokens: list[str], orders: Mapping[str, int], veloc
 def _replace_indexed_names(
     pieces: Sequence[list[str]], parameters: Collection[str]
 ) -> tuple[list[list[str]], list[str]]:
-    """Replace x[0] by x0 (or x_0 if x0 is taken); return the new pieces, and a note on each new name."""
+    """Replace x[0] by x0 (by x_0 if x0 is in use); return the new pieces, and a note on each new name."""
     used_names = {*parameters, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
     new_pieces: list[list[str]] = []
@@ -282,8 +282,8 @@ def _replace_indexed_names(
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
-    """Return a hint that says what to type instead of an unsupported statement."""
-    if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
+    """Return a hint on what to type instead of a statement that is not supported; "" if there is no hint."""
+    if "\\" in left_side:  # LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
         name = next((token for token in left_side if is_name(token) and token not in _LATEX_COMMANDS), "x")
         name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"
         return f"; LaTeX is not read: write {name}{primes} = ..., and products with *"

@@ -1,4 +1,4 @@
-"""Conversion of formulas and numbers of SymPy and other libraries to text, without importing these libraries."""
+"""Conversion of formulas and numbers of SymPy and similar libraries to text, without importing these libraries."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _NUMBERS = (int, float, complex)
 def formula_text(value: Any) -> str:
     """Convert a right-hand side or a claim to text, exactly.
 
-    Raises InexactNumber for floats, also inside SymPy expressions (Python evaluates 1/3 in 1/3*x to a float). Raises
-    InputError for irrational numbers in SymPy expressions.
+    Raises InexactNumber for floats, also for those in SymPy expressions (Python evaluates the 1/3 in 1/3*x to a float),
+    and InputError for irrational numbers in SymPy expressions.
 
     >>> formula_text("x*y"), formula_text(2)
     ('x*y', '2')
@@ -27,7 +27,7 @@ def formula_text(value: Any) -> str:
         return str(value)
     for irrational in _irrational_numbers(value):
         if irrational.is_Float:
-            rational(float(irrational))  # raises the error for floats
+            rational(float(irrational))  # raises InexactNumber
         raise InputError(
             f"found {irrational} in {value}, expected rational numbers and names: "
             f"an algebraic number is the value of a parameter, System(..., a={irrational})"
@@ -36,7 +36,7 @@ def formula_text(value: Any) -> str:
 
 
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
-    """Replace the only irrational number in SymPy expressions by a name; return the sides, {name: number} or {}."""
+    """Give a name to the only irrational number in SymPy expressions; return the new sides and {name: number} or {}."""
     from_sympy = [side for side in sides if _is_sympy(side)]
     irrational_numbers = {irrational for side in from_sympy for irrational in _irrational_numbers(side)}
     if len(irrational_numbers) != 1 or any(irrational.is_Float for irrational in irrational_numbers):
@@ -51,9 +51,9 @@ def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any]
 
 
 def number(value: Any) -> Any:
-    """Convert an algebraic number of SymPy to text, "root of ..."; return other values unchanged.
+    """Convert an algebraic number of SymPy to a text "root of ..."; return other values unchanged.
 
-    Raises InputError for other irrational numbers of SymPy.
+    Raises InputError for SymPy's floats and transcendental numbers.
     """
     if not _is_sympy(value) or value.is_Rational:
         return value
@@ -66,9 +66,9 @@ def number(value: Any) -> Any:
 
 
 def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
-    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None for other objects.
+    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None if not all are equations.
 
-    Raises InputError for other equations of SymPy.
+    Raises InputError for SymPy equations of another form.
     """
     if not equations or not all(getattr(equation, "is_Equality", False) for equation in equations):
         return None
@@ -82,7 +82,7 @@ def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
 
 
 def _irrational_numbers(value: Any) -> Iterator[Any]:
-    """Yield the irrational numbers that occur in a SymPy expression."""
+    """Yield the maximal subexpressions of a SymPy expression that are irrational numbers or floats."""
     from sympy import preorder_traversal
 
     parts = preorder_traversal(value)

@@ -1,13 +1,13 @@
-"""Families of systems in the catalogue: a member such as `lv(7,3)` has arguments, and is generated on demand.
+"""Families of systems in the catalogue; a member such as `lv(7,3)` is given by arguments and generated on demand.
 
 The Bogoyavlenskij-Itoh systems LV(n, k) are Lotka-Volterra systems:
 
     x_i' = x_i sum_j a_ij x_j,    a_ij = -a_ji,    a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k,
 
-with 2k + 1 <= n. For n = 2k + 1 the species form a circle, on which each preys on the next k species. For larger n the
-species k + 1, ..., n - k have the same interactions with all others: replaced by their sum, they reduce LV(n, k) to
-LV(2k + 1, k). Their partial sums solve the same Riccati equation, also for the map, so that cross-ratios are integrals
-(proofs: docs/mathematics.md). Sources: itoh-1987, bogoyavlenskij-1988, damianou-2017.
+with 2k + 1 <= n. For n = 2k + 1 the species form a circle, in which each species preys on the next k. For larger n the
+species k + 1, ..., n - k have equal interactions with all other species. Their sum replaces them and reduces LV(n, k)
+to LV(2k + 1, k). The Kahan map moves all partial sums of these species by the same Moebius map, so that cross-ratios
+are integrals (proofs: docs/mathematics.md). Sources: itoh-1987, bogoyavlenskij-1988, damianou-2017.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from kahanmaps.errors import InputError, quoted
 
 _MEMBER_NAME = re.compile(r"(\w+)(?:\((.*)\))?")
 _INTEGER = re.compile(r"-?[0-9]{1,6}")
-MAX_SPECIES = 40  # largest n of LV(n, k): documents grow like n^2
-_DEGREE_COUNT = 4  # number of degrees d_1, d_2, ... in a document
+MAX_SPECIES = 40  # maximal n of LV(n, k): the size of documents grows like n^2
+_DEGREE_COUNT = 4  # number of degrees d_1, d_2, ... of iterates that a document states
 
 
 class NamedFamily(NamedTuple):
-    """A family of systems: the notation of members, a title, and the function from integers to documents."""
+    """A family of systems: notation of members, an example, a title, and the function that makes documents."""
 
     form: str
     example: str
@@ -34,7 +34,7 @@ class NamedFamily(NamedTuple):
 
 
 def degree(n: int, k: int, m: int) -> int:
-    """Return the degree of the m-th iterate of the Kahan map of LV(n, k): measured, not proved for all n.
+    """Return the degree of the m-th iterate of the Kahan map of LV(n, k) by a formula that is measured, not proved.
 
     >>> [degree(5, 2, m) for m in range(5)]
     [1, 5, 21, 45, 81]
@@ -49,13 +49,13 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
 
     Args:
         n: the number of species, at least 2.
-        k: at least 0, and at most (n - 1)/2.
+        k: an integer of at least 0 and at most (n - 1)/2.
 
     Returns:
-        Plain data in the format of a system file, with integrals that have few terms.
+        Plain data in the format of a system file, with integrals of few terms.
 
     Raises:
-        InputError: for other n and k.
+        InputError: for any other n or k.
 
     Source: damianou-2017, kouloukas-quispel-vanhaecke-2016.
 
@@ -127,9 +127,9 @@ FAMILIES = {"lv": NamedFamily("lv(n,k)", "lv(7,3)", "Bogoyavlenskij-Itoh systems
 
 
 def family_member(reference: str) -> tuple[str, dict[str, Any]] | None:
-    """Return the name (without spaces) and the document of a member of a family; None for other names.
+    """Return the name without spaces and the document of the member `reference` of a family; None for other names.
 
-    Raises InputError for arguments that are missing or that the family does not have.
+    Raises InputError for missing arguments, and for arguments for which the family has no member.
 
     >>> family_member("lv(3, 1)")[0]
     'lv(3,1)'

@@ -1,8 +1,8 @@
-"""Reading and writing of system files: a differential equation or map in TOML; all mistakes are reported together.
+"""Reading and writing of system files: an ODE or a map in TOML; all mistakes in a file are reported together.
 
-A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear],
-[map] and [composition], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them.
-Numbers are exact: decimals, quoted or not, are read as rational numbers.
+A file has exactly one of the sections [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs),
+[bilinear], [map] and [composition], and may have [parameters], [integrals] and [density]; docs/system-files.md
+describes the format. Numbers are exact: decimals, quoted or not, are read as rational numbers.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 16_000_000
 _TOML = TomlKind("system file", MAX_FILE_BYTES, SystemFileError)
-_MAX_LABEL = 120  # maximal number of characters of equations that serve as a name
+_MAX_LABEL = 120  # maximal number of characters of equations that serve as the label of a system
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
@@ -52,8 +52,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     """A system or map with the parameters and claims of its file.
 
     `map` is the map; for a differential equation it is the Kahan map. `hamiltonian` and `member` are None unless the
-    file (or the Python object from which it was made) declares them. `integrals` and `density` are claims: rational
-    functions of the variables and `eps`. `document` is the file as plain data; its formulas contain the names of the
+    file, or the Python object that was converted, declares them. `integrals` and `density` are claims, rational
+    functions of the variables and `eps`. `document` is the file as plain data; formulas in it contain the names of
     parameters, not their values.
     """
 
@@ -66,12 +66,12 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
-    notes: tuple[str, ...] = ()  # how equations were interpreted, as sentences for the user
-    integrals_in_iterates: Mapping[str, RationalFunction] = field(default_factory=dict)  # claims that contain x~
+    notes: tuple[str, ...] = ()  # sentences that tell the user how equations were interpreted
+    integrals_in_iterates: Mapping[str, RationalFunction] = field(default_factory=dict)  # claims with x~
 
     @property
     def label(self) -> str:
-        """The title in pictures and pages: the name; for an inline system its equations, if they are short."""
+        """The name in pictures and on pages; for an inline system its equations, if they are short."""
         if self.name != "inline" or not self.is_quadratic:
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
@@ -79,7 +79,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return equations if len(equations) <= _MAX_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
-        """Return the name or the equations of the system, with a letter: f = euler_top, or f: (x' = y, y' = -x)."""
+        """Return the label of the system after a letter: f = euler_top, or f: (x' = y, y' = -x)."""
         return f"{letter} = {self.name}" if self.label == self.name else f"{letter}: ({self.label})"
 
     @property
@@ -95,15 +95,15 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     dimension = dim
 
     def f(self, *point: Any, **named: Any) -> Any:
-        """Return the right-hand sides at a point: f(x), f({"x": 1, "y": 2}), f("1,2"), f(1, 2) or f(x=1, y=2).
+        """Return the right-hand sides at a point, given as f(x), f({"x": 1, "y": 2}), f("1,2"), f(1, 2) or f(x=1, y=2).
 
-        The values are exact for exact numbers; an array of floats of shape (dim,) or (points, dim) gives an array.
+        The result is exact for exact numbers. An array of floats of shape (dim,) or (points, dim) gives an array.
         Raises InputError for a map without a vector field.
         """
         return self.system.f(*point, **named)
 
     def jacobian(self, *point: Any, **named: Any) -> Any:
-        """Return the Jacobi matrix f'(x) at a point, given as in `f`; without a point its entries are polynomials."""
+        """Return the Jacobi matrix f'(x) at a point, given as in `f`; without a point, a matrix of polynomials."""
         rows = self.system.jacobian(self.variables)
         if not point and not named:
             return rows
@@ -113,24 +113,24 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return entries.reshape(*entries.shape[:-1], self.dim, self.dim)
 
     def with_parameters(self, values: Mapping[Any, Any] | None = None, **named: Any) -> SystemFile:
-        """Return the system with other values of its parameters, exact numbers by name. Raises InputError."""
+        """Return the system with other parameter values, exact numbers by name. Raises InputError for unknown names."""
         values_by_name = {str(name): value for name, value in {**(values or {}), **named}.items()}
         return parse_system(self.to_toml(), self.name, values_by_name)
 
     subs = with_parameters
 
     def kahan(self, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:
-        """Return the Kahan map at an exact eps, or at the time step h = 2 eps. Raises InputError for other maps."""
+        """Return the Kahan map at an exact eps or for the time step h = 2 eps. Raises InputError for any other map."""
         _ = self.system
         return self.at(resolve_eps(eps, time_step, h))
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """Draw a portrait and return its axes; the arguments are the arguments of `km.portrait` after the system."""
+        """Draw a portrait and return its axes; the arguments are those of `km.portrait` that follow the system."""
         return import_module("kahanmaps.plots.plot").plot.portrait(self, *arguments, **options)
 
     @property
     def claim_names(self) -> tuple[str, ...]:
-        """The names of the arguments of claimed functions: the variables, the algebraic parameter (if any), and eps."""
+        """The arguments of claimed functions: the variables, the name of the algebraic parameter (if any), and eps."""
         return (*self.variables, *(self.map.given.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
 
     @property
@@ -140,7 +140,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def system(self) -> QuadraticSystem:
-        """The quadratic system of a Kahan map. Raises InputError for another map."""
+        """The quadratic system whose Kahan map is `map`. Raises InputError if `map` is another map."""
         if self.is_quadratic and isinstance(self.map, KahanFamily):
             return self.map.system
         if self.map.unsupported_reason:
@@ -157,11 +157,11 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:
-        """The right-hand sides of the quadratic system. Raises InputError for another map."""
+        """The right-hand sides of the quadratic system. Raises InputError if `map` is no Kahan map."""
         return self.system.rhs
 
     def at(self, eps: Any = None) -> Map:
-        """Return the map at an exact eps, half the time step, as a callable. Raises InputError if eps is missing."""
+        """Return the map at an exact eps (half the time step), as a callable. Raises InputError if eps is missing."""
         if hasattr(eps, "__len__") and not isinstance(eps, str):
             raise InputError("found a point, expected eps: system.at(eps)(x) is the image of x, system.f(x) the field")
         if eps is None and self.map.has_eps:
@@ -171,14 +171,14 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     __call__ = at
 
     def save(self, path: str | Path) -> None:
-        """Write the system to a file in TOML."""
+        """Write the system to a TOML file."""
         write_atomically(str(path), self.to_toml().encode())
 
     @property
     def real_approximation(self) -> SystemFile:
-        """The file for floating point: an algebraic parameter is replaced by a rational approximation.
+        """The file for computations with floats: a rational approximation replaces an algebraic parameter.
 
-        Raises InputError if the parameter is not real.
+        Raises InputError if the algebraic parameter is not real.
         """
         if not isinstance(self.map, AlgebraicMap):
             return self
@@ -187,13 +187,13 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def normal_form(self) -> SystemNormalForm | NoNormalForm:
-        """The normal form of the system, or the reason why there is none; it is computed at each access."""
+        """The normal form of the system, or the reason why there is none. Each access computes it again."""
         if not self.is_quadratic:
             return NoNormalForm(f"it is {self.map.kind}")
         return system_normal_form(self.system, self.hamiltonian, self.member)
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
-        """Raise InputError unless the arguments of the function are the system's variables and eps, in this order."""
+        """Raise InputError unless the arguments of the claim `what` are the variables of the system, then eps."""
         expected = self.claim_names
         n = self.dim
         if function.names != with_iterates(expected[:n], iterates_in(*function.names), expected[n:]):
@@ -204,20 +204,20 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def catalog(self) -> Mapping[str, Any]:
-        """Title, sources, convention and facts of a file of the catalogue."""
+        """The section [catalog] of a catalogue file: title, sources, convention and facts; empty for other files."""
         section: Mapping[str, Any] = self.document.get("catalog", {})
         return section
 
     @classmethod
     def from_system(cls, system: QuadraticSystem, name: str = "system") -> SystemFile:
-        """Return the file of a quadratic system, without a Hamiltonian and without claims."""
+        """Return a file for a quadratic system, without Hamiltonian and claims."""
         rhs = [format_polynomial(polynomial) for polynomial in system.rhs]
         document = {"name": name, "variables": list(system.variables), "system": {"rhs": rhs}}
         return cls(name, "system", {}, KahanFamily(system), None, None, {}, None, document)
 
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
-        """Return the file of a Hamiltonian system."""
+        """Return a file for a Hamiltonian system."""
         structure: Any = "standard" if hamiltonian.is_standard else _matrix_rows(hamiltonian.J)
         section = {"H": format_polynomial(hamiltonian.H), "J": structure}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
@@ -225,7 +225,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
-        """Return the file of a member of the family; if `member.signs` are not all +, that of an associated system."""
+        """Return a file for a member of the family, or for an associated system if some of `member.signs` are -."""
         from kahanmaps.family.cubics import default_variables
 
         section: dict[str, Any] = {"A": _matrix_rows(member.A), "H": format_polynomial(member.H)}
@@ -239,7 +239,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @classmethod
     def from_conjugate(cls, associate: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
-        """Return the file of an associated system over a number field, with the root as parameter."""
+        """Return a file for an associated system over a number field, whose generator is an algebraic parameter."""
         document = {
             "name": name,
             "variables": list(names_of(associate.chain[0])),
@@ -249,7 +249,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
-        """Return the file as TOML text; `parse_system` reads an equal file from it."""
+        """Return the file as TOML text, from which `parse_system` reads an equal file."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -260,7 +260,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return f"SystemFile({self.name}: {shorten(repr(self.map), 100)}{values})"
 
     def __str__(self) -> str:
-        """Return the equations of the system or map as text, with values in place of parameters."""
+        """Return the equations of the system or map as text; parameters are replaced by their values."""
         return f"{self.name}:\n{self.map}"
 
     def __eq__(self, other: object) -> bool:
@@ -281,7 +281,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
 
 def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form for float orbits, or a reason why none is used (such as the method "generic")."""
+    """Return the normal form for orbits in floats, or the reason why none is used, such as the method "generic"."""
     normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
     if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
         return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")
@@ -289,9 +289,9 @@ def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNorm
 
 
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """Read a system from a TOML file; `parameters` replace parameter values of the file.
+    """Read a system from a TOML file; `parameters` replace values of parameters in the file.
 
-    Raises SystemFileError with every mistake of the file, InputError if it cannot be read.
+    Raises SystemFileError with all mistakes in the file, and InputError if the file cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):
@@ -299,7 +299,7 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """Parse a system from text in TOML or in the format of XPP; `where` names the text in messages.
+    """Parse a system from text in TOML or in the format of XPP; messages call the text `where`.
 
     >>> parse_system('variables = ["x"]\\n[system]\\nrhs = ["x", "x"]', "example")
     Traceback (most recent call last):
@@ -315,7 +315,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 
 
 def _parse_document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
-    """Return the plain data of a text in TOML or in the .ode format of XPP, and notes on its interpretation."""
+    """Return the plain data of a text in TOML or in the .ode format of XPP, and notes on how it was interpreted."""
     is_of_xpp = where.endswith(ENDING)
     try:
         if not is_of_xpp:
@@ -332,10 +332,10 @@ def _decode(text: str | bytes) -> str:
 
 
 def _look_up_part(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
-    """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`.
+    """Look up a part of a composition: a "system" in the catalogue, or a "file" whose path is relative to `base`.
 
-    Return its document, what identifies it (its name in the catalogue or its path), and the function that looks up the
-    parts of this part (None for a system of the catalogue).
+    Return three things: the document of the part; its catalogue name or its path; the function that looks up the parts
+    of the part itself (None for a system of the catalogue).
     """
     if key == "system":
         generated = family_member(name)
@@ -355,10 +355,10 @@ def _matrix_rows(matrix: fmpq_mat) -> list[list[str]]:
 
 
 def match_variables(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
-    """Return the map of `other` in the variables of `file`, and a note on the matching ("" for the same variables).
+    """Return the map of `other` in the variables of `file`, and a note on their matching ("" for equal variables).
 
     Variables are matched by name if both maps have the same names, otherwise by position. Raises InputError if the
-    dimensions differ, and for maps other than Kahan's whose variables have the same names in another order.
+    dimensions differ, and for a map that is no Kahan map if its variables are those of `file` in another order.
     """
     f, g = file.map, other.map
     if f.dim != g.dim:

@@ -1,4 +1,4 @@
-"""Conversion of systems given by equations, on the command line or in Python, to system files."""
+"""Conversion of equations, given on the command line or in Python, to system files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def inline_file(
     variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | Sequence[str]]
 ) -> str:
-    """Return the text of a file with one section of this kind; `variables` are names separated by commas.
+    """Return the text of a system file with the section [`kind`]; `variables` are names separated by commas.
 
     >>> print(inline_file("x,y", {"a": "1/2"}, "system", {"rhs": ["a*y", "-x"]}))
     variables = ["x", "y"]
@@ -35,7 +35,7 @@ def inline_file(
     "a" = "1/2"
     """
 
-    def value(data: Any) -> str:  # strings and lists of strings are the same in JSON and TOML
+    def value(data: Any) -> str:  # strings and lists of strings are written in TOML as in JSON
         return json.dumps(data, ensure_ascii=False)
 
     lines = [] if variables is None else [f"variables = {value([name.strip() for name in variables.split(',')])}"]
@@ -54,15 +54,15 @@ def System(
     """Create a system x' = f(x) of degree at most 2 from its equations, or from a Hamiltonian of degree at most 3.
 
     Args:
-        equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
-            of SymPy, or a list of SymPy equations Eq(x(t).diff(t), ...).
-        variables: for a list of right-hand sides, the names of the variables in this order; otherwise also a dict of
-            parameters. For a Hamiltonian the positions, then the momenta in the same order.
-        hamiltonian: H, instead of equations: q' = dH/dp, p' = -dH/dq.
-        parameters: the values of other names, a=2 or parameters={"a": 2}: exact numbers, also algebraic ones of SymPy.
+        equations: "x' = 2*x*y - 1; y' = -x^2", a dict from variables to right-hand sides, or a list of right-hand
+            sides, each a text or a SymPy expression; or a list of SymPy equations Eq(x(t).diff(t), ...).
+        variables: the names of the variables in the order of a list of right-hand sides. In other cases also a dict of
+            parameters. For a Hamiltonian: the positions, then the momenta in the same order.
+        hamiltonian: H, in place of equations; the system is q' = dH/dp, p' = -dH/dq.
+        parameters: values of the other names, as a=2 or parameters={"a": 2}: exact, or algebraic numbers of SymPy.
 
     Returns:
-        A `SystemFile`, as if read from a file.
+        A `SystemFile`, as if it had been read from a file.
 
     Raises:
         InputError: if the equations cannot be read.
@@ -111,7 +111,7 @@ def System(
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-# Other names of System in the style of other libraries, e.g. System.from_sympy([y, x**2], (x, y)).
+# Names of System in the style of other libraries, such as System.from_sympy([y, x**2], (x, y)).
 vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
 vars(System)["from_hamiltonian"] = lambda H, variables=None, **parameters: System(
     None, variables, hamiltonian=H, **parameters
@@ -128,9 +128,9 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any
 
 
 def as_file(value: Any) -> SystemFile:
-    """Convert a file, system, map, catalogue name, path, or equations in the notation of `System` to a file.
+    """Return a file for a file, system, map, catalogue name, path, or equations in a notation that `System` reads.
 
-    A map at one eps is converted to a map that does not depend on eps. Raises InputError for other values.
+    A map at one eps becomes a map that does not depend on eps. Raises InputError for any other value.
     """
     if isinstance(value, SystemFile):
         return value

@@ -1,7 +1,7 @@
-"""Parsing of functions of a point and its iterates: x~ is the image of x, x~~ the image of x~.
+"""Parsing of functions of a point x and its iterates: x~ is the image of x under the map, x~~ that of x~.
 
-A formula may contain letters for functions that are defined after the formula: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. Then
-F0~ is F0 with one more ~ at every variable.
+Functions may be named by letters, which are defined after the formula: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. F0~ denotes
+F0 with one more ~ after each variable.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from kahanmaps.algebra.parsing import is_name, parse_polynomial, parse_rational_
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError, quoted
 
-MAX_ITERATES = 16  # largest number of ~ after a name
-_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms when letters are replaced by their formulas
+MAX_ITERATES = 16  # maximal number of ~ after a name
+_MAX_PRODUCTS = 1_000_000  # maximal number of products of terms that are formed when formulas replace letters
 
 
 def iterates_in(*texts: str) -> int:
-    """Return the largest number of ~ after a name in texts: 2 if x~~ occurs.
+    """Return the maximal number of ~ after a name in the texts: 2 if x~~ occurs and x~~~ does not.
 
     >>> iterates_in("x*y~ - x~~", "x")
     2
@@ -30,7 +30,7 @@ def iterates_in(*texts: str) -> int:
 
 
 def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the variables, then the variables with ~, ~~, ... up to `count` times ~, then the names `others`.
+    """Return the variables, then all of them with ~, with ~~, ... up to `count` times ~, and then the names `others`.
 
     >>> with_iterates(["x", "y"], 1, ["eps"])
     ('x', 'y', 'x~', 'y~', 'eps')
@@ -41,19 +41,19 @@ def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = 
 def parse_with_iterates(
     text: str, variables: Sequence[str], others: Sequence[str], constants: Mapping[str, fmpq]
 ) -> RationalFunction:
-    """Parse a function of the variables, their iterates and the other names.
+    """Parse a rational function of the variables, their iterates and the names `others`.
 
     Args:
-        text: a formula; letters that occur in it may be defined after it, separated by commas.
-        variables: names of the coordinates.
-        others: names that have no iterates, such as symbols and eps.
-        constants: names of numbers, with their values.
+        text: a formula; definitions of letters that occur in it may follow, separated by commas.
+        variables: the names of the coordinates of a point.
+        others: names without iterates, such as symbols and eps.
+        constants: the values of other names in the formula.
 
     Returns:
-        A function of the names that `with_iterates` gives.
+        A function whose arguments are the names that `with_iterates` returns.
 
     Raises:
-        InputError: if the text cannot be read, or replacing the letters exceeds the work limit.
+        InputError: if the text cannot be parsed, or if replacing the letters exceeds the work limit.
 
     >>> minor = parse_with_iterates("F*G~ - G*F~, F = x, G = y", ["x", "y"], ["eps"], {})
     >>> minor == parse_with_iterates("x*y~ - y*x~", ["x", "y"], ["eps"], {})
@@ -62,7 +62,7 @@ def parse_with_iterates(
     if not isinstance(text, str) or "~" not in text:
         return parse_rational_function(text, (*variables, *others), constants)
     pieces, depth = [""], 0
-    for character in text:  # split at commas outside brackets
+    for character in text:  # split the text at commas outside brackets
         depth += (character == "(") - (character == ")")
         if character == "," and depth <= 0:
             pieces.append("")
@@ -100,7 +100,7 @@ def parse_with_iterates(
     gens, coordinates = context.gens(), (max_shift + 1) * n
 
     def shift_iterates(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
-        # Variables of the last iterate have no image in the ring, and do not occur in P.
+        # P contains no variable of the last iterate, whose image is not in the ring.
         images = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
         return P.compose(*images, *gens[coordinates:], ctx=context)
 

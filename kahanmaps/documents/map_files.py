@@ -1,4 +1,4 @@
-"""System files of maps constructed in Python, so that functions of system files also accept maps."""
+"""System files for maps that are constructed in Python, so that functions for system files accept maps too."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from kahanmaps.maps.kahan import KahanFamily
 
 
 def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
-    """Return the file of a map; a map at one eps becomes a map that does not depend on eps.
+    """Return a system file for a map; a map at one eps becomes a map that does not depend on eps.
 
-    Raises InputError for a map over another field than Q, and for one with symbols other than an algebraic number.
+    Raises InputError for a map over a field other than Q, and for a map with symbols that are not an algebraic number.
 
     >>> from kahanmaps.maps.explicit import explicit_map
     >>> print(map_file(explicit_map(["x", "y"], ["y", "(y + 2)/x"])))
@@ -43,11 +43,11 @@ def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
     else:
         document = {"name": name, **_document(family)}
     file = parse_system(to_toml(document, ("name", "variables"), ("parameters", *KINDS)), name)
-    return replace(file, map=family) if family.time_steps else file  # the formulas do not contain the flow
+    return replace(file, map=family) if family.time_steps else file  # formulas do not contain the flow of the map
 
 
 def without_eps(map_: Map) -> MapFamily:
-    """Convert a map over Q at one eps, or a composition at several eps, to a map that does not depend on eps."""
+    """Convert a map over Q to a map that does not depend on eps; the map has one eps, or one for each factor."""
     if map_.field is not QQ:
         raise InputError(f"found {map_!r}, expected a map over the rational numbers")
     variables = tuple(map_.variables or (f"x{k + 1}" for k in range(map_.dim)))
@@ -67,7 +67,7 @@ def _equation_rows(equation: Equation, variables: Sequence[str]) -> Rows:
 
 
 def _document(map_: MapFamily) -> dict[str, Any]:
-    """Return the document of a map: its variables and one section."""
+    """Return the document of a map, with its variables and one section."""
     variables, n = list(map_.variables), map_.dim
     if isinstance(map_, KahanFamily):
         return {"variables": variables, "system": {"rhs": [format_polynomial(f) for f in map_.system.rhs]}}

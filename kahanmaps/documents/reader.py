@@ -1,6 +1,6 @@
-"""Reading the parts of a system file: tables, texts, polynomials and matrices, with a list of mistakes.
+"""Reading the parts of a system file (tables, texts, polynomials, matrices) and collecting the mistakes in them.
 
-Formulas may contain the variables, the parameters, which have values, and the symbols.
+A formula may contain the variables, the parameters, which have values, and the symbols, which have none.
 """
 
 from __future__ import annotations
@@ -48,42 +48,42 @@ EXPECTED = {
 }
 
 
-# A function that looks up a part of a composition, given by a key ("file" or "system") and its value. It returns the
-# document of the part, a unique name of this document, and the look-up function for parts of this document.
+# A function that looks up a part of a composition from a key ("file" or "system") and its value. It returns the
+# document of the part, a unique name of this document, and the look-up function for the parts of this document.
 LookUp = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
-    """Reads the parts of a document, and collects its names (parameters, variables, symbols) and its mistakes."""
+    """Read the parts of a document; collect its names (parameters, variables, symbols) and its mistakes."""
 
     def __init__(
         self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], look_up: LookUp | None = None
     ) -> None:
-        """`look_up` finds the parts of compositions that are given by name."""
+        """`overrides` replace parameter values; `look_up` finds the parts of a composition that are given by name."""
         self.document = document
         self.where = where
         self.overrides = overrides
         self.look_up = look_up
-        self.enclosing: tuple[str, ...] = ()  # files whose compositions contain this document
-        self.part_count = [0]  # number of parts read so far; a list, which the readers of all parts share
+        self.enclosing: tuple[str, ...] = ()  # files with compositions that contain this document
+        self.part_count = [0]  # number of parts read so far, in a list that the readers of all parts share
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
-        self.has_bad_parameter = False  # a parameter is invalid: checks that need its value are omitted
+        self.has_bad_parameter = False  # whether a parameter is invalid, so that checks with its value are omitted
         self.variables: tuple[str, ...] | None = None
-        self.symbols: tuple[str, ...] = ()  # parameters that stay symbols in the map
-        self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number; it is one of the symbols
+        self.symbols: tuple[str, ...] = ()  # parameters that remain symbols in the map
+        self.root: tuple[str, Root] | None = None  # name and value of the algebraic parameter, one of the symbols
 
     def _report(self, key: str, sentence: str) -> None:
-        # Keys come from the file: no escape sequences in them may reach a terminal.
+        # Keys come from the file and may contain escape sequences, which must not reach a terminal.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
     def _refuse(self, key: str, sentence: str) -> T | None:
-        """Note a mistake and return None."""
+        """Add a mistake to the list and return None."""
         self._report(key, sentence)
         return None
 
     def _try_make(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
-        """Return make(*arguments); if it raises InputError, note a mistake and return None."""
+        """Return make(*arguments); if this call raises InputError, note a mistake at `path` and return None."""
         try:
             return make(*arguments)
         except InputError as error:
@@ -111,9 +111,9 @@ class PartReader:
     def _read_polynomial(
         self, path: str, value: Any, max_degree: int, extra_names: Sequence[str] = (), *, of_map: bool = True
     ) -> fmpq_mpoly | None:
-        """Return a polynomial in the variables, `extra_names` and, for a map, the symbols and eps.
+        """Return `value` as a polynomial in the variables and `extra_names`; if `of_map`, also in the symbols and eps.
 
-        If the text is invalid, or the degree in the variables exceeds `max_degree`, note a mistake and return None.
+        If the text is invalid, or its degree in the variables exceeds `max_degree`, note a mistake and return None.
         """
         text = self._read_text(path, value)
         if text is None or self.variables is None:
@@ -166,7 +166,7 @@ class PartReader:
         return table.get(key)
 
     def _read_list(self, section: str, key: str, value: Any, noun: str) -> list[Any] | None:
-        """Return a list with one entry for each variable; for other values note a mistake and return None."""
+        """Return `value` if it is a list with one entry for each variable; otherwise note a mistake and return None."""
         path = f"{section}.{key}"
         if value is None:
             return None
@@ -180,7 +180,7 @@ class PartReader:
         return value
 
     def _read_each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
-        """Read every entry of a list and note all mistakes; return None if an entry cannot be read."""
+        """Return the list of all entries, each read by `read`; note all mistakes, and return None if there is one."""
         entries = value if isinstance(value, list) else []
         results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
         valid = [result for result in results if result is not None]
@@ -197,7 +197,7 @@ class PartReader:
 
 
 def json_like(value: Any) -> Any:
-    """Return plain data with long integers as text."""
+    """Return plain data in which long integers are replaced by text."""
     if isinstance(value, dict):
         return {key: json_like(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""The structured facts of a [catalog] section: degrees, growth, verdict, relations along an orbit.
+"""The structured facts of a [catalog] section: degrees, growth, verdict, and relations along orbits.
 
     degrees = [3, 9, 19, 33, 51]          of the iterates Phi, Phi^2, ... on a generic line
     growth = "quadratic"                  bounded, linear, quadratic or exponential
@@ -10,8 +10,8 @@
     monomials = ["x1^2", "x2^2", "x3^2", "1"]
     dimension = 2
 
-All these facts hold for generic parameters and generic eps, so relations do not contain parameters. The `facts` of the
-section state the evidence.
+These facts hold for generic parameters and generic eps, hence relations do not contain parameters. The evidence for
+them is stated in the `facts` of the section.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from kahanmaps.sources import SOURCES
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
 FACT_KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
-MAX_MONOMIALS = 100_000  # number of monomials of one relation
+MAX_MONOMIALS = 100_000  # maximal number of monomials of one relation
 _DEGREE_BOUND = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")
 
 
 class ClaimedRelations(NamedTuple):
-    """A Hirota-Kimura basis: `functions` (polynomials over Q in the variables), as written in the file in `text`.
+    """A Hirota-Kimura basis: `functions` are its polynomials over Q in the variables, as the file states in `text`.
 
-    `dimension` is the dimension of the space of their linear combinations that vanish along a generic orbit.
+    `dimension` is the dimension of the space of those linear combinations that vanish along a generic orbit.
     """
 
     text: str
@@ -51,8 +51,8 @@ class ClaimedRelations(NamedTuple):
 def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[ClaimedRelations, ...]:
     """Return the relations of a [catalog] section; their functions are exact polynomials in `variables`.
 
-    `section` is `SystemFile.catalog`. The result is empty if the section states no relations. Raises InputError for
-    functions that cannot be read. Source: petrera-pfadler-suris-2009.
+    `section` is `SystemFile.catalog`. The result is empty if the section states no relation. Raises InputError for a
+    function that cannot be parsed. Source: petrera-pfadler-suris-2009.
 
     >>> [result] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
     >>> result.functions, result.dimension
@@ -69,9 +69,9 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
 
 
 def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    """Return the functions given by "degree <= d" or by a list of polynomials, as exact polynomials in `variables`.
+    """Return exact polynomials in `variables`: all monomials for "degree <= d", or those of a list of texts.
 
-    Raises InputError for other values, for more than 100000 monomials, and for functions that are 0 or occur twice.
+    Raises InputError for other texts, for more than 100000 monomials, and for functions that are 0 or occur twice.
     Source: petrera-pfadler-suris-2009.
 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
@@ -104,7 +104,7 @@ def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> 
 def read_structured_facts(
     section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
-    """Validate a [catalog] section whose keys are known to be valid; call `mistake(key, sentence)` for each mistake."""
+    """Validate the values in a [catalog] section with valid keys; call `mistake(key, sentence)` for each mistake."""
     max_codimension = 10**9 if variables is None else len(variables)
     codimension_text = "an integer, 0 or more"
     if variables is not None:

@@ -1,4 +1,4 @@
-"""Conversion of a file to its system or map with some parameters as symbols."""
+"""Conversion of a system file to its system or map, in which some of the parameters are symbols."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def split_names(names: Sequence[str]) -> Sequence[str]:
-    """Return names that are given as a sequence or as one text "a, b"."""
+    """Return names that are given as a sequence, or as one text such as "a, b", as a sequence."""
     return names.replace(",", " ").split() if isinstance(names, str) else names
 
 
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
-    """Return the map of a file, in which the parameters `symbols` are symbols and all other parameters have values.
+    """Return the map of a file; the parameters `symbols` are symbols in it, all other parameters have values.
 
-    Raises InputError as `with_symbols` does; for maps other than Kahan's only for names that are not parameters.
+    Raises InputError as `with_symbols` does; for a map that is no Kahan map, only for names that are not parameters.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -40,7 +40,7 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily
 
 
 def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
-    """Return the system of a file with other values of some parameters, without its claims.
+    """Return the system of a file with other values of some of its parameters, and without its claims.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -56,31 +56,31 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
-    """Return the system of a file, in which the parameters `symbols` are symbols and all other parameters have values.
+    """Return the system of a file; the parameters `symbols` are symbols in it, all other parameters have values.
 
     Args:
         file: the system.
-        symbols: names of parameters; eps is always a symbol and must not be named.
+        symbols: names of parameters. The name eps is always a symbol and must not be given.
 
     Returns:
-        The system, with exact right-hand sides.
+        The quadratic system, with exact right-hand sides.
 
     Raises:
-        InputError: for a name that is not a parameter, for right-hand sides that are not polynomials of degree at most
-            2 for free symbols, and for a member of the family, since it need not be a member for all values of symbols.
+        InputError: for a name that is not a parameter; if with free symbols the right-hand sides are no polynomials of
+            degree at most 2; for a member of the family, since other values of the symbols may give no member.
 
     >>> from kahanmaps.documents.catalog import load
     >>> with_symbols(load("euler_top"), ["a1"]).rhs
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
-    _ = file.system  # raises InputError if the map has no vector field
+    _ = file.system  # raises InputError for a map that is no Kahan map
     map_ = map_with_symbols(file, symbols)
     assert isinstance(map_, KahanFamily)
     return map_.system
 
 
 def _require_parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
-    """Return the names without repetition. Raises InputError for a name that is not a parameter."""
+    """Return the names `symbols` without repetitions. Raises InputError for a name that is not a parameter."""
     for name in symbols:
         if name not in file.parameters:
             known_names = ", ".join(file.parameters)

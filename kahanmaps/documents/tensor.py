@@ -1,4 +1,4 @@
-"""Conversion of a system over an algebra K = Q[t]/(chi), and its claims, to a system over Q."""
+"""Conversion of a system over an algebra K = Q[t]/(chi), with its claims, to a system over Q."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kahanmaps.maps.kahan import SystemLike
 
 
 def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
-    """Convert the system of a file over K = Q[t]/(chi) to a file over Q; a parameter t of the file stands for t in K.
+    """Return the file over Q of a system over K = Q[t]/(chi); a parameter t of the system stands for t in K.
 
-    The integrals and the density are also converted, unless the results are too large or the file has a parameter t (on
-    which these claims may depend). `chi` is not constant and may have repeated roots. The result is exact. Raises
-    InputError if the file contains no quadratic system.
+    Integrals and density are converted too, unless the results are too large, or the system has a parameter t, on which
+    they may depend. `chi` is not constant and may have repeated roots. The result is exact. Raises InputError if the
+    file contains no quadratic system.
 
     >>> from kahanmaps.documents.catalog import load
     >>> result = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))

@@ -1,7 +1,7 @@
-"""Reading and writing of TOML: system files and specifications of experiments.
+"""Reading and writing of TOML: system files, and specs of experiments.
 
-Python's standard library only reads TOML. The writer supports what system files need: text, integers, lists, tables,
-and lists of tables.
+Python's standard library reads TOML but does not write it. The writer supports what system files need: text, integers,
+lists, tables, and lists of tables.
 """
 
 from __future__ import annotations
@@ -20,37 +20,37 @@ from kahanmaps.errors import InputError, SystemFileError
 
 
 class TomlKind(NamedTuple):
-    """A kind of TOML file: its name, the largest size, and the class of errors that report its mistakes."""
+    """A kind of TOML file: its name, its maximal size in bytes, and the class of errors that report its mistakes."""
 
     name: str
     max_bytes: int
     error: type[SystemFileError]
 
     def read(self, path: str | Path) -> bytes:
-        """Read the bytes of a file, at most one byte more than allowed. Raises InputError if it cannot be read."""
+        """Return the bytes of a file, at most `max_bytes` + 1 of them. Raises InputError if the file cannot be read."""
         try:
-            # Reading a pipe or a device may never end; but /dev/fd/63, which a shell passes for <(...), is allowed.
+            # Refuse a device or named pipe, which may never end; accept /dev/fd/63, which a shell passes for <(...).
             mode = os.stat(path).st_mode
             is_of_shell = stat.S_ISFIFO(mode) and str(path).startswith(("/dev/fd/", "/dev/stdin"))
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
                 raise InputError(f"cannot read the {self.name} {path}: it is a pipe or a device, expected a file")
             with open(path, "rb") as stream:
                 return stream.read(self.max_bytes + 1)
-        except InputError:  # InputError is also a ValueError
+        except InputError:  # a subclass of ValueError, which is caught below
             raise
         except OSError as error:
             raise InputError(f"cannot read the {self.name} {path}: {error.strerror or error}") from error
-        except ValueError as error:  # a path with a NUL character
+        except ValueError as error:  # the path contains a NUL character
             raise InputError(f"cannot read the {self.name} {str(path)!r}: {error}") from error
 
     def document(self, text: str | bytes, where: str) -> dict[str, Any]:
-        """Parse TOML to plain data, with decimals as text; `where` names it in messages. Raises `error`, InputError."""
+        """Parse TOML to plain data, decimals as text; messages call it `where`. Raises InputError, or `error`."""
         if len(text) > self.max_bytes:
             raise InputError(f"{where} is larger than {self.max_bytes} bytes, the limit for a {self.name}")
         try:
-            # Some editors put a byte order mark first.
+            # Some editors begin a file with a byte order mark.
             decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
-            # Python's limit on digits applies while unquoted integers are parsed.
+            # Decimals remain text. Python's limit on digits applies only to integers without quotes.
             return tomllib.loads(decoded, parse_float=lambda number: number.replace("_", ""))
         except (RecursionError, ValueError) as error:
             hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
@@ -63,7 +63,7 @@ class TomlKind(NamedTuple):
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
-    """Write a document as TOML: first the keys `top`, then the tables `sections`; other entries are omitted.
+    """Return a document as TOML: first the keys `top`, then the tables `sections`; other entries are omitted.
 
     >>> print(to_toml({"name": "a", "system": {"rhs": ["x^2"]}}, ["name"], ["system"]), end="")
     name = "a"
@@ -109,7 +109,7 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, str):
         return _toml_string(value)
     if isinstance(value, int):
-        # TOML readers written in Python refuse long decimals without quotes.
+        # TOML readers written in Python refuse long integers without quotes.
         return str(value) if value.bit_length() <= 10_000 else _toml_string(str(fmpz(value)))
     items = [_toml_value(item) for item in value]
     line = f"[{', '.join(items)}]"
@@ -119,6 +119,6 @@ def _toml_value(value: Any) -> str:
 
 
 def _toml_string(text: str) -> str:
-    # A JSON string is a TOML basic string, except that DEL must be escaped. Other escapes protect terminals.
+    # A JSON string is a TOML basic string if DEL is escaped. Escaping other control characters protects terminals.
     characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
     return "".join(characters)

@@ -1,9 +1,9 @@
-"""Reading of XPPAUT files (.ode): equations, parameters and definitions.
+"""Reading of files of XPPAUT (.ode): equations, parameters and definitions.
 
 The reader accepts x' = ..., dx/dt = ..., par, number, init, x(0) = ..., and definitions name = formula and !name =
-formula, which are substituted. Options (@), aux, set and boundary conditions concern only the integration: they are
-skipped, with a note. Statements that would change the equations (functions, arrays, Markov variables, tables, maps
-x(t+1)) raise an error that quotes the line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
+formula, which are substituted. Options (@), aux, set and boundary conditions, which concern only the integration, are
+skipped with a note. A statement that would change the equations (functions, arrays, Markov variables, tables, maps
+x(t+1)) raises an error that quotes its line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
 "Structure of ODE files".
 """
 
@@ -23,7 +23,7 @@ _EXPECTED = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
 
 
 def is_ode(text: str) -> bool:
-    """Return whether a text that is not TOML contains a line with a derivative on its left side.
+    """Whether a text that is not TOML contains a line whose left side is a derivative.
 
     >>> is_ode("x' = -x\\ny' = x"), is_ode('[system]\\nrhs = "x')
     (True, False)
@@ -39,9 +39,9 @@ def is_ode(text: str) -> bool:
 
 
 def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
-    """Return the document in the text of an XPP file, and notes on skipped lines. `where` names it in messages.
+    """Return the document for the system of an XPP file, and notes on skipped lines; messages call the file `where`.
 
-    Raises SystemFileError with every line that cannot be read.
+    Raises SystemFileError that lists every line that cannot be read.
 
     >>> read_ode("# decay\\npar a=.5 b=2\\ninit x=1\\nx'=-a*X+b\\n@ total=9\\ndone", "decay.ode")[0]
     {'parameters': {'a': '.5', 'b': '2'}, 'system': {'rhs': ["x'=-a*x+b"]}}
@@ -77,19 +77,19 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
 
 
 class _OdeReader:
-    """A reader of lines of an XPP file, and what the lines read so far contain."""
+    """A reader for the lines of an XPP file; its attributes hold the content of the lines read so far."""
 
     def __init__(self) -> None:
-        self.equations: list[tuple[str, list[str]]] = []  # the left side as text, the right side as tokens
+        self.equations: list[tuple[str, list[str]]] = []  # pairs: the left side as text, the right side as tokens
         self.parameters: dict[str, str] = {}
         self.initial: dict[str, str] = {}
         self.skipped: dict[str, None] = {}
         self.notes: list[str] = []
         self.definitions: dict[str, str] = {}
-        self.has_capitals = False  # whether names in the file contain capital letters
+        self.has_capitals = False  # whether some name in the file contains a capital letter
 
     def read(self, line: str) -> None:
-        """Read a line. Raises InputError if it cannot be read."""
+        """Read one line. Raises InputError if the line cannot be read."""
         if not line or line[0] in '#"':
             return
         if line[0] == "@":
@@ -103,7 +103,7 @@ class _OdeReader:
         if is_keyword and keyword in _SKIPPED_KEYWORDS:
             self.skipped[keyword] = None
         elif is_keyword and keyword in (*_PARAMETER_KEYWORDS, *_INITIAL_KEYWORDS):
-            # Pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; in init a name alone means 0, as in XPP.
+            # Assignments a=1,b=-2.5 c=8/3, with commas or blanks between; in init a name alone means 0, as in XPP.
             is_parameter, k = keyword in _PARAMETER_KEYWORDS, 1
             while k < len(words):
                 name = words[k]
@@ -112,7 +112,7 @@ class _OdeReader:
                 value, k = "0", k + 1
                 if words[k : k + 1] == ["="]:
                     end = k + 1 + (words[k + 1 : k + 2] in (["-"], ["+"]))
-                    if words[end + 1 : end + 2] == ["/"]:  # XPP ignores the rest of the line, without a message
+                    if words[end + 1 : end + 2] == ["/"]:  # XPP silently ignores the rest of the line
                         end += 2
                         fraction = "".join(words[k + 1 : end + 1])
                         self.notes.append(f"{name} = {fraction} is read literally, unlike in XPP")
@@ -133,11 +133,11 @@ class _OdeReader:
             formula_start = tokens.index("=") + 1
             if is_equation:
                 self.equations.append(("".join(tokens[:formula_start]), tokens[formula_start:]))
-            else:  # a definition NAME = formula, which may contain earlier definitions
+            else:  # a definition NAME = formula; the formula may contain earlier definitions
                 self.definitions[words[0]] = f"({self.expand(tokens[formula_start:])})"
 
     def expand(self, tokens: list[str]) -> str:
-        """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
+        """Return a formula in which the definitions are substituted. Raises InputError if it becomes too long."""
         pieces = [self.definitions.get(token, token) for token in tokens]
         if sum(map(len, pieces)) > LIMITS.characters:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Plan, run, store and resume batches of experiments described by one spec.
+"""Plan, run, store and resume batches: many experiments that one file, the spec, describes.
 
 Input         spec.py (a spec in TOML) and experiment.py; options.py (the options of tasks), grid.py (values and their
               combinations), registry.py and tasks.py (the kinds of tasks)

@@ -19,15 +19,15 @@ from kahanmaps.hints import AttributeHints
 
 
 class BatchCommands(AttributeHints):
-    """The functions of `km.batch`; a database is given by its path. They raise InputError as the commands do."""
+    """The functions of `km.batch`; a database is given by its path. They raise InputError where a command fails."""
 
     run = staticmethod(run)
 
     def __reduce__(self) -> str:
-        return "batch"  # the only instance is `km.batch`
+        return "batch"  # the name under which pickle finds the only instance, `km.batch`
 
     def __call__(self, spec: Any, db: str | Path | None = None, **options: Any) -> Any:
-        """Run the tasks of a spec; see `experiments.running.run.run`."""
+        """Run the tasks of a spec and yield their records; see `experiments.running.run.run` for the arguments."""
         if not isinstance(spec, str | Path) and not hasattr(spec, "experiments"):
             raise InputError(
                 f"found a {type(spec).__name__}, expected the path or the text of a spec (docs/batch.md); "
@@ -36,7 +36,7 @@ class BatchCommands(AttributeHints):
         return run(spec, db, **options)
 
     def status(self, db: str | Path) -> list[ExperimentStatus]:
-        """Return the progress of the experiments in a database."""
+        """Return the progress of each experiment in a database."""
         with Store.open(db, readonly=True) as store:
             return store.status()
 
@@ -46,12 +46,12 @@ class BatchCommands(AttributeHints):
             return store.find(key)
 
     def summary(self, db: str | Path, by: Sequence[str] = (), values: Sequence[str] | None = None) -> Summary:
-        """Return counts and quantiles for each group of tasks; tasks with equal entries `by` form a group."""
+        """Return counts and quantiles for each group of tasks; tasks with equal entries named in `by` are a group."""
         with Store.open(db, readonly=True) as store:
             return summarise(store.rows(missing=True), by, values)
 
     def export(self, db: str | Path, path: str | Path) -> None:
-        """Write the results to a .csv, .jsonl or .parquet file."""
+        """Write the results in a database to a .csv, .jsonl or .parquet file."""
         suffix = Path(path).suffix
         if suffix not in (".csv", ".jsonl", ".parquet"):
             raise InputError(f"found the suffix {suffix!r} of {path}, expected .csv, .jsonl or .parquet")
@@ -68,7 +68,7 @@ class BatchCommands(AttributeHints):
                     write_jsonl(rows(), stream)
 
     def merge(self, target: str | Path, *sources: str | Path) -> list[Merged]:
-        """Add the results of other databases to `target`, which is created if necessary."""
+        """Add the experiments and results of other databases to `target`, which is created if necessary."""
         with Store.open(target, create=True) as store:
             return [store.merge(source) for source in sources]
 

@@ -1,7 +1,7 @@
-"""Experiments of a batch, and their reading from a spec: an experiment is many tasks of one kind, created lazily.
+"""Experiments of a batch, and how a spec is read: an experiment is a lazy sequence of tasks of one kind.
 
 `SpecDocument` checks the shape of a spec: its keys and the types of their values. `ExperimentReader` reads one table
-[experiments.NAME], whose meaning depends on its task, and reports every mistake to the document.
+[experiments.NAME]. The kind of task decides what the entries of this table mean. Mistakes go to the `SpecDocument`.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, ta
 from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
 from kahanmaps.experiments.results.system_spec import ENDINGS, family_spec, find_file, spec_of
 
-PARAMETERS = "parameters."  # prefix of option names that set a parameter of the system
+PARAMETERS = "parameters."  # prefix of the names of options that set a parameter of the system
 DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY = "family"
-_MAX_FILES = 10_000  # number of files that match one pattern
+_MAX_FILES = 10_000  # maximal number of files that match one pattern
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
@@ -54,8 +54,8 @@ def _read_digits(value: Any) -> None:
         raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
 
 
-# A shape is a function that raises ValueError for invalid values, or a tuple of a type and a description. For a list or
-# a table the tuple also has the shape of all items, or a dict of allowed keys and their shapes.
+# The shape of a value is a function that raises ValueError for invalid values, or a tuple (type, description). The
+# tuple of a list or table has a third entry: the shape of every item, or a dict from allowed keys to their shapes.
 _ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
 _LIMITS = (
     dict,
@@ -83,7 +83,7 @@ _SYSTEM_FILE_KEYS = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]]:
-    """Return the mistakes in the shape of a spec as triples: the path of the entry, the same path as text, a sentence.
+    """Return the mistakes in the shape of a spec as triples: path of the entry, the path as text, message.
 
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
@@ -93,7 +93,7 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]
 
 
 def _find_mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the path of each part of `value` that does not have the expected shape, and a sentence that says why."""
+    """Yield (path, message) for each part of `value` that does not have the expected `shape`; `value` is at `path`."""
     if callable(shape):
         try:
             shape(value)
@@ -122,15 +122,15 @@ def _find_mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyP
 
 
 def key_of(path: KeyPath) -> str:
-    """Return a path as text; positions in lists are counted from 1, as in experiments.a.zip[1]."""
+    """Return a path as text; positions in lists are counted from 1: experiments.a.zip[1] is the first zip."""
     return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
 
 
 class SpecDocument:
-    """A spec as plain data; paths of system files in it are relative to `folder`.
+    """A spec as plain data; relative paths of system files in it start from `folder`.
 
-    `mistakes` are pairs of a key and a sentence; wrong shapes come first. `documents` contains the documents of the
-    systems that were read. If `skip_bad`, all experiments skip systems that cannot be read, as with on_error = "skip".
+    `mistakes` are pairs (key, message), wrong shapes first. `documents` maps digests to documents, the contents of the
+    system files read so far. If `skip_bad`, every experiment skips unreadable systems, as with on_error = "skip".
     """
 
     def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:
@@ -145,13 +145,13 @@ class SpecDocument:
             self.mistake(key, sentence)
 
     def mistake(self, key: str, sentence: str) -> None:
-        """Report a mistake."""
-        # Keys and values come from the file: escape sequences must not reach a terminal.
+        """Add the message `sentence` on the entry `key` to the mistakes."""
+        # Keys and values come from the file and may contain escape sequences, which must not reach a terminal.
         printable = ["".join(c if c.isprintable() or c == "\n" else "_" for c in text) for text in (key, sentence)]
         self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
 
     def valid_value(self, *path: str | int) -> Any:
-        """Return the value at a path; None if it is missing or has a wrong shape."""
+        """Return the value at a path in the spec; None if it is missing or has a wrong shape."""
         if any(misshapen == path[: len(misshapen)] for misshapen in self._misshapen):
             return None
         value: Any = self.document
@@ -164,7 +164,7 @@ class SpecDocument:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment: a kind of task, the values that all its tasks share (`fixed`), and the grid of varying values."""
+    """An experiment: a kind of task, values equal for all its tasks (`fixed`), and a grid of the values that vary."""
 
     name: str
     kind: TaskKind
@@ -172,7 +172,7 @@ class Experiment:
     fixed: Mapping[str, Any]
     grid: Grid
     limits: TaskLimits
-    skipped: Sequence[tuple[str, str]] = ()  # systems that cannot be used, with reasons
+    skipped: Sequence[tuple[str, str]] = ()  # pairs of a system that cannot be used, and the reason
 
     @property
     def size(self) -> int:
@@ -181,14 +181,14 @@ class Experiment:
 
     @property
     def product(self) -> str:
-        """The number of tasks as a product of the numbers of values: 4 m x 10,000 seed x 3 eps."""
+        """The number of tasks as a product, with a factor for each axis or zip: 4 m x 10,000 seed x 3 eps."""
         return " x ".join(f"{len(self.grid.axes[group[0]]):,} {'+'.join(group)}" for group in self.grid.groups)
 
     @cached_property
     def definition(self) -> str:
-        """The definition as canonical text: experiments with equal definitions have equal tasks.
+        """The definition of the experiment as canonical text; experiments with equal definitions have equal tasks.
 
-        It contains the first task, hence also the default values, which may change between versions.
+        It contains the first task with all its options, since default values may change between versions.
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():
@@ -197,7 +197,7 @@ class Experiment:
                 continue
             read_value, axes[name] = values.option.read, []
             for piece in values.pieces:
-                if isinstance(piece, RationalRange):  # a range is represented by its end points
+                if isinstance(piece, RationalRange):  # a range is represented by its end points and its length
                     axes[name].append({"from": read_value(piece[0]), "to": read_value(piece[-1]), "count": len(piece)})
                 else:
                     axes[name].append(list(piece))
@@ -221,23 +221,23 @@ class Experiment:
 
 
 class ExperimentReader:
-    """Reads the table of an experiment; each reader is used once.
+    """Read the table of one experiment in a spec; a reader can be used once.
 
-    `files` are the system files named by the key `system`. If `is_family`, the systems are random members of the family
-    instead. `kind` is None if the task is unknown.
+    `files` are the system files that the key `system` names. If `is_family` is true, the systems are random members of
+    the family instead. `kind` is the kind of task, or None if the spec names an unknown one.
     """
 
     def __init__(self, spec: SpecDocument, name: str) -> None:
         self.spec = spec
         self.name = name
-        self.raw: dict[str, Any] = spec.document["experiments"][name]  # unchecked: its shape may be wrong
+        self.raw: dict[str, Any] = spec.document["experiments"][name]  # its shape may be wrong
         self.kind: TaskKind | None = None
         self.files: list[SystemFile] = []
         self.skipped: list[tuple[str, str]] = []
         self.is_family = False
 
     def read(self) -> Experiment | None:
-        """Return the experiment, or None after reporting its mistakes."""
+        """Return the experiment; if the table contains mistakes, report them and return None."""
         reported_before = len(self.spec.mistakes)
         on_error = self.valid_value("on_error") or self.spec.valid_value("on_error") or "refuse"
         if on_error not in ("refuse", "skip"):
@@ -249,7 +249,7 @@ class ExperimentReader:
         system_specs = self._read_systems()
         kind = self.kind
         if kind is None:
-            return None  # the meaning of options depends on the task
+            return None  # without a kind of task the options have no meaning
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
         keys: dict[str, str] = {}
         for option, option_key, _ in [entry for table in ("options", "axes") for entry in self.entries(table)]:
@@ -265,7 +265,7 @@ class ExperimentReader:
             for name in ("time", "memory", "digits")
         )
         if "digits" in own_limits and self.valid_value("limits", "digits") is None:
-            pass  # reported as a wrong shape
+            pass  # already reported as a wrong shape
         elif "max_digits" not in kind.options:
             if "digits" in own_limits:
                 self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
@@ -299,15 +299,15 @@ class ExperimentReader:
             self.mistake(key, str(error))
 
     def mistake(self, key: str, sentence: str) -> None:
-        """Report a mistake; `key` is relative to this table."""
+        """Report a mistake; `key` is relative to the table of this experiment."""
         self.spec.mistake(f"experiments.{self.name}.{key}", sentence)
 
     def valid_value(self, *path: str | int) -> Any:
-        """Return the value at a path in this table; None if it is missing or has a wrong shape."""
+        """Return the value at a path in the table of this experiment; None if it is missing or has a wrong shape."""
         return self.spec.valid_value("experiments", self.name, *path)
 
     def entries(self, table: str) -> list[tuple[str, str, Any]]:
-        """Return a canonical name, a key and a value for each entry of the table `table` (options or axes)."""
+        """Return triples (canonical name, key, value) of the entries of `table`, which is "options" or "axes"."""
         entries: list[tuple[str, str, Any]] = []
         for key, raw in (self.valid_value(table) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
@@ -317,11 +317,11 @@ class ExperimentReader:
         return entries
 
     def given(self) -> dict[str, str]:
-        """Map the canonical name of each option in the spec, valid or not, to its key."""
+        """Return a dict from the canonical name of each option in the spec, valid or not, to its key."""
         return {name: key for table in ("axes", "options") for name, key, _ in self.entries(table)}
 
     def _read_values(self, kind: TaskKind, table: str) -> dict[str, AxisValues]:
-        """Map the canonical name of each option in the table `table` to its valid values, and report invalid ones."""
+        """Return a dict from canonical names of options in `table` to their valid values; report the invalid values."""
         valid: dict[str, AxisValues] = {}
         for name, key, raw in self.entries(table):
             with self._report_errors_at(key):
@@ -338,7 +338,7 @@ class ExperimentReader:
         return valid
 
     def _find_option(self, kind: TaskKind, name: str, written_name: str) -> Option:
-        """Return the option or parameter of this name. Raises InputError if there is no such option."""
+        """Return the option called `name`, maybe a parameter of the system. Raises InputError if there is none."""
         if name.startswith(PARAMETERS) and self.has_parameters:
             parameter = name.removeprefix(PARAMETERS)
             for file in self.files:
@@ -348,11 +348,11 @@ class ExperimentReader:
                     raise InputError(f"{file.name} has no such parameter, its parameters are: {parameter_names}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
-        if self.is_family or (self.has_parameters and not self.files):  # a member of the family may have been intended
+        if self.is_family or (self.has_parameters and not self.files):  # perhaps "family" was intended
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
-        if name == "seconds":  # name of an option of version 0.2, whose results depended on the clock
+        if name == "seconds":  # an option of version 0.2, with which results depended on the clock
             replacement = (
                 f"{EFFORT} = 1 (one more doubles the work)" if EFFORT in options else 'limits = {time = "60 s"}'
             )
@@ -370,7 +370,7 @@ class ExperimentReader:
             system_specs = self._read_files(key, references)
             return AxisValues(option, [system_specs]) if system_specs else None
         if key.endswith(f".{TIME_STEP}"):
-            read_eps = option.read  # reads half the time step
+            read_eps = option.read  # reads a value of eps, half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
         zipped_names = {name for names in self._canonical_zips() for name in names or []}
         values, mistakes = read_values(option, raw, repeats=option.name in zipped_names)
@@ -379,7 +379,7 @@ class ExperimentReader:
         return values
 
     def _canonical_zips(self) -> list[list[str] | None]:
-        """Return the canonical names of the axes of each zip; None for a zip of wrong shape, already reported."""
+        """Return the canonical names of the axes in each zip; None for a zip whose wrong shape is already reported."""
         zips: list[list[str] | None] = []
         for index, names in enumerate(self.valid_value("zip") or []):
             is_valid = self.valid_value("zip", index) is not None
@@ -397,7 +397,7 @@ class ExperimentReader:
                 continue
             unknown_names = [name for name in names if name not in axes]
             for name in unknown_names:
-                if name not in given_axes:  # the values of an axis in the spec are invalid, and were reported
+                if name not in given_axes:  # otherwise the axis exists, and its invalid values are already reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             repeated_names = [name for k, name in enumerate(names) if name in names[:k] or name in used_names]
             if len(names) < 2:
@@ -425,7 +425,7 @@ class ExperimentReader:
 
     def _require_options(self, kind: TaskKind) -> None:
         if any(self.valid_value(table) is None and table in self.raw for table in ("options", "axes")):
-            return  # an option that seems to be missing may be in a table of wrong shape
+            return  # a table of wrong shape may contain the option that seems to be missing
         keys = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)
         for name in kind.required:
@@ -447,11 +447,11 @@ class ExperimentReader:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether the system is a file, or its value is wrong and might mean a file."""
+        """Whether the system may have parameters: it is a file, or its value is wrong and might mean a file."""
         return self.kind is not None and self.kind.needs is not None and not self.is_family
 
     def _read_systems(self) -> list[dict[str, Any]]:
-        """Return the specs of the valid systems, and report invalid ones; [] if the task needs no system."""
+        """Return the specs of the valid systems, report the invalid ones; an empty list if the task needs no system."""
         raw = self.valid_value("system")
         if raw is None:
             if self.kind is not None and self.kind.needs is not None and self.raw.get("system") is None:
@@ -473,9 +473,9 @@ class ExperimentReader:
         return self._read_files("system", references)
 
     def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
-        """Return the specs of the files named by the value of a key."""
+        """Return the specs of the systems that `references`, the value of `key`, names; report the invalid ones."""
         system_specs: dict[str, dict[str, Any]] = {}
-        names: dict[str, str] = {}  # digest of a document -> name of its file
+        names: dict[str, str] = {}  # digest of a document -> name of the file that contains it
         for number, reference in enumerate(references, start=1):
             item_key = f"{key}[{number}]" if len(references) > 1 else key
             with self._report_errors_at(item_key):
@@ -485,7 +485,7 @@ class ExperimentReader:
                         system_spec = spec_of(file, self.spec.documents)
                         if self._skips and key == "system":
                             self._require_kind(file)
-                    except InputError as error:  # continue, so that all mistakes are reported together
+                    except InputError as error:  # go on, so that all mistakes are reported together
                         if self._skips and key == "system":
                             self.skipped.append((name, str(error)))
                         else:
@@ -509,7 +509,7 @@ class ExperimentReader:
         return list(system_specs.values())
 
     def _match_files(self, reference: str) -> list[str]:
-        """Return the reference itself, or the files that match a pattern such as members/*.toml."""
+        """Return [reference], or the files that match if `reference` is a pattern such as members/*.toml."""
         if not any(wildcard in reference for wildcard in "*?["):
             return [reference]
         if Path(reference).is_absolute() or not reference.endswith(ENDINGS):

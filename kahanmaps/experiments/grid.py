@@ -1,6 +1,6 @@
-"""Values of options (lists, exact ranges "1/10..1/2 step 1/10") and their combinations (products, zips), all lazy.
+"""Values of options (lists, exact ranges "1/10..1/2 step 1/10") and their combinations (products, zips).
 
-The size of a grid is known without iterating over it.
+Ranges and combinations are computed on demand, and the size of a grid is known without iterating over it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from kahanmaps.experiments.options import Option
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
 _MAX_VALUES = 2**62  # maximal number of values of an axis: Python's `len` cannot exceed 2^63
-_TOO_MANY = "too many values"  # for messages
+_TOO_MANY = "too many values"  # part of messages
 
-Mistake = tuple[tuple[int, ...], str]  # the position in a list, and a sentence
+Mistake = tuple[tuple[int, ...], str]  # a position in a list of values, as a tuple (k,) or (), and a message
 
 
 class RationalRange(Sequence[fmpq]):
@@ -50,7 +50,7 @@ class RationalRange(Sequence[fmpq]):
 
     @classmethod
     def from_text(cls, text: str) -> RationalRange:
-        """Read a range such as "2..5". Raises InputError for any other text."""
+        """Return the range that a text such as "2..5" describes. Raises InputError for any other text."""
         first, separator, last_and_step = text.partition("..")
         words = last_and_step.split()
         if not separator or not first.strip() or not (len(words) == 1 or (len(words) == 3 and words[1] == "step")):
@@ -67,7 +67,7 @@ class RationalRange(Sequence[fmpq]):
 
 
 class AxisValues(Sequence[Any]):
-    """The canonical values of an option: a sequence of pieces, each a single value or a range."""
+    """The canonical values of an option, as a sequence composed of `pieces`: single values and ranges."""
 
     def __init__(self, option: Option, pieces: Sequence[Sequence[Any]]) -> None:
         self.option = option
@@ -87,14 +87,14 @@ class AxisValues(Sequence[Any]):
 
 
 def is_range(raw: Any) -> bool:
-    """Whether a value of a spec is a range, valid or not."""
+    """Whether a value in a spec has the form of a range; the range may be invalid."""
     return isinstance(raw, str) and ".." in raw
 
 
 def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisValues | None, list[Mistake]]:
-    """Return the values of an option in a spec (None if invalid), and the mistakes, with positions counted from 1.
+    """Return a pair: the values of an option in a spec (None if invalid), and mistakes at positions counted from 1.
 
-    `raw` is one value, a range or a list of values and ranges. If `repeats` is true, a value may occur several times.
+    `raw` is one value, a range, or a list of values and ranges. If `repeats` is true, values may occur repeatedly.
     """
     pieces: list[Sequence[Any]] = []
     mistakes: list[Mistake] = []
@@ -107,7 +107,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
         try:
             if option.numbers and is_range(item):
                 values_range = RationalRange.from_text(item)
-                # If both end points are valid, so are all values between them, except eps = 0 and fractions.
+                # Both ends, the second value and 0 are tried: an option may exclude 0 or numbers that are not integers.
                 values = AxisValues(option, [values_range])
                 zero_index = values_range.numerators.index(0) if 0 in values_range.numerators else 0
                 for k in {0, min(1, len(values_range) - 1), len(values_range) - 1, zero_index}:
@@ -127,7 +127,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
 
 
 def has_repeats(values: AxisValues) -> bool:
-    """Whether a single value occurs several times, not counting values in ranges."""
+    """Whether some single value occurs more than once; values within ranges are not compared."""
     single_values = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
     return len(set(single_values)) < len(single_values)
 
@@ -148,7 +148,7 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """The number of combinations (`len` cannot exceed 2^63)."""
+        """The number of combinations, which may exceed the maximum 2^63 - 1 of `len`."""
         return prod(self._lengths)
 
     def __getitem__(self, index: int) -> dict[str, Any]:

@@ -1,10 +1,10 @@
 """The tasks of the laboratory: preserved structures and growth of degrees, singularities, cycles, Lyapunov exponents.
 
-As in tasks.py, results are short texts and numbers by which tasks can be grouped; `report = true` stores the full
-result. If eps is not given, an analysis is valid for every eps. The effort limits the work, hence it belongs to the key
-of the task; "status" says what is undecided. The verdict is the weakest verdict of the formulas that were found. Growth
-and numbers of integrals are measured, and are separate entries. Singularities, cycles and exponents are measured,
-without a verdict.
+As in tasks.py, results are short texts and numbers by which tasks can be grouped; `report = true` also stores the full
+result. Without eps an analysis is valid for every eps. The effort bounds the work, so it belongs to the key of the
+task, and "status" names what remains undecided. The verdict is the weakest verdict among the formulas in the result.
+Growth and numbers of integrals are measured and are separate entries. Singularities, cycles and Lyapunov exponents
+are measured and have no verdict.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 POISSON_ARGUMENTS = {"symbolic": "symbols", "max_degree": "degree"}
-_ENDINGS = ("constant", "singular")  # if a degree sequence ends so, all degrees are known without a recurrence
+_ENDINGS = ("constant", "singular")  # a degree sequence with one of these endings is known without a recurrence
 
 
 @analysis(
@@ -56,7 +56,7 @@ def scan_parameters(
     system: SystemFile,
     over: list[str],
     eps: Any = None,
-    by: str = "degrees",  # the only allowed value; part of the keys in databases of earlier versions
+    by: str = "degrees",  # the only allowed value; it is part of the keys in databases of earlier versions
     terms: int | None = None,
     primes: list[int] | None = None,
     effort: int = 1,
@@ -74,7 +74,7 @@ def scan_parameters(
     ]
     return {
         "status": result.ended,
-        "growth": by_growth[0][0] if by_growth else None,  # the slowest growth
+        "growth": by_growth[0][0] if by_growth else None,  # the kind of the slowest growth
         "components": len(result.components),
         "confirmed": sum(component.is_confirmed for component in result.components),
         "integrable": [
@@ -194,7 +194,7 @@ def all_analyses(result: Analysis) -> Result:
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
     conclusion, verdicts = result.conclusion, {run.verdict for run in result.singularities}
-    # The analyses that were begun but not completed, since the work limit was reached or formulas were missing.
+    # Analyses that were begun but left something undecided: the work limit was reached, or formulas are missing.
     is_finished = {
         "degrees": result.degrees is None or result.degrees.recurrence is not None or result.degrees.ended in _ENDINGS,
         "integrals": result.integrals is None or _state_of_integrals(result.integrals) == "complete",
@@ -242,7 +242,7 @@ def confinement(
         "confinement": first.verdict if is_consistent else UNDECIDED,
         "status": "budget" if any(run.stopped for run in runs) else "complete" if is_consistent else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
-        "followed": first.followed,  # number of steps, if some singularity is not confined
+        "followed": first.followed,  # number of steps over which unconfined singularities were followed
         **fields(first, "map_degree", "critical_degree"),
         "exceptional_count": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
         "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),
@@ -281,7 +281,7 @@ def cycles(
     runs = [cycle_census(system.map, value, prime, **limits) for value in eps_values]
     return {
         "status": "complete" if all(census.complete for census in runs) else "sampled",
-        "points": str(runs[0].points),  # as text: it may exceed the integers of a database
+        "points": str(runs[0].points),  # a text, since the number may exceed the integers of a database
         "longest": max(census.longest for census in runs),
         "runs": [
             {
@@ -338,7 +338,7 @@ def _state_of_integrals(search: IntegralSearch) -> str:
 
 
 def _state_of_densities(search: DensitySearch) -> str:
-    """Return "found", "none" (measured: up to the largest degree that was searched) or "open" (undecided)."""
+    """Return "found", "none" (measured, up to the largest degree that was searched) or "open" (undecided)."""
     if search.densities:
         return "found"
     return "none" if search.reason.startswith("no polynomial") else "open"
@@ -350,12 +350,12 @@ def _weakest_verdict(verdicts: Iterable[Certainty]) -> str | None:
 
 
 def _growth_entries(growth: DegreeGrowth) -> Result:
-    """Return the entries on the growth of degrees."""
+    """Return the entries of a result that describe the growth of degrees."""
     recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
         "growth": str(growth.growth),
-        "looks_exponential": growth.looks_exponential,  # an estimate if no recurrence is known
-        "unconfirmed": growth.unconfirmed,  # why a recurrence that fits the degrees is not returned
+        "looks_exponential": growth.looks_exponential,  # without a recurrence this is an estimate
+        "unconfirmed": growth.unconfirmed,  # the reason why a recurrence that fits the degrees is not accepted
         "singularities": None if growth.patterns is None else growth.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,
         "minimal_polynomial": None if rate is None else format_univariate(fmpq_poly(rate.minimal_polynomial)),
@@ -377,5 +377,5 @@ def _hypersurface_entries(run: SingularityRun) -> list[Result]:
 
 
 def _json_number(value: Any) -> float | None:
-    """Return a number as a Python float, which JSON can represent."""
+    """Return a number as a float, or None if JSON cannot represent it."""
     return float(value) if isfinite(value) else None

@@ -1,7 +1,7 @@
-"""The options of all tasks: a name means the same option in every task, and values are exact.
+"""The options of all tasks: an option of one name has the same meaning in every task, and its values are exact.
 
-An option converts a value in a spec to canonical plain data (exact numbers become text, so that 0.1 and 1/10 give one
-task). In the worker process it converts these data to an argument of the library.
+An option converts a value in a spec to canonical plain data: exact numbers become text, so that 0.1 and 1/10 give the
+same task. In the worker process it converts these data to an argument of a library function.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MAX_INTEGER = 2**63 - 1
 _MAX_PRIME_BITS = 192  # maximal number of bits of the option prime
 _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
-_MAX_SECONDS, _MAX_BYTES = 10**9, 10**18  # limits of system calls
+_MAX_SECONDS, _MAX_BYTES = 10**9, 10**18  # upper bounds of time and memory limits; system calls accept these
 _NO_LIMIT = "none"
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
@@ -35,9 +35,9 @@ _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 class Option:
     """An option of tasks.
 
-    `read` converts a value in a spec to plain data or raises InputError; `make` converts plain data to an argument of
-    the library. The plain value None means that the option is not given. If `numbers` is true, the values are numbers,
-    and ranges "a..b step c" are allowed.
+    `read` converts a value in a spec to plain data, or raises InputError. `make` converts these data to an argument of
+    a library function. The plain value None means that the option is not given. If `numbers`, values may be ranges
+    "a..b step c".
     """
 
     name: str
@@ -48,7 +48,7 @@ class Option:
 
 
 def exact(name: str, help: str, *, zero: bool = True) -> Option:
-    """Return an option with a rational value (0 only if `zero`), whose canonical form is text in lowest terms."""
+    """Return an option whose value is rational (0 is allowed if `zero`); its canonical form is text in lowest terms."""
 
     def read(value: Any) -> str:
         number = number_of(value)
@@ -91,7 +91,7 @@ def choice(name: str, help: str, choices: Sequence[str]) -> Option:
 
 
 def point(name: str, help: str, max_count: int | None = None) -> Option:
-    """Return an option whose value is a text of numbers separated by commas; a list would be several values."""
+    """Return an option whose value is a text with numbers separated by commas; a list would mean several points."""
 
     def read(value: Any) -> str:
         numbers = parse_point(_require_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
@@ -105,7 +105,7 @@ def point(name: str, help: str, max_count: int | None = None) -> Option:
 def integers(name: str, help: str, expected: str, allowed: Sequence[int], is_ordered: bool = False) -> Option:
     """Return an option whose value is a text of integers separated by commas, or a single integer.
 
-    Unless `is_ordered`, the integers form a set: its canonical form is increasing, without repetitions.
+    Unless `is_ordered`, the integers form a set, whose canonical form is increasing and without repetitions.
     """
 
     def read(value: Any) -> str:
@@ -131,7 +131,7 @@ def _read_prime(value: Any) -> str:
     expected = f"a prime of at most {_MAX_PRIME_BITS} bits"
     number = _read_integer(value, expected, range(2, 1 << _MAX_PRIME_BITS))
     GF(number)
-    return str(number)  # as text: JSON and databases may be unable to represent long integers
+    return str(number)  # a text, since JSON and databases may be unable to represent a long integer
 
 
 def _read_names(value: Any) -> str:
@@ -170,14 +170,14 @@ def _read_integer(value: Any, expected: str, allowed: Sequence[int]) -> int:
 
 
 def number_of(value: Any) -> fmpq:
-    """Return the exact number given by a value of a spec. Raises InputError for tables, lists, dates and flags."""
+    """Return the exact number that a value of a spec denotes. Raises InputError for tables, lists, dates and flags."""
     if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
         raise InputError(f"found {show(value)}, expected a number")
     return rational(value)
 
 
 def read_time(value: Any) -> float | None:
-    """Return seconds from a number or a text such as "90 s", "5 min", "2 h"; None for "none".
+    """Return a time in seconds, read from a number of seconds or a text such as "90 s", "2 h"; None for "none".
 
     >>> read_time("1.5 min"), read_time("none")
     (90.0, None)
@@ -188,7 +188,7 @@ def read_time(value: Any) -> float | None:
 
 
 def read_memory(value: Any) -> int | None:
-    """Return bytes from a number or a text such as "500 MB", "2 GiB"; None for "none".
+    """Return a memory size in bytes, read from a number of bytes or a text such as "2 GiB"; None for "none".
 
     >>> read_memory("1.5 GB")
     1500000000
@@ -265,7 +265,7 @@ VOCABULARY = {
 }
 
 CHI_CHOICES = ("eigenvalues", "generic")
-# Options of a random member of the family, apart from the option seed, which is in VOCABULARY.
+# Options of a random member of the family, except the option seed, which is in VOCABULARY.
 FAMILY = {
     option.name: option
     for option in (

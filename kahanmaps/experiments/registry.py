@@ -1,19 +1,19 @@
-"""The tasks of batches: functions that are registered by a decorator, with options given by their signatures.
+"""The kinds of tasks in batches: functions registered by a decorator; their signatures determine the options.
 
     @task("family-space", needs=MEMBER)
     def family_space(system: SystemFile) -> Result:
         '''Compute the space of cubics that belong to A.'''
 
-Parameters are options in `options.VOCABULARY`, optional if they have a default; `system` is the system of the task. The
-result is plain data; its entry "verdict" becomes the verdict of the record. A task of the laboratory only summarizes
-the result of a library function, called with these options and defaults:
+The parameters of a function are options in `options.VOCABULARY`, optional if they have a default; `system` is the
+system of the task. The result is plain data; its entry "verdict" becomes the verdict of the record. The function for a
+laboratory task only summarizes the result of a library function, which is called with the options listed:
 
     @analysis("find-density", "preserve.densities:find_densities", eps=None, effort=1, seed=0)
     def density(search: DensitySearch) -> Result:
         '''Search for densities phi such that the measure dx/phi is invariant.'''
 
-Tasks of users are in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which each
-worker process imports.
+Users register tasks in their own modules: the environment variable KAHANMAPS_TASKS lists the names of these modules,
+separated by commas, and each worker process imports them.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ ENVIRONMENT = "KAHANMAPS_TASKS"
 LIBRARY_MODULES = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
 REPORT = "report"
 Result = dict[str, Any]
-FullResult = tuple[Result, Any]  # a result, and the object whose `to_json` gives the full report
+FullResult = tuple[Result, Any]  # (result, object whose `to_json` returns the full report)
 TaskFunction = Callable[..., Result | FullResult]
 Summarizer = Callable[[Any], Result]
 ARGUMENT_NAMES = {"symbolic": "symbols", "terms": "max_terms"}  # option -> parameter of library functions
 
-# The kinds of systems that tasks may need.
+# What the system of a task has to be: any system, a member of the family, or a member unless the option other is given.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
 
 
 @dataclass(frozen=True)
 class TaskKind:
-    """A kind of task: its options, their defaults, the kind of system it needs, and whether it `reports` in full."""
+    """A kind of task: options with defaults, the kind of system it needs (None: no system), whether it `reports`."""
 
     name: str
     summary: str
@@ -55,18 +55,18 @@ class TaskKind:
 
     @property
     def required(self) -> tuple[str, ...]:
-        """The options without a default."""
+        """The names of the options without a default."""
         return tuple(name for name in self.options if name not in self.defaults)
 
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
-        """Perform the task; `options` are canonical, except that the option `other` is a system."""
+        """Perform the task and return its result; `options` are canonical, except that `other` is a second system."""
         options = dict(options)
         is_report_requested = self.reports and options.pop(REPORT, False)
         arguments = {
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
         }
-        if "eps" in self.required and arguments.get("eps") is None:  # omitted for maps that do not depend on eps
+        if "eps" in self.required and arguments.get("eps") is None:  # a map without eps: any value will do
             arguments["eps"] = self.options["eps"].make("1")
         result = self.function(**arguments) if self.needs is None else self.function(system, **arguments)
         if isinstance(result, tuple):
@@ -76,7 +76,7 @@ class TaskKind:
 
 
 def fields(result: Any, *names: str) -> Result:
-    """Return the attributes of a result with these names, as a dict."""
+    """Return a dict from `names` to the attributes of `result` with these names."""
     return {name: getattr(result, name) for name in names}
 
 
@@ -86,10 +86,10 @@ _KINDS: dict[str, TaskKind] = {}
 def task(
     name: str, needs: str = SYSTEM, *, options: Mapping[str, Any] | None = None, reports: bool = False
 ) -> Callable[[TaskFunction], TaskFunction]:
-    """Register a function as a kind of task. Raises TypeError for a parameter that is not an option.
+    """Return a decorator that registers a kind of task. Raises TypeError for a parameter that is not an option.
 
-    `options` with their defaults replace the signature of a function with arbitrary keywords. A function that `reports`
-    returns a pair of a result and its full report, which the option "report" stores.
+    `options`, with defaults, replace the signature of a function with arbitrary keywords. If `reports`, the function
+    returns a pair (result, full report), and the option "report" of the task stores the report.
     """
 
     def register(function: TaskFunction) -> TaskFunction:
@@ -106,7 +106,7 @@ def task(
         unknown = [key for key in names if key not in VOCABULARY]
         if unknown:
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
-        # Equal code is the same task, registered again when its module is imported twice.
+        # A module that is imported twice registers the same function, with equal code, twice.
         if name in _KINDS and _KINDS[name].function.__code__ != function.__code__:
             raise TypeError(f"there are two tasks with the name {name}")
         if reports:
@@ -123,10 +123,10 @@ def task(
 def analysis(
     name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENT_NAMES, **defaults: Any
 ) -> Callable[[Summarizer], Summarizer]:
-    """Register a function of the laboratory ("module:name", imported when it is called) as a kind of task.
+    """Return a decorator that registers a function of the laboratory, given as "module:name", as a kind of task.
 
-    The arguments are the system file (or its attribute `of`) and the options; `renamed` maps options to parameter
-    names. The `defaults` are given here, not in the library, since they enter the keys of tasks.
+    It is called with the system file (or its attribute `of`) and the options; `renamed` maps options to parameter
+    names. The `defaults` are stated here rather than in the library, since they enter the keys of tasks.
     """
 
     def register(summarize: Summarizer) -> Summarizer:
@@ -145,13 +145,13 @@ def analysis(
 
 
 def task_kinds() -> Mapping[str, TaskKind]:
-    """Return a dict from the names to all kinds of tasks, including tasks of users (KAHANMAPS_TASKS)."""
+    """Return a dict from names to kinds of tasks, including those that users registered (KAHANMAPS_TASKS)."""
     for library_module in LIBRARY_MODULES:
         import_module(library_module)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:
             import_module(module)
-        except Exception as error:  # a module of a user may raise anything
+        except Exception as error:  # importing a module of a user may raise any exception
             reason = f"{type(error).__name__}: {error}"
             raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {reason}") from error
     return _KINDS

@@ -17,8 +17,8 @@
     memory = "1 GB"
     digits = 20000
 
-All mistakes in a spec are reported together, each with its key; docs/batch.md lists all keys. The module experiment.py
-reads the table of an experiment.
+All mistakes in a spec are reported together, each with its key. The file docs/batch.md lists all keys, and the module
+experiment.py reads the table of an experiment.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from kahanmaps.errors import SystemFileError, reading
 from kahanmaps.experiments.experiment import Experiment, ExperimentReader, SpecDocument
 
 MAX_BYTES = 4_000_000  # maximal size of a spec file
-MAX_TASKS = 1_000_000  # number of tasks of all experiments of a spec, unless the caller allows more
+MAX_TASKS = 1_000_000  # maximal number of tasks in all experiments of a spec, unless the caller allows more
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
-_MAX_LISTED = 3  # maximal number of experiments in a message
+_MAX_LISTED = 3  # maximal number of experiments that a message names
 
 
 class SpecError(SystemFileError):
-    """Raised for a spec with mistakes: it lists all of them, each with its key."""
+    """Raised for a spec with mistakes; the message lists all of them, each with its key."""
 
 
 _TOML = TomlKind("spec", MAX_BYTES, SpecError)
@@ -55,15 +55,15 @@ class Spec:
 
     @property
     def size(self) -> int:
-        """The number of all tasks."""
+        """The number of tasks in all experiments."""
         return sum(experiment.size for experiment in self.experiments)
 
 
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
-    """Read the spec in a TOML file; paths of system files in it are relative to the folder of the spec.
+    """Read a spec from a TOML file; relative paths of system files in it start from the folder of this file.
 
-    If `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
-    SpecError with all mistakes, and InputError if the file cannot be read.
+    If `skip_bad`, systems that cannot be read or that the task cannot use are skipped and listed. Raises SpecError with
+    all mistakes, and InputError if the spec file cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):
@@ -78,7 +78,7 @@ def parse_spec(
     max_tasks: int = MAX_TASKS,
     skip_bad: bool = False,
 ) -> Spec:
-    """Read a spec from TOML text; `where` names the text in messages.
+    """Read a spec from TOML text; messages call the text `where`.
 
     >>> table = '[experiments.a]\\ntask = "orbit"\\nsystem = "lorenz"\\n'
     >>> spec = parse_spec(table + 'axes = {eps = ["0.1", "1/7"], seed = "0..4"}')

@@ -1,7 +1,7 @@
 """The tasks for checks, the claims of the paper, members of the family, and orbits; each task is one function.
 
-Results are small: counts, verdicts, numbers, and the witnesses of refutations. `report = true` stores the full report,
-as printed by `--json`.
+The results of tasks are small: counts, verdicts, numbers, and witnesses of refutations. `report = true` also stores the
+full report, which `--json` prints.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
-_MIN_COMPILED_WORK = 5_000_000  # orbits times steps from which compiled code is used
-_MAX_POINT = 400  # maximal number of characters of a stored last point; of a longer point only the hash is stored
+_MIN_COMPILED_WORK = 5_000_000  # minimal product of orbits and steps for compiled code
+_MAX_POINT = 400  # maximal number of characters of a stored point; of a longer last point only the hash is stored
 
 
 _SETTINGS = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
 def _register_check(check: Check) -> None:
-    """Register a task for a check of one system, or of a pair of systems with two time steps."""
+    """Register the task of a check, for one system or for two systems, which may have different time steps."""
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
@@ -137,7 +137,7 @@ def orbit(
         normal_form=normal_form,
     )
     points = deque(trajectory, 1)
-    if not points:  # the orbit may end before the first requested iterate
+    if not points:  # the orbit ended before the first requested iterate
         first = trajectory.orbit.start
         exact = parsed_arithmetic.kind == "exact"
         points.append(OrbitPoint(0, parsed_arithmetic.field, IntegerPoint.from_rationals(first) if exact else first))
@@ -155,7 +155,7 @@ def orbit(
     text = ",".join(last.text)
     if len(text) <= _MAX_POINT:
         result["last"] = text
-    result["last_sha256"] = sha256(text.encode()).hexdigest()  # to compare two computations
+    result["last_sha256"] = sha256(text.encode()).hexdigest()  # for comparing two computations
     if parsed_arithmetic.kind == "exact":
         result["digits"] = last.digits
     return result
@@ -180,7 +180,7 @@ def ensemble(
     normal_form = float_normal_form(system, method)
     choice = choose_method(method, "float", normal_form, None)
     form = normal_form.form if choice.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
-    # Both kernels give the same numbers, but compiling takes longer than a short task.
+    # The kernels give equal numbers; compiling code takes longer than a short task.
     kernel = "numpy" if orbits * steps < _MIN_COMPILED_WORK else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
@@ -237,12 +237,12 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 
 def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
-    """Return a random initial point determined by seed and system: a fixed point may be special for some systems."""
+    """Return a random initial point that depends on `seed` and on the system: one point for all might be special."""
     return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 
 
 def _full_result(report: Report) -> FullResult:
-    """Return the verdict, counts of verdicts, and refuted or undecided claims with witnesses; then the full report."""
+    """Return the result (verdict, counts of verdicts, refuted or undecided claims, witnesses) and the full report."""
     findings = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in findings)
     controls = [finding for finding in report.findings if finding.control]

@@ -1,4 +1,4 @@
-"""Escape times and basins: when and in which direction the orbits of the points of a plane leave a ball."""
+"""Escape times and basins: when, and in which direction, the orbits of a plane of initial points leave a ball."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from kahanmaps.plots.style import COLOR_MAP, COLORS, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MAX_CELLS, MAX_STEPS = 2000, 1_000_000  # cells along each axis, steps of each orbit
-STAYS, ENDS = -1, -2  # instead of a direction, for an orbit that stays in the ball, or ends at a pole or by overflow
+MAX_CELLS, MAX_STEPS = 2000, 1_000_000  # maximal number of cells along each axis, maximal number of steps
+STAYS, ENDS = -1, -2  # in place of a direction: the orbit stays in the ball; it ends at a pole or by overflow
 
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """Arrays (rows, columns) over a window: the first step at which max |x_i| > radius, and the direction of escape.
+    """Arrays (rows, columns) over a window: `times`, when max |x_i| first exceeds the radius, and `directions`.
 
-    The step is -1 for an orbit that stays inside up to the last step. The direction is 2 i if x_i is the largest of the
-    numbers x_0, -x_0, x_1, ..., and 2 i + 1 if -x_i is; it is `STAYS` for an orbit that stays inside, `ENDS` for one
-    that ended at a pole before any point was outside.
+    A time is -1 if the orbit stays in the ball up to the last step. A direction is 2 i if x_i is the largest of the
+    numbers x_0, -x_0, x_1, ..., and 2 i + 1 if -x_i is; it is `STAYS` if the orbit stays in the ball, and `ENDS` if the
+    orbit ended before it left the ball, at a step that is then its time.
     """
 
     variables: tuple[str, ...]
@@ -54,10 +54,10 @@ def survey_escape(
     radius: float = 1000.0,
     progress: Callable[[int], None] | None = None,
 ) -> Escape:
-    """Follow the float orbits of the centers of `cells` x `cells` cells of a window in the plane of two variables.
+    """Follow the float orbits whose initial points are the centers of `cells` x `cells` cells of a window.
 
-    `at` are the coordinates outside the plane (default 0). Orbits of Kahan maps may pass near poles and return: an
-    orbit that leaves the ball need not go to infinity.
+    The window lies in the plane of the variables with indices `axes`; `at` are the other coordinates (default 0).
+    Orbits of Kahan maps may return from points near poles: an orbit that leaves the ball need not go to infinity.
 
     >>> from kahanmaps.maps.kahan import as_map
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -85,18 +85,18 @@ def survey_escape(
     escape_points = np.nan_to_num(ensemble.escaped_to)
     largest_index = np.abs(escape_points).argmax(axis=1)
     escape_directions = 2 * largest_index + (escape_points[np.arange(len(escape_points)), largest_index] < 0)
-    times = np.where(has_left, ensemble.escaped_at, ensemble.failed_at)  # both -1 for orbits that stay
+    times = np.where(has_left, ensemble.escaped_at, ensemble.failed_at)  # both are -1 for an orbit that stays
     directions = np.where(has_left, escape_directions, np.where(has_ended, ENDS, STAYS))
     shape = cells, cells
     return Escape(map_.variables, axes, window, radius, steps, times.reshape(shape), directions.reshape(shape))
 
 
 def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time") -> Figure:
-    """Plot the escape times ("time") or the directions of escape ("basin"); orbits that stay in the ball are white."""
+    """Plot the escape times ("time") or the directions ("basin"); initial points of orbits that stay are white."""
     style, (x, y) = style or Style(), result.window
     names = [side + label_of(name) for name in result.variables for side in ("+", "\N{MINUS SIGN}")]
     directions, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)
-    directions = directions[np.argsort(-counts, kind="stable")][: len(COLORS)]  # the rarest directions are white, too
+    directions = directions[np.argsort(-counts, kind="stable")][: len(COLORS)]  # the rarest directions are white too
     labels = ["ends at a pole" if direction == ENDS else names[int(direction)] for direction in directions]
     with drawing(style):
         from matplotlib.colors import ListedColormap, LogNorm

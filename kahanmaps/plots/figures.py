@@ -1,6 +1,6 @@
-"""Figures of matplotlib without pyplot: no windows, no global state, the same bytes for the same picture.
+"""Figures of matplotlib without pyplot: no windows, no global state, and equal files for equal pictures.
 
-A plotting function has the form `plot_...(result, style) -> Figure`; it calls `new_figure` inside `drawing(style)`:
+A plotting function has the form `plot_...(result, style) -> Figure`. It calls `new_figure` inside `drawing(style)`:
 
     with drawing(style):
         figure = new_figure(style, aspect=0.75)
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("pdf", "svg", "png")
-# More points are stored as an image of `dpi` dots per inch: a million points as vectors take 15 MB and ten seconds.
+# More points are stored as an image of `dpi` dots per inch: a million points stored as vectors take 15 MB.
 MAX_VECTOR_POINTS = 20_000
-LETTER_WIDTH = 0.5  # mean width of a letter, in units of the font size
+LETTER_WIDTH = 0.5  # mean width of a letter relative to the font size
 _MAX_DIGITS = 40  # maximal number of characters of a number in a label
 _MAX_FORMULA = 60  # maximal number of characters of a typeset expression
 _BAND_COLOR, _BAND_SHARE = "#e8e8e8", 0.09  # band for zeros on a log axis, fraction of the height
-_MAX_TICKS = 6  # on a logarithmic axis with a band for zeros
-_HANDLE_WIDTH = 5.0  # width of a line or mark in a legend with the space around it, in font sizes
+_MAX_TICKS = 6  # maximal number of ticks on a logarithmic axis with a band for zeros
+_HANDLE_WIDTH = 5.0  # width of a line or mark in a legend, with space around it, relative to the font size
 _ON_ONE_LINE = replace(
     LATEX,
     enclosed="({})".format,
     fraction=lambda numerator, denominator: f"{_in_brackets(numerator)} / {_in_brackets(denominator)}",
 )
-# The keys of the metadata for version, command and system; no dates, so that equal figures give equal files.
+# Metadata keys for version, command and system; no dates, so that equal figures give equal files.
 _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
     "pdf": (("Creator", "Subject", "Keywords"), {"CreationDate": None}),
     "svg": (("Creator", "Description", "Source"), {"Date": None}),
@@ -58,7 +58,7 @@ _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
 
 
 def require_matplotlib() -> None:
-    """Raise InputError with instructions for installing matplotlib if it is missing."""
+    """Raise InputError if matplotlib is missing; the message says how to install it."""
     try:
         import matplotlib.figure  # noqa: F401 (only to test whether it is installed)
     except ModuleNotFoundError as error:
@@ -67,7 +67,7 @@ def require_matplotlib() -> None:
 
 @contextmanager
 def drawing(style: Style) -> Iterator[None]:
-    """Use matplotlib's defaults and the settings of the style within the context; then restore the user's settings.
+    """Use matplotlib's defaults and the settings of the style in the context, then restore the user's settings.
 
     Raises InputError if matplotlib is missing.
     """
@@ -76,24 +76,24 @@ def drawing(style: Style) -> Iterator[None]:
     import matplotlib.style
 
     with mpl.rc_context():
-        mpl.rcdefaults()  # ignore the user's matplotlibrc
+        mpl.rcdefaults()  # the user's matplotlibrc must not change pictures
         with as_file(files("kahanmaps.plots") / "pictures.mplstyle") as path:
             mpl.style.use([path, style.settings()])
         yield
 
 
 def new_figure(style: Style, aspect: float = 0.75) -> Figure:
-    """Return an empty figure in the size of the style; if the style has no height, `aspect` is height over width."""
+    """Return an empty figure of the size of the style; `aspect` is height over width if the style has no height."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=style.inches(aspect), layout="compressed")
 
 
 def label_of(text: str) -> str:
-    r"""Return a name, an expression or an equation as a label, typeset in matplotlib's mathtext where possible.
+    r"""Return the label for a name, an expression or an equation, typeset as a formula in matplotlib's mathtext.
 
-    The final digits of a name become its index. An underscore separates a letter from its index (p_a) or a word from a
-    symbol (modified_H). Text that is long or cannot be parsed as a formula is returned as plain text.
+    The digits at the end of a name are an index. An underscore separates a letter from its index (p_a) or a word from a
+    symbol (modified_H). A text that is long or cannot be parsed as a formula is returned as plain text.
 
     >>> label_of("x1"), label_of("eps"), label_of("p_a"), label_of("modified_H"), label_of("p_a$")
     ('$x_1$', '$\\varepsilon$', '$p_{a}$', 'modified $H$', 'p_a\\$')
@@ -115,7 +115,7 @@ def label_of(text: str) -> str:
             latex = _ON_ONE_LINE.rational(parse_rational_function(text, names))
         except InputError:
             return escape_dollars(text)
-        # mathtext supports only a part of TeX, and stacked fractions in a line of text are too small to read.
+        # mathtext supports only a part of TeX. Moreover, stacked fractions in a line of text are too small to be read.
         return escape_dollars(text) if "mathrm" in latex else f"${latex}$"
     latex = latex_name(text)
     if "mathrm" not in latex:
@@ -132,7 +132,7 @@ def label_of(text: str) -> str:
 
 
 def _is_word(text: str) -> bool:
-    """Whether letters form a word, as in modified_H, and not a symbol such as x, al, or the name of a Greek letter."""
+    """Whether letters form a word, as in modified_H, rather than a symbol: x, al, or the name of a Greek letter."""
     return len(text) > 2 and text.isalpha() and latex_name(text) == text
 
 
@@ -141,14 +141,14 @@ def _in_brackets(text: str) -> str:
 
 
 def escape_dollars(text: str) -> str:
-    """Escape the dollar signs in a text, so that no part of it is typeset as a formula."""
+    """Escape the dollar signs in a text, so that mathtext typesets no part of it as a formula."""
     return text.replace("$", r"\$")
 
 
 def wrap_text(text: str, width: float, size: float, max_lines: int = 3) -> str:
-    """Break plain text into at most `max_lines` lines of about `width` points for letters of `size` points.
+    """Break plain text into at most `max_lines` lines, for a width of `width` points and letters of `size` points.
 
-    Longer text is cut, and ends in dots.
+    A text that is too long is cut, and dots mark the cut.
 
     >>> wrap_text("relative error of a_very_very_long_name", width=80, size=8)
     'relative error of\\na_very_very_long_...'
@@ -161,7 +161,7 @@ def wrap_text(text: str, width: float, size: float, max_lines: int = 3) -> str:
 
 
 def label_number(value: Any) -> str:
-    """Return an exact number as text for a label; in a long number dots replace the middle digits.
+    """Return an exact number as text for a label; in a long number dots replace the digits in the middle.
 
     >>> from flint import fmpq
     >>> label_number(fmpq(3, 10)), len(label_number(fmpq(10) ** 99))
@@ -172,14 +172,14 @@ def label_number(value: Any) -> str:
 
 
 def write_title(figure: Figure, text: str, style: Style) -> None:
-    """Put a title above all panels, broken into lines that fit into the width of the figure."""
+    """Write a title above all panels, broken into lines as wide as the figure."""
     size = style.font_size + 1
     with drawing(style):
         figure.suptitle(escape_dollars(wrap_text(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
 
 
 def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:
-    """Return the number of columns of labels that fit into the width of the style, at most `max_columns`.
+    """Return how many columns of labels, but at most `max_columns`, fit into the width of the style.
 
     >>> legend_columns(["RK4", "implicit midpoint"], Style(width=8.6)), legend_columns(["x" * 50] * 2, Style(width=8.6))
     (2, 1)
@@ -189,7 +189,7 @@ def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) ->
 
 
 def shortened_name(name: str, suffix: str, style: Style) -> str:
-    """Cut a name so that the name and a suffix fit into one legend line of the width of the style.
+    """Return a name, cut such that the name and `suffix` fit into one line of a legend as wide as the style.
 
     >>> shortened_name("f", ": linear growth", Style())
     'f'
@@ -201,12 +201,12 @@ def shortened_name(name: str, suffix: str, style: Style) -> str:
 
 
 def letter_count(label: str) -> int:
-    """Return the approximate number of letters of a typeset label, not counting the commands of mathtext."""
+    """Return the approximate number of letters in a typeset label, without the commands of mathtext."""
     return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
 
 
 def _letters_across(style: Style) -> float:
-    """The width of a picture in units of the font size of its legend."""
+    """Return the width of a picture divided by the font size of its legend."""
     return style.width / CENTIMETRES_PER_INCH * 72 / style.small
 
 
@@ -218,7 +218,7 @@ def legend_above(
     title: str | None = None,
     max_columns: int = 4,
 ) -> None:
-    """Put a legend of at most `max_columns` columns above the axes; the layout makes room for it."""
+    """Put a legend of at most `max_columns` columns above the axes, which become smaller."""
     figure.legend(
         list(handles),
         list(labels),
@@ -231,15 +231,15 @@ def legend_above(
 
 
 def legend_height(labels: Sequence[str], style: Style, title: bool = False, max_columns: int = 4) -> float:
-    """Return the height of a legend divided by the width of the figure."""
+    """Return the height of a legend above the axes, relative to the width of the figure."""
     lines = -(-len(labels) // legend_columns(labels, style, max_columns)) + title
     return 1.45 * lines * style.font_size / (style.width / CENTIMETRES_PER_INCH * 72)
 
 
 def draw_points(axes: Axes, *coordinates: Any, total: int | None = None, **keywords: Any) -> Any:
-    """Draw points as dots: many points as small dots, more than MAX_VECTOR_POINTS as an image.
+    """Draw points as dots: many points as small dots, and more than MAX_VECTOR_POINTS as an image.
 
-    `total` is the number of points in the whole picture if several calls draw it; `keywords` are passed to `plot`.
+    `total` is the number of points in the whole picture if several calls draw it; `keywords` go to matplotlib's `plot`.
     """
     count = len(coordinates[0]) if total is None else total
     return axes.plot(
@@ -252,9 +252,9 @@ def draw_points(axes: Axes, *coordinates: Any, total: int | None = None, **keywo
 def write_beside(
     axes: Axes, text: str, at: Any, offset: tuple[float, float], halo: float = 0.0, **keywords: Any
 ) -> None:
-    """Write a text beside a point, `offset` points away, with `halo` points of white around its letters.
+    """Write a text beside the point `at`, shifted by `offset` in points; `halo` is the width of its white outline.
 
-    `keywords` are passed to `annotate`.
+    `keywords` go to matplotlib's `annotate`.
     """
     if halo:
         from matplotlib.patheffects import withStroke
@@ -264,9 +264,9 @@ def write_beside(
 
 
 def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
-    """Make the vertical axis logarithmic from `least` to `largest`; return the value at which zeros are drawn.
+    """Make the vertical axis logarithmic from `least` to `largest`; return the height at which zeros are drawn.
 
-    Exact zeros are drawn in a gray band at the bottom that is labelled 0. If `has_zeros` is false, it returns None.
+    Exact zeros are drawn in a gray band at the bottom, labelled 0. If `has_zeros` is false, the result is None.
     """
     axes.set_yscale("log")
     low, high = math.log10(least), math.log10(largest)
@@ -283,7 +283,7 @@ def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: boo
     axes.axhspan(10**bottom, 10**low, color=_BAND_COLOR, linewidth=0, zorder=0)
     powers = range(math.ceil(low), math.floor(high) + 1)
     stride = max(1, -(-len(powers) // _MAX_TICKS))
-    # Ticks at powers are drawn only above the band: inside it the scale has no meaning.
+    # Ticks at powers of ten are drawn only above the band, in which the scale has no meaning.
     axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::stride]]))
     axes.yaxis.set_minor_locator(NullLocator())
     write_beside(
@@ -293,12 +293,12 @@ def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: boo
 
 
 def dot_size(count: int) -> float:
-    """Return the diameter in points of each of `count` dots."""
+    """Return the diameter, in points, for each of `count` dots."""
     return 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35
 
 
 def format_of(path: str, requested: str | None) -> str:
-    """Return the requested format (pdf, svg or png), by default the extension of the path. Raises InputError."""
+    """Return the requested format (pdf, svg or png), by default the extension of `path`. Raises InputError."""
     extension = requested or Path(path).suffix.removeprefix(".").lower()
     if extension not in FORMATS:
         given = f"the extension .{extension}" if extension else "no extension"
@@ -307,10 +307,10 @@ def format_of(path: str, requested: str | None) -> str:
 
 
 def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", system: str = "") -> bytes:
-    """Return the bytes of a PDF, SVG or PNG file of the figure, with the command and the system (TOML) as metadata.
+    """Return a figure as a PDF, SVG or PNG file, with the command and the system (TOML) as metadata.
 
-    Equal figures give equal bytes with the same version of matplotlib: there are no dates and no random ids. Raises
-    InputError if the picture has too many pixels.
+    Equal figures give equal bytes if the version of matplotlib is the same, since there are no dates and no random ids.
+    Raises InputError if the picture has too many pixels.
     """
     style.require_pixels(*figure.get_size_inches())
     keys, no_dates = _METADATA[kind]
@@ -322,15 +322,15 @@ def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", sy
 
 
 def write_picture(figure: Figure, path: str, kind: str, style: Style) -> None:
-    """Write the figure to a file atomically."""
+    """Write a figure atomically to the file `path` in the format `kind`."""
     write_atomically(Path(path), picture_bytes(figure, kind, style))
 
 
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:
-    """Return the figure as an <svg> element for a page.
+    """Return a figure as an <svg> element for an HTML page.
 
-    `name` is a prefix that makes the ids unique on the page; `alt` is the alternative text. The element takes the
-    available width, at most the width of the style.
+    `name` is a prefix that makes the ids of the element unique on the page; `alt` is the alternative text. The element
+    takes the available width, but at most the width of the style.
     """
     text = picture_bytes(figure, "svg", style).decode()
     text = text[text.index("<svg") :]

@@ -1,6 +1,6 @@
-"""Pictures of the growth of complexity: degrees of iterates, and heights of exact orbits.
+"""Pictures of the growth of complexity under iteration: degrees of iterates, and heights of exact orbits.
 
-The data are results of the library, or are read from the output of `degrees --json` and `heights --json`.
+The data are results of the library, or they are read from the output of `degrees --json` and `heights --json`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 SCALES = ("linear", "log", "loglog")
 _MAX_SYSTEMS = len(COLORS)
-_MAX_FORMULA = 24  # maximal number of letters of d_n in a legend
+_MAX_FORMULA = 24  # maximal number of letters of the formula for d_n in a legend
 _MAX_MARKS = 30  # maximal number of marks for one orbit
 _ASPECT = 0.62  # height over width of the axes
 
@@ -52,10 +52,10 @@ def plot_degrees(
     """Plot the degrees d_n of the iterates against n; `growths` maps the names of systems to their degree growth.
 
     Marks are the measured degrees. A solid line shows degrees that satisfy a checked recurrence. A dotted line joins
-    degrees without a recurrence; their growth is then estimated. `scale` is "linear", "log" (exponential growth is
-    a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" if some growth is or
-    looks exponential, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises InputError
-    unless there are 1 to 7 systems, and for an unknown scale.
+    degrees without a recurrence, whose growth is then an estimate. `scale` is "linear", "log" (exponential growth is a
+    straight line) or "loglog" (a power is a straight line; n begins with 1). By default it is "log" if some growth is,
+    or looks, exponential, and otherwise "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises
+    InputError unless there are 1 to 7 systems, and for an unknown scale.
 
     >>> from kahanmaps.laboratory.growth.degrees import degree_growth
     >>> from kahanmaps.documents.catalog import load
@@ -88,7 +88,7 @@ def plot_degrees(
             line: dict[str, Any] = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
             steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
             shown_degrees = np.array([float(growth.degrees[n] or zero) for n in steps])
-            # On a logarithmic scale a degree 0 lies in the band below, and no line leads to it.
+            # On a logarithmic scale a degree 0 lies in the band at the bottom, to which no line leads.
             is_gap = np.array([scale != "linear" and not growth.degrees[n] for n in steps])
             n, d = steps, np.where(is_gap, np.nan, shown_degrees)
             recurrence = growth.recurrence
@@ -98,7 +98,7 @@ def plot_degrees(
                 and ";" not in recurrence.closed_form
                 and recurrence.preperiod == 0
             ):
-                # d_n is one polynomial in n: draw a smooth curve instead of straight lines from point to point.
+                # d_n is one polynomial in n: a smooth curve is drawn, not straight lines between the marks.
                 fit_steps = range(recurrence.power + 1)
                 fit_degrees = [recurrence.predict(n) for n in fit_steps]
                 polynomial = np.polynomial.Polynomial.fit(list(fit_steps), fit_degrees, recurrence.power)
@@ -106,7 +106,7 @@ def plot_degrees(
                 d = polynomial(n)
             axes.plot(n, d, zorder=2, **line, **mark)
             axes.plot(steps, shown_degrees, marker=MARKS[k], markersize=4, linestyle="none", clip_on=False, **mark)
-            # An empty plot for the legend entry, a line with a mark.
+            # A plot without points is the legend entry: a line with a mark.
             axes.plot([], [], marker=MARKS[k], markersize=4, label=label, **line, **mark)
         axes.set_xlabel("iterate $n$")
         axes.set_ylabel("degree $d_n$")
@@ -118,7 +118,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """Return the legend text after the name: d_n, the dynamical degree or the growth, and whether it is an estimate."""
+    """Return the legend text after the name: d_n, dynamical degree or growth, and whether the growth is estimated."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -147,13 +147,13 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Plot the heights of exact orbits against the step, with the fitted growth; each eps has a color.
+    """Plot the heights of exact orbits against the step, with the fitted growth; orbits of one eps have one color.
 
-    Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2 or c n with terms of lower
-    degree, or an exponential; orbits with bounded, logarithmic or undecided growth have no line. `scale` is "linear",
-    "log" or "loglog" (from step 1 on); by default "log" if some growth is exponential, "loglog" if some growth is
-    quadratic or linear and there are 8 steps or more, else "linear". Raises InputError if there is no orbit, for more
-    than 7 values of eps, and for an unknown scale.
+    Marks are heights in bits. Lines are fits of `kahanmaps.invariants.heights`: c n^2 or c n, with terms of lower
+    degree, or an exponential; an orbit with bounded, logarithmic or undecided growth has no line. `scale` is "linear",
+    "log" or "loglog" (from step 1 on). By default it is "log" if some growth is exponential; "loglog" if some growth is
+    quadratic or linear, and there are at least 8 steps; otherwise "linear". Raises InputError if there is no orbit, for
+    more than 7 values of eps, and for an unknown scale.
     """
     curves = height_curves(survey) if isinstance(survey, HeightSurvey) else tuple(survey)
     if not curves:
@@ -177,12 +177,12 @@ def plot_heights(
             eps_curves, starts_at_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
             mark_size = 3.2 if len(eps_curves) <= 3 and max(len(curve.steps) for curve in eps_curves) <= 80 else 2
             line: dict[str, Any] = {"color": COLORS[k], "linestyle": LINES[k], "linewidth": 0.7}
-            # Hollow marks, so that the line of the fit remains visible.
+            # The marks are hollow, so that the line of the fit remains visible.
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in eps_curves:
                 indices = np.flatnonzero(curve.steps >= (1 if starts_at_one else 0))
                 if len(indices) > _MAX_MARKS:
-                    # Only _MAX_MARKS marks, evenly spaced along the axis, including the first and the last step.
+                    # At most _MAX_MARKS marks, evenly spaced along the axis, with the first and the last step.
                     steps = curve.steps[indices].astype(np.float64)
                     spaced = (np.geomspace if starts_at_one else np.linspace)(steps[0], steps[-1], _MAX_MARKS)
                     indices = indices[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
@@ -192,7 +192,7 @@ def plot_heights(
                     end_step = curve.steps[-1]
                     n = np.geomspace(1, max(1, end_step), 200) if starts_at_one else np.linspace(0, end_step, 200)
                     axes.plot(n, fit(n), zorder=1.5, **line)
-            # The legend: eps, the time step, and the kinds of growth.
+            # The legend text: eps, the time step, and the kinds of growth.
             label = rf"$\varepsilon = {label_number(eps)}$ (time step {label_number(2 * eps)})"
             label = label if eps_curves[0].has_eps else "heights"
             eps_kinds = list(dict.fromkeys(curve.kind for curve in eps_curves))
@@ -228,7 +228,7 @@ def _checked_scale(requested: str | None, default: str) -> str:
 
 
 def _format_step_axis(axes: Axes, scale: str, last_step: int) -> None:
-    """Format the horizontal axis: integer steps, on a logarithmic scale from 1 on."""
+    """Format the horizontal axis of steps: its ticks are integers; on a logarithmic scale it begins with 1."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     if last_step <= 1:
@@ -245,15 +245,15 @@ def _format_step_axis(axes: Axes, scale: str, last_step: int) -> None:
 
 
 _MAX_ORBITS, _MAX_TERMS = 2000, 10_000
-_MAX_INTEGER = 10**15  # bound for degrees, steps and bits: larger numbers in a record are refused
+_MAX_INTEGER = 10**15  # upper bound for degrees, steps and bits in a record
 _READ_ERRORS = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError)
 
 
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
-    """Return the name of the system and its degrees from the JSON object that `kahanmaps degrees --json` writes.
+    """Return a pair: the name of the system, and its degrees, from the JSON object of `kahanmaps degrees --json`.
 
-    The recurrence is computed again. Records of older versions contain no singularity patterns.
-    Raises InputError for other objects.
+    The recurrence is computed again. Records of older versions contain no singularity patterns. Raises InputError for
+    any other object.
 
     >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}
     >>> name, growth = degrees_of_record({**record, "ended": "terms", "message": "8 terms", "seed": 0, "lines": []})
@@ -300,10 +300,10 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
 
 @dataclass(frozen=True, eq=False)
 class HeightCurve:
-    """Heights in bits of one orbit at some steps, the kind of growth of the orbit, and the fitted numbers.
+    """The heights of one orbit, the kind of their growth, and the fitted numbers.
 
-    `eps` is half the time step (exact); `constant` is c in the fit c n^2 or c n, `ratio` the factor of one step for
-    exponential growth; `status` says how the orbit ended, as in OrbitEnd.
+    `bits` are the heights, in bits, at `steps`; `eps` is half the time step (exact). `constant` is c in the fit c n^2
+    or c n, `ratio` the factor of one step in an exponential fit. `status` says how the orbit ended, as in OrbitEnd.
     """
 
     eps: fmpq
@@ -317,7 +317,7 @@ class HeightCurve:
 
 
 def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
-    """Return the orbits of a survey as curves with all heights.
+    """Return the orbits of a survey as curves that contain the heights at all steps.
 
     >>> from kahanmaps.laboratory.growth.height_survey import height_survey
     >>> from kahanmaps.documents.catalog import load
@@ -340,9 +340,9 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
 
 
 def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, ...]:
-    """Return the orbits in the JSON object that `kahanmaps heights --json` writes: heights at steps 0, 1, 2, 4, 8, ...
+    """Return the orbits in the JSON object of `kahanmaps heights --json`, with heights at steps 0, 1, 2, 4, 8, ...
 
-    Raises InputError for other objects.
+    Raises InputError for any other object.
     """
     orbits = record.get("orbits") if isinstance(record, Mapping) and record.get("command") == "heights" else None
     if not isinstance(orbits, list) or not 1 <= len(orbits) <= _MAX_ORBITS:
@@ -377,10 +377,10 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """Return the fitted height as a function of the step (NaN where it is not positive); None if nothing was fitted.
+    """Return the fitted height as a function of the step, NaN where it is not positive; None if nothing was fitted.
 
-    For c n^2 and c n, c is `curve.constant`, and the terms of lower degree are a least-squares fit to the heights. The
-    exponential goes through the last height.
+    In the fits c n^2 and c n, c is `curve.constant`, and the terms of lower degree are fitted to the heights by least
+    squares. An exponential fit goes through the last height.
     """
     n, c = curve.steps.astype(np.float64), curve.constant
     if curve.kind is Growth.EXPONENTIAL and curve.ratio is not None:

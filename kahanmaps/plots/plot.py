@@ -1,4 +1,4 @@
-"""The functions of `km.plot`: each draws a picture of a result and returns its axes."""
+"""The functions of `km.plot`: each draws a picture of a result and returns the matplotlib axes."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 
 class Plot(AttributeHints):
-    """Pictures of results; each method returns matplotlib axes `ax`, and `ax.figure.savefig("a.pdf")` writes a file.
+    """Pictures of results; each method returns matplotlib axes `ax`. To save a picture: `ax.figure.savefig("a.pdf")`.
 
-    `km.plot(value)` draws a result, an orbit, or the portrait of a system. Raises InputError for other types.
+    `km.plot(value)` draws a result, an orbit, or the portrait of a system. Raises InputError for any other value.
     """
 
     def __reduce__(self) -> str:
-        return "plot"  # the only instance is `km.plot`
+        return "plot"  # the name under which pickle finds the only instance, `km.plot`
 
     def __call__(self, value: Any, *arguments: Any, **options: Any) -> Axes:
-        """Draw the result of one of the functions below, an orbit, or the portrait of a system."""
+        """Draw a result that one of the methods can draw, an orbit, or the portrait of a system."""
         methods: dict[type, Any] = {
             DegreeGrowth: self.degrees,
             HeightSurvey: self.heights,
@@ -72,14 +72,14 @@ class Plot(AttributeHints):
         return _axes(plot_scan(result, Style()))
 
     def compare(self, result: Comparison, *, show: str = "drift", scale: str = "loglog") -> Axes:
-        """Plot a result of `km.compare`: "drift", "error" (against the time step) or "work" (evaluations of f)."""
+        """Plot a result of `km.compare`: "drift", "error" (against the time step) or "work" (against evaluations)."""
         from kahanmaps.plots.comparison.plot_compare import plot_comparison
 
         _require(result, Comparison, "a result: km.plot.compare(km.compare(...))")
         return _axes(plot_comparison(result, show=show, scale=scale))
 
     def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
-        """Draw x and its images under the Kahan maps of two systems (or associated systems) and their two products."""
+        """Draw x, its images under the maps of two (or two associated) systems, and both products of the maps at x."""
         from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, plot_squares, squares
 
         file = as_file(system)
@@ -87,7 +87,7 @@ class Plot(AttributeHints):
         return _axes(plot_squares([squares(pair, x0, eps, n) for pair in pairs], Style()))
 
     def invariant_curves(self, system: SystemLike, *, x0: Any, eps: Any, n: int = 1000) -> Axes:
-        """Draw the invariant curves through one or several initial points in each plane of a member of the family."""
+        """Draw the invariant curves through one or several initial points, in each plane of a member of the family."""
         from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
         from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 
@@ -104,7 +104,7 @@ class Plot(AttributeHints):
         points: int = 200,
         against: str | None = None,
     ) -> Axes:
-        """Plot rotation numbers along the segment from `first` to `last`, against the position or an integral."""
+        """Plot rotation numbers of initial points from `first` to `last` against their position or an integral."""
         from kahanmaps.plots.rotation import plot_rotation
 
         file = as_file(system)
@@ -122,7 +122,7 @@ class Plot(AttributeHints):
         axes: Sequence[str] | None = None,
         direction: str = "up",
     ) -> Axes:
-        """Plot a Poincare section of float orbits, as `plot section` draws it.
+        """Plot a Poincare section of float orbits, as the command `plot section` does.
 
         Args:
             system: a map with at least 3 variables, or a system, which stands for its Kahan map.
@@ -130,8 +130,8 @@ class Plot(AttributeHints):
             x0: one initial point or many.
             eps: half the time step (exact); None for a map without eps.
             n: the number of steps of each orbit.
-            axes: two variables or expressions; by default the variables along which the crossings spread most.
-            direction: "up" for crossings to larger values, "down" or "both".
+            axes: two variables or expressions; by default the variables along which the crossings are spread most.
+            direction: "up" for crossings to larger values, "down" for crossings to smaller values, or "both".
         """
         from kahanmaps.plots.comparison.functions import requested_axis
         from kahanmaps.plots.section import curves_on, hyperplane_of, plot_section, section_of
@@ -157,12 +157,12 @@ class Plot(AttributeHints):
         cells: int = 300,
         radius: float = 1000,
     ) -> Axes:
-        """Plot the steps at which, or the directions in which, float orbits leave a ball, like `plot escape`.
+        """Plot at which step, or in which direction, float orbits leave a ball, as the command `plot escape` does.
 
         Args:
             system: a map, or a system, which stands for its Kahan map.
             eps: half the time step (exact); None for a map without eps.
-            window: the intervals of the first two coordinates of the initial points; all other coordinates are 0.
+            window: the ranges of the first two coordinates of the initial points; all other coordinates are 0.
             n: the number of steps.
             show: "time" for the steps, or "basin" for the directions.
             cells: the number of initial points along each axis.
@@ -179,7 +179,7 @@ class Plot(AttributeHints):
         return _axes(plot_escape(survey, show=show))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
-        """Plot the points of an orbit, a result of `km.orbit`, in the coordinates with indices `x` and `y`."""
+        """Plot the points of an orbit, a result of `km.orbit`, in the coordinates with the indices `x` and `y`."""
         _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(trajectory)[:, None]
         return _draw_trajectories(
@@ -187,7 +187,7 @@ class Plot(AttributeHints):
         )
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
-        """Draw a portrait, as `km.portrait` does."""
+        """Draw a portrait; the arguments are those of `km.portrait`."""
         return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
 
 
@@ -228,7 +228,7 @@ def plot_orbits(
     n: int | None = None,
     axes: Sequence[int] = (0, 1),
 ) -> Axes:
-    """Draw float orbits of a map in two coordinates. The command `plot portrait` can add flow and level curves.
+    """Draw float orbits of a map in two coordinates; the command `plot portrait` can add the flow and level curves.
 
     Args:
         system: a map, or a system, which stands for its Kahan map.

@@ -1,4 +1,4 @@
-"""Functions in floating point, evaluated at many points at once: coordinates, integrals, and others for pictures."""
+"""Functions that pictures evaluate in floating point at many points at once: coordinates, integrals, expressions."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from kahanmaps.maps.floats.float_orbit import FLOATS
 from kahanmaps.plots.figures import escape_dollars, label_of
 
 ZERO = fmpq(0)
-_MAX_FORMULA = 60  # maximal number of characters of a formula along an axis
+_MAX_FORMULA = 60  # maximal number of characters of a formula as the label of an axis
 
 
 @dataclass(frozen=True, eq=False)
 class PointFunction:
-    """A rational function of the variables and eps (in this order), in doubles.
+    """A rational function of the variables and eps (in this order), evaluated in doubles.
 
-    `name` is the name of the function in output; half the time step `eps` (exact) is substituted.
+    `name` is the name of the function in output; `eps` (exact, half the time step) is the value of the last argument.
 
     >>> radius = point_function("x^2 + y^2", ["x", "y"])
     >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))
@@ -36,10 +36,10 @@ class PointFunction:
     name: str
     function: RationalFunction
     eps: fmpq = ZERO
-    of_arrays: ClassVar[bool] = True  # ensembles evaluate it at arrays of points
+    of_arrays: ClassVar[bool] = True  # ensembles may call it with arrays of points
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the values at points (..., dim) as an array (...), with NaN at poles and for values that overflow."""
+        """Return the values at points (..., dim), an array (...); NaN at poles and where a value overflows."""
         variable = self.variable
         if variable is not None:
             return np.array(points[..., variable], dtype=np.float64)
@@ -54,13 +54,13 @@ class PointFunction:
         return value
 
     def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the values of the numerator and of the denominator of the function at points (..., dim)."""
+        """Return the values of numerator and denominator of the function at points (..., dim), as two arrays (...)."""
         with np.errstate(all="ignore"):
             return self._value(self.function.numerator, points), self._value(self.function.denominator, points)
 
     @property
     def variable(self) -> int | None:
-        """The index i if the function is the variable x_i; None for other functions."""
+        """The index i if the function is the variable x_i; None for any other function."""
         if not self.function.denominator.is_one():
             return None
         for index, generator in enumerate(self.function.numerator.context().gens()[:-1]):
@@ -70,7 +70,7 @@ class PointFunction:
 
     @property
     def label(self) -> str:
-        """The name for a picture; a short formula is typeset."""
+        """The name as a label in a picture; a short formula is typeset."""
         if is_name(self.name) or not self.function.denominator.is_one():
             return label_of(self.name)
         formula = latex_polynomial(self.function.numerator)
@@ -80,7 +80,7 @@ class PointFunction:
         coordinates = [*np.moveaxis(points, -1, 0), to_float(self.eps)]
         value = np.asarray(evaluate(polynomial, FLOATS, coordinates), dtype=np.float64)
         values: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
-        values[np.isnan(points).any(axis=-1)] = np.nan  # constant functions, too, have no value at missing points
+        values[np.isnan(points).any(axis=-1)] = np.nan  # also for a constant function
         return values
 
 
@@ -91,10 +91,10 @@ def point_function(
     parameters: Mapping[str, fmpq] | None = None,
     known_functions: Mapping[str, RationalFunction] | None = None,
 ) -> PointFunction:
-    """Return the function given by `text`: a known function, or an expression in the variables, eps and parameters.
+    """Return the function that `text` denotes: a known function, or an expression in variables, eps and parameters.
 
     `known_functions` maps names to rational functions of the variables and eps, in this order. Without `eps` (exact,
-    half the time step), expressions that contain eps are refused. Raises InputError for invalid text.
+    half the time step) an expression must not contain eps. Raises InputError for an invalid text.
 
     >>> point_function("(x - eps)/y", ["x", "y"], fmpq(1, 2))(np.array([2.5, 4.0]))
     array(0.5)

@@ -1,4 +1,4 @@
-"""Pictures of the rotation numbers along a segment of initial points."""
+"""Pictures of rotation numbers for the initial points on a segment."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.62  # height over width of the axes
-_MIN_SPACING = 0.05  # minimal distance of marked resonances, relative to the height of the axes
-_MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # marked resonances p/q: number to be reached, bound for q
+_MIN_SPACING = 0.05  # minimal distance between marked resonances, relative to the height of the axes
+_MIN_RESONANCES, _MAX_DENOMINATOR = 3, 1000  # minimal number of marked resonances p/q if possible, upper bound for q
 _MAX_POINTS = 10_000  # maximal number of initial points
 
 
@@ -38,21 +38,21 @@ def plot_rotation(
     points: int = 200,
     against: str | None = None,
 ) -> Figure:
-    """Plot the rotation numbers of a map along the segment from one initial point to another.
+    """Plot the rotation numbers of a map for initial points on a segment.
 
     Args:
-        file: the system or map.
+        file: the system or the map.
         eps: half the time step (exact); None for a map without eps.
         first, last: the end points of the segment (exact).
         points: the number of initial points; points without a rotation number are omitted.
         against: the declared integral whose value is the horizontal coordinate; None for the position on the segment.
 
-    A system with a normal form has a rotation number for each real root of chi, unless the level curve is singular. For
-    other maps the orbit needs a curve of genus 1 or 0 that contains it. Solid lines belong to the map. Dashed lines
-    belong to an iterate, e.g. the second if the map exchanges two real components. Dotted lines belong to the flow at
-    the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
+    A system with a normal form has a rotation number for each real root of chi, unless the level curve is singular. Any
+    other map has a rotation number at a point if a curve of genus 1 or 0 that contains the orbit is found. Solid lines
+    belong to the map, dashed lines to an iterate, e.g. the second one if the map exchanges two real components. Dotted
+    lines belong to the flow for the time 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
 
-    Raises InputError if no point has a rotation number, for fewer than 2 or more than 10,000 points, and for an
+    Raises InputError if no initial point has a rotation number, for fewer than 2 or more than 10,000 points, and for an
     unknown integral.
     """
     if not 2 <= integer(points, "points") <= _MAX_POINTS:
@@ -74,7 +74,7 @@ def plot_rotation(
                 rotations = rotation_numbers(normal_form, map_over.eps, start)
             elif (curve := orbit_curve(map_over, start, file.map, list(integrals.values()))).rotation is not None:
                 rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
-        except (PrecisionLost, UnknownCurve, InputError):  # the orbit is finite, ends, or lies on no known curve
+        except (PrecisionLost, UnknownCurve, InputError):  # a finite orbit, an orbit that ends, or no known curve
             continue
         for root, rotation in rotations.items() if abscissa is not None else ():
             if len(rotation.numbers) == 1:
@@ -103,7 +103,7 @@ def plot_rotation(
         axes = figure.subplots()
         for k, root_rows in enumerate(rows.values()):
             table = np.array(root_rows)
-            # No line crosses an omitted level, or joins levels with different numbers of components.
+            # No line crosses an omitted point, or joins numbers of different iterates.
             breaks = 1 + np.flatnonzero((np.diff(table[:, 4]) > 1) | (np.diff(table[:, 3]) != 0))
             for branch in np.split(table, breaks):
                 line = LINES[min(int(branch[0, 3]) - 1, 1)]
@@ -130,7 +130,7 @@ def plot_rotation(
 
 
 def _resonances(low: float, high: float) -> list[Fraction]:
-    """Return spaced fractions p/q in (low, high): with q up to twice the least q, larger q until there are three."""
+    """Return spaced fractions p/q in (low, high): all q up to twice the least q, and larger q until there are three."""
     resonances: list[Fraction] = []
     for q in range(2, _MAX_DENOMINATOR):
         if len(resonances) >= _MIN_RESONANCES and q > 2 * resonances[0].denominator:

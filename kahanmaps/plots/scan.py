@@ -1,4 +1,4 @@
-"""The plane of two parameters of a family of maps, with the conditions under which degrees grow more slowly."""
+"""Pictures of the plane of two parameters of a family of maps: where degrees of iterates grow more slowly."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8  # height over width of the axes
-_EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
+_EXPONENTIAL = f"{Growth.EXPONENTIAL} growth"  # components with this growth are thin lines without labels
 _CONDITION_FONT_RATIO = 0.8  # font size of conditions, relative to the font size of other text
 _LABEL_POSITIONS, _SAMPLES = 12, 300  # points of a curve: tried for its label; used to find labels that it crosses
-_AXES_SHARE = 0.85  # the axes as a fraction of the width and height of the picture
+_AXES_SHARE = 0.85  # the axes as a fraction of the width, and of the height, of the picture
 _DEFAULT_WINDOW: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
 def plot_scan(
     scan: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
-    """Draw the special curves and points of the plane of two parameters, with conditions and a color for each growth.
+    """Draw the special curves and points in the plane of two parameters, with equations and a color for each growth.
 
-    `window` is (low, high) for each parameter; by default it contains most of the points with rational parameters. With
-    `modulo`, a prime for which the scan tried all members, all special members modulo this prime are drawn instead.
-    Raises InputError for a scan over another number of parameters, and for another prime.
+    `window` is a pair (low, high) for each parameter; by default it contains most of the special points with rational
+    coordinates. If `modulo` is a prime for which the scan tried all members, the special members modulo this prime are
+    drawn instead. Raises InputError for a scan that is not over two parameters, and for any other prime.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.scan.scan import scan
@@ -59,7 +59,7 @@ def plot_scan(
     if len(scan.over) != 2:
         raise InputError(f"found a scan over {', '.join(scan.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
-    growths: dict[str, list[Component]] = {}  # growth -> components with this growth, the slowest growth first
+    growths: dict[str, list[Component]] = {}  # growth -> its components, the slowest growth first
     for _, components in scan.classes:
         growth = growth_on(components)
         growths.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(components)
@@ -68,7 +68,7 @@ def plot_scan(
         if modulo not in sweeps:
             primes = ", ".join(map(str, sweeps)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {primes}")
-        # The special members, each with the growth of a component that contains the member and has its degrees.
+        # Each special member has the growth of a component that contains it and has its degrees.
         unassigned = {degrees: list(points) for degrees, points in sweeps[modulo].classes.items()}
         special = []
         for name, components in growths.items():
@@ -100,7 +100,7 @@ def plot_scan(
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(component.text, [_position(component)]) for component in components if component.is_rational_point]
         for text, pieces in curves:
-            # The label is on the longest piece, preferably away from the middle: there curves rarely cross.
+            # The label is on the longest piece, preferably away from its middle, where curves often cross.
             longest = max(pieces, key=len)
             ends = _resampled(longest, _LABEL_POSITIONS + 1)
             indices = sorted(range(1, _LABEL_POSITIONS), key=lambda k: abs(4 * k - 3 * _LABEL_POSITIONS))
@@ -113,7 +113,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _ColorGroup:
-    """What is drawn in one color: points, pieces of curves, and conditions with possible positions of their labels."""
+    """What is drawn in one color: points, pieces of curves, and pairs (condition, possible positions of its label)."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -156,10 +156,10 @@ def _draw(scan: Scan, style: Style, groups: list[_ColorGroup], window: Window, l
 
 
 def _write_labels(axes: Axes, groups: list[_ColorGroup], window: Window, style: Style) -> None:
-    """Write conditions next to their curves, then next to points, if they fit; labels may cover points.
+    """Write the conditions beside their curves, then those beside their points, if they fit; labels may cover points.
 
-    Points with the fastest growth below exponential are labelled first. Among the positions at which a label
-    fits, the position crossed by the fewest curves is chosen.
+    Points with the fastest growth below exponential are labelled first. If a label fits at several positions, the
+    position that is crossed by the fewest curves is chosen.
     """
     em = _CONDITION_FONT_RATIO * style.font_size
     em_x, em_y = (em / (72 * _AXES_SHARE * inches) for inches in style.inches(_ASPECT))

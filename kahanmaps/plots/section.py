@@ -1,4 +1,4 @@
-"""Poincare sections: crossings of floating-point orbits with a hyperplane a.x = c, and level curves of integrals."""
+"""Poincare sections: crossings of float orbits with a hyperplane a.x = c, and level curves of integrals on it."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UP, DOWN, BOTH = "up", "down", "both"
-_NODE_COUNT = 6  # interpolation nodes: three points on either side of the hyperplane
-_NEWTON_STEPS = 12  # steps of Newton's method for the zero of an interpolation polynomial
-_MAX_DIFFERENCE = 0.1  # largest difference, in steps, of the zeros interpolated with four and with six nodes
+_NODE_COUNT = 6  # number of interpolation nodes: three points on each side of the hyperplane
+_NEWTON_STEPS = 12  # number of steps of Newton's method for the zero of an interpolation polynomial
+_MAX_DIFFERENCE = 0.1  # maximal distance, in steps, of the crossings interpolated with four and with six nodes
 _ASPECT = 0.75  # height over width of the axes
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """The crossings of orbits with a hyperplane.
+    """The crossings of orbits with a hyperplane, and the number of those that were omitted.
 
-    `crossings` contains for each orbit its crossings (count, dim) in the order of the orbit. `skipped` counts crossings
-    that were omitted, since the steps near them are too long for an interpolation.
+    `crossings` has for each orbit an array (count, dim) of its crossings, in the order of the orbit. `skipped` counts
+    the crossings that were omitted, since the steps beside them are too long for an interpolation.
     """
 
     crossings: tuple[FloatArray, ...]
@@ -44,11 +44,11 @@ class Section:
 
     @property
     def points(self) -> FloatArray:
-        """The crossings of all orbits (count, dim)."""
+        """The crossings of all orbits as one array (count, dim)."""
         return np.concatenate(self.crossings)
 
     def widest_axes(self, hyperplane: PointFunction) -> tuple[int, ...]:
-        """Return two variables along which the crossings spread most, none of them constant on the hyperplane."""
+        """Return the two variables along which the crossings are spread most, neither constant on the hyperplane."""
         powers = [sum(column) for column in zip(*hyperplane.function.numerator.monoms(), strict=True)]
         dim = self.points.shape[1]
         free_indices = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
@@ -56,7 +56,7 @@ class Section:
 
 
 def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return F - C for a text F=C. Raises InputError unless F - C is affine in the variables and free of eps."""
+    """Return the function F - C for a text F=C. Raises InputError unless it is affine and free of eps."""
     left, _, right = text.partition("=")
     function = requested_axis(file, eps, left if right.strip() in ("", "0") else f"{left} - ({right})")
     polynomial = function.function.numerator
@@ -71,7 +71,7 @@ def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunctio
 def curves_on(
     file: SystemFile, eps: fmpq | None, hyperplane: PointFunction, axes: Sequence[PointFunction]
 ) -> list[PointFunction]:
-    """Return the integrals of a file whose restrictions to a hyperplane depend only on the variables along the axes."""
+    """Return those integrals, restricted to the hyperplane, that depend only on the variables along the axes."""
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
@@ -87,17 +87,17 @@ def section_of(
     direction: str = UP,
     progress: Callable[[int], None] | None = None,
 ) -> Section:
-    """Return the crossings of a hyperplane by the orbits of an ensemble.
+    """Return the crossings of the orbits of an ensemble with a hyperplane.
 
     Args:
         ensemble: the orbits.
         hyperplane: an affine function of the variables that is 0 on the hyperplane.
         steps: the number of steps of each orbit.
-        direction: "up" for crossings to positive values, "down" to negative ones, or "both".
+        direction: "up" for crossings to positive values of this function, "down" to negative values, or "both".
         progress: called with the current step.
 
     Crossings are interpolated through six consecutive points by polynomials in the step number. Raises InputError for
-    another direction.
+    any other direction.
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
@@ -115,13 +115,13 @@ def section_of(
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
-    """Return the interpolated points at which an affine function along an orbit is 0, and the number of omitted ones.
+    """Return the interpolated points of an orbit at which an affine function is 0, and the number of omitted ones.
 
     Args:
-        points: the points of the orbit (count, dim). values: the values of the function (count,).
-        direction: "up", "down" or "both".
+        points: the points of the orbit (count, dim). values: the values (count,) of an affine function at these points.
+        direction: "up" for zeros at which the function increases, "down" or "both".
 
-    A zero is interpolated only if the orbit has three points on either side of it.
+    A zero is interpolated only if the orbit has three points before it and three points after it.
 
     >>> t = 0.3 * np.arange(12)
     >>> circle = np.stack([np.cos(t), np.sin(t)], axis=1)
@@ -139,15 +139,15 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     node_points, node_values = points[node_rows], values[node_rows]
 
     def interpolate_zero(nodes: slice) -> FloatArray:
-        """Return the crossings, interpolated through the nodes in this slice of the six nodes."""
+        """Return the crossings, each interpolated through those of its six nodes that the slice `nodes` selects."""
         node_steps = np.arange(1 - _NODE_COUNT // 2, _NODE_COUNT // 2 + 1, dtype=np.float64)[nodes]
-        inverse = np.linalg.inv(np.vander(node_steps, increasing=True))  # maps values at the nodes to coefficients
+        inverse = np.linalg.inv(np.vander(node_steps, increasing=True))  # maps values at nodes to coefficients
         coefficients = node_values[:, nodes] @ inverse.T
         powers = np.arange(len(node_steps))
         low, high = np.zeros(len(coefficients)), np.ones(len(coefficients))
         t = np.clip(values[indices] / (values[indices] - values[indices + 1]), 0, 1)
         rising = values[indices] < values[indices + 1]
-        for _ in range(_NEWTON_STEPS):  # Newton's method, restricted to an interval with a change of sign
+        for _ in range(_NEWTON_STEPS):  # Newton's method, or bisection if it leaves the interval with the zero
             value = (coefficients * t[:, None] ** powers).sum(axis=1)
             slope = (coefficients[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
             is_below = (value < 0) == rising
@@ -161,7 +161,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
         fine_points, coarse_points = interpolate_zero(slice(None)), interpolate_zero(slice(1, _NODE_COUNT - 1))
         step_lengths = np.linalg.norm(points[indices + 1] - points[indices], axis=1)
         is_trusted = np.linalg.norm(fine_points - coarse_points, axis=1) <= _MAX_DIFFERENCE * step_lengths
-        # A function that moves away from 0 on both sides of a change of sign has a pole there.
+        # If |function| increases on both sides away from a change of sign, the function has a pole there.
         middle = _NODE_COUNT // 2
         approach, departure = np.diff(np.abs(node_values), axis=1)[:, [middle - 2, middle]].T
         is_trusted &= (approach < 0) | (departure > 0)
@@ -169,7 +169,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
 
 
 def restrict(function: PointFunction, hyperplane: PointFunction, plane: Sequence[int]) -> PointFunction | None:
-    """Return the restriction of a function to a hyperplane in two variables; None if it depends on other variables."""
+    """Return a function restricted to a hyperplane as a function of two variables; None if it depends on others."""
     affine = hyperplane.function.numerator
     names = function.function.names
     context = affine.context()
@@ -196,15 +196,15 @@ def plot_section(
     window: Window | None = None,
     equal: bool = False,
 ) -> Figure:
-    """Plot the crossings along two axes with a color for each orbit, and level curves of integrals.
+    """Plot the crossings in the plane of two axes, with a color for each orbit, and level curves of integrals.
 
     Args:
         section: the crossings.
         axes: two functions of the point.
         style: sizes and fonts of the picture.
-        curves: integrals as functions of the variables along the axes, as `restrict` returns them; their levels
-            through the first crossing of each orbit are drawn.
-        window: the part of the plane; None for all crossings.
+        curves: integrals that are functions of the variables along the axes, as `restrict` returns them; the level
+            through the first crossing of each orbit is drawn.
+        window: the part of the plane that is shown; None for all crossings.
         equal: whether both axes have the same unit.
 
     Raises InputError if there are no crossings.

@@ -1,9 +1,8 @@
-"""Test whether two maps commute at one point: compute Phi_f^i Phi_g^j x and Phi_g^j Phi_f^i x exactly.
+"""Pictures of whether two maps commute at one point x: Phi_f^i Phi_g^j x and Phi_g^j Phi_f^i x, computed exactly.
 
 The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). In the
-picture an arrow of f leads from Phi_f^i Phi_g^j x to Phi_f^(i+1) Phi_g^j x, an arrow of g from Phi_g^j Phi_f^i x to
-Phi_g^(j+1) Phi_f^i x. An arrow of g ends in a ring, an arrow of f in a dot. If the maps commute, every ring contains a
-dot.
+picture an arrow of f leads from Phi_f^i Phi_g^j x to Phi_f^(i+1) Phi_g^j x and ends in a dot; an arrow of g leads from
+Phi_g^j Phi_f^i x to Phi_g^(j+1) Phi_f^i x and ends in a ring. If the maps commute, every ring contains a dot.
 """
 
 from __future__ import annotations
@@ -35,18 +34,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MAX_STEPS = 12  # number of steps of each map
-MAX_BITS = 300_000  # bits of numerator and denominator of one coordinate: with so many bits a step takes seconds
+MAX_STEPS = 12  # maximal number of steps of each map
+MAX_BITS = 300_000  # maximal number of bits of numerator and denominator of a coordinate: a step then takes seconds
 
 Point = tuple[fmpq, ...]
-Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None after an indeterminacy point or if numbers are too long
+Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j]; None: indeterminacy point before, or numbers too long
 
 
 @dataclass(frozen=True)
 class MapPair:
-    """Two maps to be compared; a system stands for its Kahan map, and is scaled if its time step differs.
+    """Two maps to be compared. A system stands for its Kahan map; a second system with another eps is scaled.
 
-    `names` are short texts, and `note` says how variables are matched if they differ.
+    `names` are the names of the two maps in the picture. `note` says how their variables are matched if they differ.
     """
 
     f: QuadraticSystem | MapFamily
@@ -57,9 +56,9 @@ class MapPair:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Lattices of a point x and maps F, G: `g_after_f[i][j]` is G^j(F^i x), and `f_after_g[i][j]` is F^i(G^j x).
+    """Lattices of points for a point x and maps F, G: `g_after_f[i][j]` is G^j(F^i x), `f_after_g[i][j]` is F^i(G^j x).
 
-    `stopped` is a sentence that says why points are missing, empty if none are missing.
+    `stopped` is a sentence that says why some points are missing; it is empty if none are missing.
     """
 
     pair: MapPair
@@ -69,31 +68,31 @@ class Squares:
 
     @property
     def steps(self) -> int:
-        """The number of applications of each map."""
+        """The number of times that each map is applied."""
         return len(self.g_after_f) - 1
 
     @property
     def compared(self) -> list[tuple[Point, Point]]:
-        """The pairs of points with equal indices [i][j] in the two lattices, if both points exist."""
+        """The pairs of points with equal indices i, j > 0 in the two lattices, if both points exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
         pairs = (pair for row, other_row in rows for pair in zip(row[1:], other_row[1:], strict=True))
         return [(p, q) for p, q in pairs if p is not None and q is not None]
 
     @property
     def closes(self) -> bool | None:
-        """Whether the two orders of the maps give exactly the same points; None if there are no points to compare."""
+        """Whether the points of all pairs in `compared` are exactly equal; None if there are no pairs."""
         pairs = self.compared
         return all(p == q for p, q in pairs) if pairs else None
 
     @property
     def gap(self) -> float:
-        """The largest Euclidean distance between corresponding points."""
+        """The largest Euclidean distance between the points of a pair in `compared`."""
         squares = [sum(((a - b) ** 2 for a, b in zip(*pair, strict=True)), fmpq(0)) for pair in self.compared]
         return float(arb(max(squares, default=fmpq(0))).sqrt().mid())
 
     @property
     def verdict(self) -> str:
-        """The result as text: closes exactly, the size of the gap, or that nothing could be compared."""
+        """The result as text: closes exactly, the size of the gap, or no fourth corner (nothing could be compared)."""
         if self.closes is None:
             return "no fourth corner"
         return "closes exactly" if self.closes else f"gap {self.gap:.3g}"
@@ -102,9 +101,9 @@ class Squares:
 def squares(
     pair: MapPair, start: Sequence[Any], eps: Any, steps: int = 1, progress: Callable[[str], None] = lambda _: None
 ) -> Squares:
-    """Apply each map `steps` times to an exact initial point in both orders; eps is exact, the time step is 2 eps.
+    """Apply each map `steps` times to an exact initial point, in both orders; `eps` is exact, half the time step.
 
-    Raises InputError for wrong sizes.
+    Raises InputError for an invalid number of steps or of coordinates.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "0"])
     >>> g = QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])
@@ -144,11 +143,11 @@ def squares(
 
 
 def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
-    """Return the pairs of maps to be plotted for a member: two associated systems, and a control.
+    """Return the two pairs of maps that are drawn for a member of the family: two associated systems, and a control.
 
-    The first system is the member itself, the second is the associated system with the opposite sign at the last factor
-    of chi. The control is J grad H_0, J grad H_1 with grad H_1 = A grad H_0 or, if m = 1, f = J grad H_0 and 2 f.
-    Raises InputError if the system is not a member of the family, declared or recognised, in its own coordinates.
+    The first associated system is the member itself; the second has the opposite sign at the last factor of chi. The
+    control is the pair J grad H_0, J grad H_1 with grad H_1 = A grad H_0 or, for m = 1, f = J grad H_0 and 2 f. Raises
+    InputError unless the system is a member of the family, declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
@@ -172,7 +171,7 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
-    """Return the pair of two systems of equal dimension; with `eps2` the second system is scaled by eps2/eps."""
+    """Return the pair of maps of two systems of equal dimension; `eps2` scales the second system by eps2/eps."""
     g: QuadraticSystem | MapFamily
     g, note = match_variables(file, other)
     if eps2 is not None:
@@ -187,7 +186,7 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
 
 _F_COLOR, _G_COLOR, _GAP_COLOR = COLORS[1], COLORS[5], COLORS[0]
 _MAX_COORDINATE = 1e150  # squares of larger numbers would overflow
-_MIN_VISIBLE_GAP = 0.06  # fraction of the width of a panel: a smaller gap is magnified
+_MIN_VISIBLE_GAP = 0.06  # fraction of the width of a panel; the picture of a smaller gap is magnified
 
 
 def plot_squares(
@@ -196,10 +195,10 @@ def plot_squares(
     axes: tuple[int, int] | None = None,
     captions: Sequence[str] = (),
 ) -> Figure:
-    """Plot one panel for each pair of maps in the coordinates `axes`, by default those in which the squares are widest.
+    """Plot a panel for each pair of maps in the coordinates `axes`, by default those in which the squares are widest.
 
-    `captions` replace the names of the maps above the panels. Raises InputError for invalid indices of variables, and
-    for an initial point too large to be plotted.
+    `captions` replace the names of the maps above the panels. Raises InputError for invalid indices in `axes`, and for
+    an initial point that is too large for a picture.
     """
     dim = squares_of_pairs[0].pair.f.dim
     if not all(np.isfinite(_to_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
@@ -225,7 +224,7 @@ def plot_squares(
 
 
 def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
-    """Return the two coordinates that maximize the smallest width of all squares and of all gaps between corners."""
+    """Return the two coordinates for which the smallest width among all squares and all gaps of corners is largest."""
     dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0
@@ -249,16 +248,16 @@ def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
 
 
 def _draw_panel(axes: Axes, squares: Squares, plane: tuple[int, int], caption: str, em: float, style: Style) -> None:
-    """Draw one panel; `em` is the font size in units of the side of the panel."""
+    """Draw one panel; `em` is the font size relative to the side of the panel."""
     gf, fg = _to_table(squares.g_after_f)[..., plane], _to_table(squares.f_after_g)[..., plane]
     all_points = np.concatenate([gf.reshape(-1, 2), fg.reshape(-1, 2)])
     all_points = all_points[np.isfinite(all_points).all(axis=1)]
-    # Margins on each side, in units of the range of the points: space for the names of corners, more in small panels.
+    # Margins on each side, relative to the range of the points: space for names of corners, more of it in small panels.
     if squares.steps > 1:
         window = np.array(window_of(all_points, gf[0, 0][None]))
         space = np.array([[1.3 * em], [1.7 * em]])
         margins = np.maximum(0.12, space / (1 - 2 * np.minimum(0.36, space)))
-    else:  # one step: all five points are shown
+    else:  # for one step all five points are shown
         window = np.array([all_points.min(axis=0), all_points.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
         space = np.minimum(0.36, np.array([[3.2 * em], [2.5 * em]]))
@@ -299,7 +298,7 @@ def _draw_panel(axes: Axes, squares: Squares, plane: tuple[int, int], caption: s
 
 
 def _draw_lattices(axes: Axes, gf: Floats, fg: Floats) -> None:
-    """Draw arrows with rings at the ends of arrows of g and dots at the ends of arrows of f; gaps are dotted lines."""
+    """Draw arrows (those of g end in rings, those of f in dots), and dotted lines where the maps do not commute."""
     from matplotlib.patches import FancyArrowPatch
 
     steps = len(gf) - 1
@@ -323,7 +322,7 @@ def _draw_lattices(axes: Axes, gf: Floats, fg: Floats) -> None:
 
 
 def _magnify(axes: Axes, gf: Floats, fg: Floats, all_points: Floats, window: Floats, style: Style) -> None:
-    """Draw both candidates for the last corner, magnified to be distinguishable, in the emptiest part of the panel."""
+    """Draw both candidates for the last corner in the emptiest corner of the panel, magnified to be distinguishable."""
     lengths = np.diff(window, axis=1)[:, 0]
     relative_points = (all_points - window[:, 0]) / lengths
     if len(gf) == 2:  # the panel also contains the name of the last corner
@@ -348,15 +347,15 @@ def _magnify(axes: Axes, gf: Floats, fg: Floats, all_points: Floats, window: Flo
 
 
 def _in_two_digits(number: float) -> str:
-    """Format a positive number with two digits for a formula: 6.1, 180, or with a power of ten."""
+    """Format a positive number with two digits for a formula, such as 6.1 or 180, if necessary with a power of ten."""
     digits, power = f"{number:.1e}".split("e")
     return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
 
 
 def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float, side: str = "") -> None:
-    """Write a text beside a point, away from the middle of all points; a long text above or below, shifted inside.
+    """Write a text beside a point, away from `center`; a long text is above or below the point, inside of the panel.
 
-    `side` is the alignment of a long name beside which another long name is written.
+    `side` is the alignment of a long text that has another long text beside it.
     """
     if not np.isfinite(point).all():
         return
@@ -381,7 +380,7 @@ def _write_label(axes: Axes, point: Floats, text: str, center: Floats, em: float
 
 
 def _to_table(lattice: Lattice) -> Floats:
-    """Return the points of a lattice in doubles; NaN for missing points and for coordinates of 1e150 or more."""
+    """Return the points of a lattice in doubles; NaN for missing points, and for coordinates of at least 1e150."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _MAX_COORDINATE, table, np.nan)

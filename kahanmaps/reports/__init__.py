@@ -1,1 +1,1 @@
-"""HTML pages about a system or a member of the family; each page is a single file that needs no network."""
+"""HTML pages about a system or a member of the family; a page is a single file that needs no network."""

@@ -1,7 +1,7 @@
-"""Pages with sliders for eps and the initial point: the browser draws the orbit next to the exact verdict.
+"""Pages with sliders for eps and the initial point of an orbit, which the browser draws beside the exact verdict.
 
-The browser computes in floating point with the polynomials M and r of the map (M x~ = r); explore.js solves the linear
-system of each step. Proofs are computed beforehand and printed as text.
+The browser computes in floating point: explore.js solves the linear system M x~ = r for each step, where the entries of
+M and r are polynomials in x and eps. The proofs are computed before, and the page contains them as text.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
 from kahanmaps.reports.pictures import DEFAULT_EPS
 
-_MIN_SLIDER_END = 0.5  # the slider of eps ends there, or at twice the given eps if this is larger
+_MIN_SLIDER_END = 0.5  # the slider of eps ends here, or at twice the given eps if this is larger
 _DEFAULT_STEPS, _MAX_STEPS = 800, 5000
-_MAX_TERMS = 2000  # number of terms of all polynomials that the browser evaluates at every step
-_MAX_VARIABLES = 12  # maximal number of variables: each has a slider
+_MAX_TERMS = 2000  # maximal number of terms of the polynomials that the browser evaluates at each step
+_MAX_VARIABLES = 12  # maximal number of variables, each of which has a slider
 
 
 def explore_sections(analysis: Analysis) -> list[Section]:
-    """Return the sections of a page with the verdict and the integrals of `analyze` and an orbit controlled by sliders.
+    """Return the sections of a page: an orbit with sliders, the verdict and the integrals of an analysis; the system.
 
     Raises InputError if the map has too many variables or terms for a browser.
     """
@@ -58,14 +58,14 @@ def explore_sections(analysis: Analysis) -> list[Section]:
             for integral in integrals
         ],
         "functions": data["functions"],
-        # in a script < could begin a tag; in JSON it can be escaped
+        # In a script, < could begin a tag. In JSON it can be escaped.
         "data": Html(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
     }
     return [Section("explore", "An orbit", explore=explore), system_section(analysis.file)]
 
 
 def explore_data(analysis: Analysis) -> dict[str, Any]:
-    """Return the data for explore.js: rows of (M | -r) with M x~ = r as terms, plotted functions, initial point."""
+    """Return the data for explore.js: the rows of (M | -r), where M x~ = r; functions to plot; an initial point."""
     file = analysis.file
     map_, n = file.map, file.dim
     if n > _MAX_VARIABLES:
@@ -88,7 +88,7 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
             plotted_functions.append(
                 {"name": name, "text": text, "word": certainty, "numerator": sides[0], "denominator": sides[1]}
             )
-    if file.is_quadratic:  # the middle one of the initial points of a portrait, whose orbits are bounded
+    if file.is_quadratic:  # the middle one of sixteen initial points with bounded orbits
         starts = automatic_starts(file.system, DEFAULT_EPS if analysis.eps is None else analysis.eps)
         start, bound = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
     else:
@@ -106,7 +106,7 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
 
 
 def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, fmpq]) -> list[list[Any]]:
-    """Return terms as lists [coefficient, exponents of the names]; symbols are replaced by their `values`."""
+    """Return the terms of a polynomial as lists [coefficient, *exponents of `names`]; other names have `values`."""
     own_names = names_of(polynomial)
     terms = []
     for powers, coefficient in polynomial.terms():

@@ -1,8 +1,8 @@
-"""HTML pages: a title, a lead, sections with stable ids, and instructions to reproduce the page.
+"""HTML pages: a title, a lead, sections with stable ids, and instructions on how to reproduce the page.
 
-A page is a single file made from page.html, a template of Jinja2. It needs no network, and JavaScript only for
-explore.py; equal input gives equal bytes. The template escapes text; `Html` is not escaped. Formulas are converted from
-LaTeX to MathML.
+A page is a single file, made from page.html, a template of Jinja2. It needs no network, and JavaScript only for
+explore.py; equal input gives equal bytes. The template escapes text, but not `Html`. Formulas are converted from LaTeX
+to MathML.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, printable
 from kahanmaps.version import __version__
 
-CHARACTERS = 6_000  # approximate limit for one formula, and limit for one line of text
-_MAX_SYSTEM = 200_000  # maximal number of characters of a printed system file
+CHARACTERS = 6_000  # maximal number of characters of a line of text, and approximately of a formula
+_MAX_SYSTEM = 200_000  # maximal number of characters of a system file on a page
 _MAX_EQUATIONS = 40  # maximal number of equations of a system on a page
-# LaTeX commands with their arguments, and words.
+# Matches LaTeX commands with their arguments, and words of at least two letters.
 _COMMANDS_AND_WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
-# Text commands in names with special characters; latex2mathml would print these commands literally.
+# LaTeX commands in names with special characters -> the characters; latex2mathml prints these commands literally.
 _TEXT_COMMANDS = {
     r"\textbackslash{}": r"\backslash ",
     r"\textasciicircum{}": r"\wedge ",
@@ -40,7 +40,7 @@ _TEXT_COMMANDS = {
 
 
 class Html(str):
-    """HTML, which the template does not escape."""
+    """A text in HTML, which the template does not escape."""
 
     __slots__ = ()
 
@@ -50,18 +50,18 @@ class Html(str):
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a page with its id, title and content; a section without content is omitted."""
+    """A section of a page: an id, a title, and content of several kinds; a section without content is omitted."""
 
     id: str
     title: str
-    conclusion: tuple[str, str] | None = None  # a verdict and a sentence, printed in large letters
+    conclusion: tuple[str, str] | None = None  # (verdict, sentence), printed in large letters
     paragraphs: Sequence[str] = ()
-    items: Sequence[str] = ()  # the items of a list
+    items: Sequence[str] = ()  # entries of a list
     statements: Sequence[tuple[str, str]] = ()  # pairs of a status and a sentence
     pieces: Sequence[str] = ()
-    folded: Sequence[tuple[str, str]] = ()  # pairs of a summary and its content, which a click unfolds
+    folded: Sequence[tuple[str, str]] = ()  # pairs of a summary and the content that a click on it unfolds
     claims: Sequence[Mapping[str, Any]] = ()
-    explore: Mapping[str, Any] | None = None  # the interactive orbit of explore.py
+    explore: Mapping[str, Any] | None = None  # data of the interactive orbit, see explore.py
 
     def __bool__(self) -> bool:
         return any(getattr(self, field.name) for field in fields(self)[2:])
@@ -77,9 +77,9 @@ def page(
     file: SystemFile | None = None,
     script: str = "",
 ) -> str:
-    """Return a page; empty sections are omitted. `script` is the only JavaScript that browsers may run.
+    """Return a page as HTML; empty sections are omitted. `script` is the only JavaScript that the browser may run.
 
-    `command`, `seed` (None if nothing is random) and `file` are printed in the instructions to reproduce the page.
+    `command`, `seed` (None if nothing is random) and `file` are part of the instructions on how to reproduce the page.
     """
     remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]
@@ -104,9 +104,9 @@ def page(
 
 @cache
 def font_face() -> str:
-    """Return a CSS rule that embeds the font for formulas.
+    """Return a CSS rule that embeds the font of formulas.
 
-    Browsers need a font with a MATH table to place exponents and primes.
+    A browser needs a font with a MATH table in order to place exponents and primes.
     """
     font = resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff"
     code = b64encode(font.read_bytes()).decode("ascii")
@@ -115,7 +115,7 @@ def font_face() -> str:
 
 @cache
 def page_template() -> Any:
-    """Return the template of all pages. Raises InputError if the extra [report] is not installed."""
+    """Return the Jinja2 template of all pages. Raises InputError if the packages of the extra [report] are missing."""
     try:
         import latex2mathml.converter  # noqa: F401 (only to test whether it is installed)
         from jinja2 import Environment
@@ -132,13 +132,13 @@ def page_template() -> Any:
 
 @cache
 def mathml(latex: str) -> str:
-    r"""Convert LaTeX to MathML with the LaTeX as `alttext`, or to code if it cannot be converted.
+    r"""Convert LaTeX to MathML, with the LaTeX as `alttext`; if this fails, return the LaTeX as code.
 
-    latex2mathml raises few errors, so its output is parsed and searched for unknown commands.
+    latex2mathml rarely raises an error for invalid input, so its output is parsed and searched for unknown commands.
     """
     from latex2mathml.converter import convert
 
-    # A name of several letters would look like a product: set it upright, with spaces around it.
+    # A name of several letters would look like a product, so it is set upright, with spaces around it.
     source = _COMMANDS_AND_WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
     source = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", source)
     for command, replacement in _TEXT_COMMANDS.items():
@@ -146,27 +146,27 @@ def mathml(latex: str) -> str:
     try:
         text = convert(source)
         is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
-    except Exception:  # an exception of latex2mathml, KeyError, IndexError or ParseError
+    except Exception:  # of latex2mathml: its own, KeyError or IndexError; of the parser: ParseError
         is_known = False
     if not is_known:
         return f"<code>{markup.escape(latex)}</code>"
-    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign after = is a prefix, not a binary operator
+    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # after = the minus sign is a prefix, not a binary operator
     text = text.replace(sign, sign.replace("><mo>&#x02212", '><mo form="prefix">&#x02212'))
     return re.sub("^<math[^>]*>", lambda _: f'<math alttext="{markup.escape(latex)}">', text)
 
 
 def text(words: object) -> Html:
-    """Return text as HTML, shortened if it is too long for a page."""
+    """Return a text as HTML; it is shortened if it is too long for a page."""
     return Html(markup.escape(markup.abbreviate(words, CHARACTERS)))
 
 
 def wide(table: str) -> Html:
-    """Return a table that scrolls horizontally on narrow pages."""
+    """Return a table that readers can scroll horizontally on a narrow page."""
     return Html(f'<div class="wide">{table}</div>')
 
 
 def system_section(file: SystemFile) -> Section:
-    """Return the section with equations, parameters and Hamiltonian of a system."""
+    """Return the section of a page with the equations, parameters and Hamiltonian of a system."""
     if file.is_quadratic:
         pieces = [Html(f"<p>{equations_html(file.system, CHARACTERS, _MAX_EQUATIONS)}</p>")]
     else:

@@ -1,4 +1,4 @@
-"""The pictures of a page as inline SVG, or sentences that say why pictures are missing."""
+"""The pictures of a page as inline SVG, or sentences that say why a picture is missing."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
 
     from kahanmaps.documents.files import SystemFile
 
-DEFAULT_EPS = fmpq(1, 20)  # eps of pictures on a page about every eps
-_STYLE = Style(width=14, font_size=11, dpi=150)  # letters are legible on a phone
-_MAX_ELEMENTS = 1_500  # maximal number of points drawn as SVG elements, which take a hundred bytes each
+DEFAULT_EPS = fmpq(1, 20)  # eps of the pictures on a page that is about every eps
+_STYLE = Style(width=14, font_size=11, dpi=150)  # letters of this size are legible on a phone
+_MAX_ELEMENTS = 1_500  # maximal number of points drawn as SVG elements, each of which takes a hundred bytes
 _STEPS = 600  # number of steps of each orbit of a portrait
-_PORTRAIT_STARTS = 16  # number of random initial points
+_PORTRAIT_STARTS = 16  # number of random initial points of a portrait
 _CURVE_COUNT = 3  # number of orbits on invariant curves
-_CURVE_STEPS = 300  # number of steps of each of these orbits
+_CURVE_STEPS = 300  # number of steps of an orbit on invariant curves
 
 
 class Pictures:
-    """Draws the pictures of a page, or omits them unless `requested`.
+    """The pictures of a page; there are none unless they are `requested` and matplotlib is installed.
 
-    `note` is a sentence for the page if matplotlib is missing, else empty.
+    `note` is a sentence for the page if matplotlib is missing, and otherwise empty.
     """
 
     def __init__(self, requested: bool = True) -> None:
@@ -56,17 +56,17 @@ class Pictures:
     def draw(
         self, name: str, caption: str, alt: str, drawing: Callable[[Style], Figure], remarks: Sequence[str] = ()
     ) -> str:
-        """Return a <figure> with the picture made by `drawing`; `name` is its id, `alt` its text alternative.
+        """Return a <figure> with the picture that `drawing` returns; `name` is its id, `alt` its alternative text.
 
-        `drawing` may append to `remarks`, which are printed below the caption. Returns an empty text if no pictures are
-        requested, and a sentence with the reason if the picture cannot be drawn.
+        `drawing` may append sentences to `remarks`, which are printed below the caption. If there are to be no
+        pictures, the result is an empty text; if the picture cannot be drawn, it is a sentence with the reason.
         """
         if not self._requested:
             return ""
         try:
             figure = drawing(_STYLE)
             for axes in figure.axes:
-                # Rasterize artists with many points; axes and letters stay vectors.
+                # Lines and dots with many points are stored as images; axes and letters remain vectors.
                 lines: list[Any] = list(axes.lines)
                 collections: list[Any] = list(axes.collections)
                 points = sum(len(line.get_xdata()) for line in lines) + sum(
@@ -83,9 +83,9 @@ class Pictures:
         return f'<figure id="{name}">\n{svg}\n<figcaption>{caption_html}</figcaption>\n</figure>'
 
     def portrait(self, file: SystemFile, eps: Any) -> str:
-        """Draw sixteen orbits in the plane of the first two variables; in dimension 1, against the step number.
+        """Draw sixteen orbits in the plane of the first two variables; a single variable is drawn against the step.
 
-        The initial points lie around an equilibrium of the vector field; without a vector field they are random.
+        The initial points lie around an equilibrium of the vector field; for a map without a field they are random.
         """
         eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
@@ -116,7 +116,7 @@ class Pictures:
         return self.draw("portrait", caption, f"Portrait of orbits in {axis_names}, {sentence}", drawing, remarks)
 
     def invariant_curves(self, file: SystemFile, eps: Any) -> str:
-        """Draw three orbits of a member of the family on their invariant cubics, with a panel for each plane."""
+        """Draw three orbits of a member of the family on their invariant cubics, in a panel for each plane."""
         eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
 

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
     from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 
-# Long enough for complete witnesses, which a reader can check.
+# The limits are large enough for complete witnesses, which a reader can then check.
 _LIMITS = checks.DisplayLimits(CHARACTERS, CHARACTERS, CHARACTERS, 100)
-_MAX_RELATION = 4_000  # maximal length of a relation that is typeset as a formula
+_MAX_RELATION = 4_000  # maximal number of characters of a relation that is typeset as a formula
 _PAPER = "petrera-suris-2016"
 _LEGEND = (
     "Proved: exactly, for every eps or the one that is named. Supported: held at random points over GF(p), with a "
@@ -56,24 +56,24 @@ def report_html(
     explore: bool = False,
     certificate: str = "",
 ) -> str:
-    """Return an HTML page with results, which needs no network, and no JavaScript unless `explore` is true.
+    """Return an HTML page with results; it needs no network, and JavaScript only if `explore` is true.
 
     Args:
         results: an `Analysis`, the `Report` of `verify` or of a check, or several reports on checks of one system.
-        file: the system of the reports, for its equations and pictures; an Analysis contains its system.
-        title: the title (default: the name of the system).
-        pictures: whether to draw pictures; without matplotlib a note says how to install it.
-        command: the command line that creates the page, printed on the page.
-        left_out: sentences on omitted results, printed as notes.
-        certificate: the path of a file that `certificate` wrote, relative to the page; the page links to it.
-        explore: for an Analysis, add sliders for eps and the initial point of an orbit instead of the results.
+        file: the system of the reports, whose equations and pictures are shown; an Analysis contains its system.
+        title: the title of the page (default: the name of the system).
+        pictures: whether to draw pictures; if matplotlib is missing, a note says how to install it.
+        command: the command line that creates the page; it is printed on the page.
+        left_out: sentences on results that were omitted, printed as notes.
+        certificate: the path, relative to the page, of a file that `certificate` wrote; the page links to it.
+        explore: for an Analysis: show an orbit with sliders for eps and the initial point instead of the results.
 
     Returns:
-        The page; its text depends only on the input and the versions of the libraries. Formulas are exact;
-        formulas of more than about 6000 characters are truncated, with a note.
+        The text of the page, which depends only on the input and the versions of the libraries. Formulas are exact;
+        those of more than about 6000 characters are truncated, with a note.
 
     Raises:
-        InputError: for other types, for no reports, and if the extra [report] is not installed.
+        InputError: for results of another type, for no reports, and if the packages of the extra [report] are missing.
 
     >>> from kahanmaps.checks.conserve import check_integrals
     >>> from kahanmaps.documents.catalog import load
@@ -132,16 +132,16 @@ def report(
     pictures: bool = True,
     explore: bool = False,
 ) -> str:
-    """Return the HTML page about a system or about results, and write it to `path` if a path is given.
+    """Return the HTML page about a system or about results; write it to `path` if a path is given.
 
     Args:
-        system: a system, which is analyzed with `eps` (or `time_step`, `h`), `effort` and `seed` as by `analyze`, or
-            results as for `report_html`.
-        path: the path of the file, which is replaced atomically.
+        system: a system, which is analyzed with `eps` (or `time_step`, `h`), `effort` and `seed` as `analyze` does, or
+            results that `report_html` accepts.
+        path: the path of the HTML file, which is replaced atomically.
         title, pictures, explore: see `report_html`.
 
     Returns:
-        The page. Raises InputError as `analyze` and `report_html` do.
+        The text of the page. Raises InputError as `analyze` and `report_html` do.
     """
     results: Any = system
     if not isinstance(results, Analysis | Report | list | tuple):
@@ -153,16 +153,16 @@ def report(
 
 
 def write_report(path: str | Path, results: Any, **options: Any) -> None:
-    """Write the page of `report_html` atomically to a file; `options` are options of `report_html`."""
+    """Write the page of `report_html` atomically to a file; `options` are further arguments of `report_html`."""
     write_atomically(Path(path), report_html(results, **options).encode())
 
 
 def _title(file: SystemFile) -> str:
-    """Return the title from the catalogue or, for other files, the label (the name, or short equations)."""
+    """Return the title of a catalogue file, or the label of any other file (its name, or short equations)."""
     return str(file.catalog.get("title", "")) or file.label
 
 
-# -- the page of an analysis: the verdict first, then the results with their certainty
+# -- the page of an analysis: the verdict, then the results with their certainty
 
 
 def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
@@ -178,7 +178,7 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
     growth, survey, label = analysis.degrees, analysis.heights, file.label
     for name, lines in analysis.sections:
         statements = [(Html(markup.verdict(line.status)), formulas.get(line.text, line.text)) for line in lines]
-        # The pictures and folded tables that follow the statements.
+        # Pictures and folded tables, which follow the statements of a section.
         figures: list[str] = []
         folded: list[tuple[str, Html]] = []
         for run in analysis.singularities if name == "singularities" else ():
@@ -201,7 +201,7 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
         title = name[0].upper() + name[1:]
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
-    is_member = isinstance(file.normal_form, SystemNormalForm)  # a member in the coordinates of the system
+    is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates of the system
     picture = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
     return [*sections, Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
 
@@ -234,7 +234,7 @@ def _catalogue_section(file: SystemFile) -> Section:
 
 
 def formulas_of(analysis: Analysis) -> dict[str, Html]:
-    """Return a dict from statements in `analysis.sections` that are formulas to their HTML."""
+    """Return a dict from those statements in `analysis.sections` that are formulas to their HTML."""
     html_by_text: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
@@ -272,7 +272,7 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
 
 
 def _relation_html(relation: SparseRelation, names: tuple[str, ...]) -> str:
-    """Return P = 0 as HTML with terms in the order of the relation's text; empty if it is unparsable or too long."""
+    """Return the relation P = 0 as HTML with the terms in the order of its text; "" if it is unparsable or too long."""
     if len(relation.text) > _MAX_RELATION:
         return ""
     text = ""
@@ -288,7 +288,7 @@ def _relation_html(relation: SparseRelation, names: tuple[str, ...]) -> str:
     return typeset(f"{text} = 0")
 
 
-# -- the page of claims: the paper's claims by section, or the claims of checks of one system
+# -- the page of claims: of the paper, by section, or of checks of one system
 
 
 def _claims_sections(
@@ -326,9 +326,9 @@ def _claims_sections(
 
 
 def _claim_data(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
-    """Return the data of a line that unfolds to its evidence; it is open if the claim is refuted unexpectedly.
+    """Return the data of a claim: a line that unfolds to its evidence, open if the claim is refuted and no control.
 
-    `ids` counts the keys on the page, to make ids unique: a claim and its controls have the same key.
+    `ids` counts how often a key occurs on the page, so that ids are unique: a claim and its controls share a key.
     """
     name = ""
     if key := finding.place.get("key"):

@@ -99,7 +99,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
 
 class _ReportPrinter:
-    """Prints each section of the report as soon as it is final; `is_silent` (other output formats) turns it off."""
+    """Print each section of the report as soon as it is final; print nothing if `is_silent` (for JSON or Markdown)."""
 
     def __init__(self, is_silent: bool) -> None:
         self.result: lib.Analysis | None = None

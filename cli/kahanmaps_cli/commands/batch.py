@@ -142,12 +142,12 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 
 
 def _print_dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
-    """Print the tasks that a run of the spec would start."""
+    """Print the tasks of a spec file, and how many of them have no result yet; run nothing."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
     experiments = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     missing = None
-    if os.path.exists(db):  # a dry run opens it read-only
+    if os.path.exists(db):  # a dry run must not change the database
         with lib.Store.open(db, readonly=True) as store:
             finished_keys = {row.task.key for row in store.rows() if row.record is not None}
         missing = len({task.key for experiment in experiments for task in experiment.tasks()} - finished_keys)
@@ -195,7 +195,7 @@ def _print_dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
 
 
 def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
-    """Run the missing tasks; return the exit status."""
+    """Run the tasks without a result and return the exit status; `path` is the spec, None to resume a database."""
     limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
     spec = None if path is None else lib.read_spec(path, **limits)
     experiments = () if spec is None else spec.experiments
@@ -231,12 +231,12 @@ def _run_tasks(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 batch, is_announced = lib.Batch(jobs, executor), False
                 with interruptible(batch.interrupt):
                     for records in batch:
-                        if batch.was_interrupted and not is_announced:  # the handler may interrupt a line
+                        if batch.was_interrupted and not is_announced:  # not by the handler, which might split a line
                             is_announced = True
                             if executor.in_flight:
                                 running = _count_text(executor.in_flight)
                                 progress.print(f"finishing {running} in flight (Ctrl-C again ends at once)")
-                        if records:  # store them before the next job is submitted
+                        if records:  # store the records before the next job is submitted
                             store.add(records)
                         progress.add(records, executor.in_flight)
                         for record in records if options["as_jsonl"] else ():
@@ -282,13 +282,13 @@ def _count_text(number: int) -> str:
 
 
 class BatchProgress(Progress):
-    """Progress of a batch; `expected_count` is the expected number of records."""
+    """Progress of a batch run; `expected_count` is the number of tasks to run."""
 
     def __init__(self, expected_count: int, quiet: bool) -> None:
         super().__init__(quiet)
         self.expected_count = expected_count
         self.outcomes: Counter[str] = Counter()
-        self.last_loss = ""  # message of the task that was lost last
+        self.last_loss = ""  # the message of the most recently lost task
         self._begin = time.monotonic()
 
     @property
@@ -298,16 +298,16 @@ class BatchProgress(Progress):
 
     @property
     def lost(self) -> int:
-        """The number of lost tasks, which have no result."""
+        """The number of lost tasks: they have no result, since their worker process was killed or did not start."""
         return self.outcomes["lost"]
 
     @property
     def seconds(self) -> float:
-        """Seconds since the start."""
+        """Seconds since the progress object was created."""
         return time.monotonic() - self._begin
 
     def add(self, records: Sequence[lib.Record], in_flight: int) -> None:
-        """Count new records (there may be none), and show the number of running tasks."""
+        """Count the new `records` (possibly none) and show progress; `in_flight` is the number of running tasks."""
         for record in records:
             self.outcomes[str(record.outcome)] += 1
             if record.outcome == "lost":
@@ -321,7 +321,7 @@ class BatchProgress(Progress):
         self(", ".join([*phrases, *(f"{count} {word}" for word, count in counts.items() if count)]))
 
     def print(self, text: str) -> None:
-        """Print a message on its own line."""
+        """Print a message on a line of its own, unless `quiet`."""
         if not self.quiet:
             self.clear()
             print_stderr(text)

@@ -24,7 +24,7 @@ _EXIT_STATUSES = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage er
 
 
 def command(name: str) -> click.Command:
-    """Return the command of a check."""
+    """Return the command for the check called `name`."""
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
@@ -103,9 +103,9 @@ def command(name: str) -> click.Command:
 
 
 class _PairCommand(click.Command):
-    """A command with an argument SYSTEM and an inline system: f is the system that is typed first, g the other one.
+    """A command with an argument SYSTEM and an inline system: f is whichever is typed first, g the other one.
 
-    click processes arguments after all options, so this class determines the order.
+    click processes arguments after all options, so its own parsing does not tell which of the two was typed first.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -118,10 +118,10 @@ class _PairCommand(click.Command):
 
 
 def _name_claims(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
-    """Return the claims given by --integral as pairs (name, text), all of them named, without the word "known".
+    """Return the pairs (name, text) of --integral with every name filled in, and without the request "known".
 
-    An integral of the file has its name in the file. Other claims without a name are called I1, I2, ..., skipping names
-    in use.
+    A claim whose text is the name of an integral of the file gets this name. Any other claim without a name gets the
+    first unused name among I1, I2, ...
     """
     file_integrals = {**file.integrals, **file.integrals_in_iterates}
     claims = [(name or text if text in file_integrals else name, text) for name, text in claims]

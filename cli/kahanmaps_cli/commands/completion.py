@@ -37,7 +37,7 @@ def command(shell: str | None) -> None:
     if completion is None:
         raise click.UsageError(f"found the shell {name[:40]!r}, expected one of {', '.join(_SHELLS)}: give it as SHELL")
     script = completion(cli, {}, "kahanmaps", COMPLETION).source()
-    if name == "bash":  # no blank after a folder or NAME=: the user continues the word
+    if name == "bash":  # type no blank after a folder or after NAME=, since the user continues this word
         offer = "COMPREPLY+=($value)"
         script = script.replace(offer, f"{offer}\n            [[ $value == *[/=] ]] && compopt -o nospace 2>/dev/null")
     click.echo(script)

@@ -60,7 +60,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
-    # The command that reproduces the file, without the option -o.
+    # The command that reproduces the converted text, without the option -o.
     command_words = ["kahanmaps", "convert", *([system] if system is not None else [])]
     command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
     command_words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
@@ -73,7 +73,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
 
 
 def write_text(text: str, title: str, output: str | None, quiet: bool) -> None:
-    """Write a text to standard output, or to a file with a line on standard error; `title` is the kind of text."""
+    """Write a text to standard output, or to a file and report it on standard error; `title` describes the text."""
     if output is None or output == "-":
         click.echo(text, nl=False)
         return

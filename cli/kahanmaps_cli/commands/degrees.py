@@ -14,7 +14,7 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-_MAX_DEGREES_SHOWN = 8  # maximal number of degrees in a line of a table
+_MAX_DEGREES_SHOWN = 8  # maximal number of degrees in one line of a table over parameter values
 
 
 # These options are shared with `plot degrees`.
@@ -116,7 +116,7 @@ def measure(
 
 
 def is_done(growth: lib.DegreeGrowth, terms: int | None) -> bool:
-    """Whether the request is fulfilled: `terms` degrees are measured or, if `terms` is None, a recurrence is found."""
+    """Whether the requested result is complete: `terms` degrees, or if `terms` is None, degrees with a recurrence."""
     if growth.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and (growth.proof is not None or growth.recurrence is not None)

@@ -19,10 +19,10 @@ from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # maximal number of steps: more would take years
-FAILURES_SHOWN = 20  # number of orbits that ended early and are listed in the output
-_MIN_COMPILED_WORK = 5_000_000  # orbits times steps; for less, numpy is faster than loading and compiling code
-_MAX_SAMPLES = 100  # steps at which integrals are evaluated, unless --every is given
-_MAX_VALUES = 200_000  # maximal number of values of integrals
+FAILURES_SHOWN = 20  # maximal number of orbits that ended early and are listed in the output
+_MIN_COMPILED_WORK = 5_000_000  # orbits times steps: for less work, numpy is faster than loading and compiling code
+_MAX_SAMPLES = 100  # maximal number of steps at which integrals are evaluated, unless --every is given
+_MAX_VALUES = 200_000  # maximal number of sampled values of an integral, over all orbits
 
 
 @click.command("ensemble")
@@ -72,12 +72,12 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     eps_value = lib.rational(1) if eps is None else eps
     requests = [pair for pair in options["integrals"] if pair != ("", "known")]
     claims: dict[str, Any] = lib.functions_along(file, requests, in_floats=True)
-    integrals: dict[str, Any] = {  # also for --backward: the inverse map has the same integrals
+    integrals: dict[str, Any] = {  # these are also integrals of the inverse map (--backward)
         name: lib.PointFunction(name, claim.function, eps_value) for name, claim in claims.items()
     }
     if len(requests) < len(options["integrals"]):
         integrals |= {function.name: function for function in lib.known_functions(file.real_approximation, eps_value)}
-    file.map.at(eps_value)  # raises the same errors for eps as the command orbit
+    file.map.at(eps_value)  # raises the errors of the command orbit for an invalid eps
     starts = requested_starts(file, options)
     normal_form = lib.float_normal_form(file, options["method"])
     if isinstance(normal_form, lib.NoNormalForm) and options["method"] == "normal-form":
@@ -100,7 +100,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if verbose and not quiet:
         reason = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         print_stderr(f"method {method}: {reason}; kernel {ensemble.kernel}")
-    # Integrals are evaluated also if only the first and the last point are written.
+    # Integrals are evaluated at further steps if only the first and the last point are written.
     record_interval = every or max(1, steps)
     interval = record_interval
     if integrals and not every:
@@ -118,7 +118,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     near_orbits, near_at = near_singular.nonzero()[0].tolist(), ensemble.near_singular_at
     first_orbit = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
     first_near = None if first_orbit is None else {"orbit": first_orbit, "step": int(near_at[first_orbit])}
-    # The largest drift of each integral over the completed orbits.
+    # The largest drift of each integral over all completed orbits, and the index of the orbit that has it.
     completed_orbits = (ensemble.failed_at < 0).nonzero()[0]
     statistics = ensemble.statistics()
     drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed_orbits)} for drift in ensemble.drift]
@@ -186,7 +186,7 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
 
 
 def _print_results(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results: dict[str, Any]) -> None:
-    """Print tab-separated lines, aligned on a terminal."""
+    """Print the results as lines of tab-separated cells; on a terminal the cells are aligned."""
     print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
     rows = [("orbits", str(results["orbits"])), ("steps", str(results["steps_taken"])), ("kernel", kernel)]
     rows += [(status, str(number)) for status, number in results["counts"].items()]

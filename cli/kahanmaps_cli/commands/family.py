@@ -86,7 +86,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 
 def random_member_file(options: dict[str, Any]) -> lib.SystemFile:
-    """Return the random member given by the options as a system file; by default m = 3."""
+    """Return the random member given by the options as a system file; m = 3 unless an option determines m."""
     member_options = {name: options[name] for name in MEMBER_OPTIONS}
     if member_options["m"] is None and member_options["eigenvalues"] is None and member_options["chi"] is None:
         member_options["m"] = 3
@@ -380,7 +380,7 @@ def _get_member(system: str | None, parameters: Sequence[tuple[str, str]]) -> tu
 
 def _write_file(file: lib.SystemFile, output: str | None) -> None:
     text = file.to_toml()
-    lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError for an invalid file
+    lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError if the file would be invalid
     if output is None:
         click.echo(text, nl=False)
         return

@@ -107,13 +107,13 @@ def command(system: str | None, **options: Any) -> int:
 
 
 def require_heights(options: dict[str, Any]) -> None:
-    """Raise UsageError for options that contradict each other."""
+    """Raise UsageError for options of the height survey that contradict each other."""
     if options["count"] is not None and options["starts"]:
         raise click.UsageError("give --start X or --random N, not both")
 
 
 def survey_heights(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
-    """Run the survey with the given options."""
+    """Run the survey of heights of exact orbits with the given options."""
     return lib.height_survey(
         file.map,
         eps,

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 
 _MAX_STEPS = 10**9
-_DEFAULT_START_COUNT = 16  # number of random initial points
+_DEFAULT_START_COUNT = 16  # number of random initial points unless initial points are given
 
 
 @click.command("lyapunov")
@@ -86,7 +86,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, double precision")
         print_stdout(f"orbits\t{result.orbits - result.ended} of {result.orbits}")
-        if result.stopped and not result.steps:  # over zero steps there is no mean, hence no exponent
+        if result.stopped and not result.steps:  # exponents are means over counted steps, and there are none
             print_stdout(f"steps\tnone counted: stopped in the transient, after {result.transient} of its steps")
         else:
             print_stdout(f"steps\t{result.steps} after {result.transient}")

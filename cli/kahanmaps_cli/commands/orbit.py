@@ -110,13 +110,13 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         else:
             start = start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
 
-    def stop() -> None:  # while the method is being chosen, no points exist that could be kept
+    def stop() -> None:  # while the method is chosen, the orbit has no points yet that could be written
         raise KeyboardInterrupt
 
     with interruptible(stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = {}
-        if options["integrals"]:  # this imports the checks
+        if options["integrals"]:  # imported only if needed: this call loads the checks
             functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         trajectory = lib.orbit(
             map_,
@@ -136,7 +136,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     is_table = on_terminal and form == "text"
     destination: Any = sys.stdout if output is None else output
     if is_table:
-        from kahanmaps_cli.screen.orbit_table import OrbitTable  # this import loads the library
+        from kahanmaps_cli.screen.orbit_table import OrbitTable  # imported here: this import loads the library
 
         destination = OrbitTable(destination, file.variables, list(functions))
     last_step = trajectory.header()["steps"]

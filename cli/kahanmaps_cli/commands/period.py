@@ -74,7 +74,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(f"{no_period}: {normal_form.reason}. {_ORBIT_HINT}")
     eps = requested_eps(options["eps"], options["time_step"])
-    # Check eps, prime and initial point as `orbit` does, with the same messages.
+    # Raise the errors that `orbit` raises for an invalid eps, prime or initial point.
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
     if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(
@@ -89,7 +89,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     result = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = result.text.splitlines()[0], _EXIT_STATUS.get(result.status, 3)
     if as_json:
-        # Numbers are written as text: many JSON readers cannot represent long periods exactly.
+        # Integers are written as strings: many JSON readers cannot represent long periods exactly.
         planes = [
             {
                 **lib.attributes(plane, "name", "status", "meets_pole", "reason"),
@@ -123,7 +123,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
-    """Print the levels on which all orbits have the period --levels, also in the planes of a system if one is given."""
+    """Print the levels on which all orbits have the period --levels; for a given system, also those in each plane."""
     levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {
         **envelope("period levels"),
@@ -166,6 +166,6 @@ def _print_levels(system: str | None, as_json: bool, options: dict[str, Any]) ->
         for square in plane["squares"]:
             remark = ", no real level" if square[0] == "-" else ""
             print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{remark}")
-        if plane["disc"] == "0":  # then gamma = 1, which is a root of no psi_N
+        if plane["disc"] == "0":  # then gamma = 1 on every level, and no psi_N has the root 1
             print_stdout("level\tnone, except perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

@@ -86,7 +86,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     is_named, is_random = _require_consistent(system, options)
     refuse_certificate_with_eps(options)
-    lib.page_template()  # raises InputError for a missing package before the computation
+    lib.page_template()  # raises InputError before the computation if the package for HTML pages is missing
     page_options = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:
         if options["source"] == "analyze":
@@ -108,7 +108,7 @@ def command(system: str | None, **options: Any) -> int:
                 html = lib.report_html(results[-1], **{**page_options, "pictures": False}, left_out=[search.ending])
             status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
-            # Without SYSTEM, verify and the options of a random member need a member of the family.
+            # Without SYSTEM, --from verify and the options of a random member refer to a random member of the family.
             needs_random_member = not is_named and (is_random or options["source"] == "verify")
             file = random_member_file(options) if needs_random_member else opt.load_system(system, options)
             eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
@@ -138,7 +138,7 @@ def command(system: str | None, **options: Any) -> int:
 
 
 def _write_certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
-    """Write the certificate of all claims if requested; return its path relative to the page, "" if not requested."""
+    """Write the certificate of all claims if requested; return its path relative to the page, else an empty text."""
     path, page = options["certificate"], options["output"]
     if write_certificate(options, file.name, lambda checker: lib.certificate(file, checker, everything=True)):
         return ""
@@ -146,7 +146,7 @@ def _write_certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:
-    """Return two flags: a system is given; a random member is requested. Refuse contradictory options."""
+    """Return whether a system is given, and whether a random member is requested; refuse contradictory options."""
     context = click.get_current_context()
     names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
     typed_options = [

@@ -83,13 +83,13 @@ def _summary(file: Any) -> dict[str, Any]:
 
 
 def _structured_facts(file: Any) -> dict[str, Any]:
-    """Return a dict of the structured facts; the value is None for a fact that the file does not state."""
+    """Return a dict from the names of structured facts to their values; a fact that the file does not state is None."""
     return {key: file.document.get("catalog", {}).get(key) for key in lib.FACT_KEYS}
 
 
 def _latex(file: Any) -> str:
     names = [lib.latex_name(name) for name in file.variables]
-    if isinstance(file.map, lib.KahanFamily):  # an adjusted discretization has eps in its coefficients
+    if isinstance(file.map, lib.KahanFamily):  # `file.system` would refuse eps in coefficients
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
         rows = [
@@ -116,7 +116,7 @@ def _print_system(file: Any) -> None:
         print_stdout(abbreviated(line))
     if file.hamiltonian is not None:
         print_stdout(f"H = {abbreviated(lib.format_polynomial(file.hamiltonian.H))}")
-    claim_word = "" if file.catalog else "claimed "  # integrals of the catalogue are verified by tests
+    claim_word = "" if file.catalog else "claimed "  # tests verify the integrals that a catalogue file states
     for name, integral in file.integrals.items():
         print_stdout(f"{claim_word}integral {name} = {abbreviated(lib.format_factored(integral))}")
     if file.density is not None:

@@ -216,7 +216,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
             print_stdout(_LEGEND[method])
-    # Both the evidence for the verdict and further evidence.
+    # `evidence` decided the verdict of a finding; `also` is its further evidence.
     all_evidence = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(e.data["error_bound"])[3:]) for e in all_evidence if "error_bound" in e.data]
     if bounds:

@@ -1,1 +1,1 @@
-"""The subcommands of `kahanmaps plot`, one file each, and what they share (output.py)."""
+"""The subcommands of `kahanmaps plot`, one file for each, and the code that they share (output.py)."""

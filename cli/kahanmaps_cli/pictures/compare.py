@@ -11,7 +11,7 @@ from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.runs.comparison import comparison_options, early_messages, requested_comparison
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_START_CHARACTERS = 160  # maximal number of characters of a printed initial point
+_MAX_START_CHARACTERS = 160  # maximal number of characters of an initial point in a message
 
 
 @picture(
@@ -52,7 +52,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     is_drift = options["show"] == "drift"
     settings = {"orders": not is_drift, "linear_bins": options["scale"] == "semilog"}
     if not is_drift and not options["integrals"]:
-        settings["integrals"] = ()  # no integrals, so that no search is started
+        settings["integrals"] = ()  # no integrals, so that no search for integrals is started
     result = requested_comparison(options, progress, **settings)
     figure = lib.plot_comparison(result, options["style"], show=options["show"], scale=options["scale"])
     start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START_CHARACTERS]

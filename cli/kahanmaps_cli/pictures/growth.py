@@ -17,8 +17,8 @@ from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
-_MAX_BYTES = 64_000_000  # maximal size of a file of --from
-# Statuses of OrbitEnd that count as early ends; a digit limit and a periodic orbit are normal ends.
+_MAX_BYTES = 64_000_000  # maximal size of a file given by --from
+# The statuses of OrbitEnd that the command reports as early ends; a digit limit and a periodic orbit are normal ends.
 _EARLY_STATUSES = ("singular",)
 
 _scale_option = click.option(
@@ -60,7 +60,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     growths: dict[str, lib.DegreeGrowth] = {}
 
     def add(name: str, growth: lib.DegreeGrowth) -> None:
-        """Add a result; a second result of the same name is called name (2)."""
+        """Add the degrees of the system `name`; a second result of the same name is called "name (2)"."""
         names = chain([name], (f"{name} ({k})" for k in count(2)))
         growths[next(unused for unused in names if unused not in growths)] = growth
 
@@ -156,7 +156,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
 
 
 def read_record(path: str) -> Any:
-    """Return the JSON object in a file, `-` for standard input. Raises InputError if the file contains no object."""
+    """Return the JSON object in a file, or in standard input for `-`. Raises InputError if there is no JSON object."""
     try:
         with click.open_file(path, "rb") as file:
             content = file.read(_MAX_BYTES + 1)

@@ -27,7 +27,7 @@ _ARGUMENTS = "kahanmaps_cli.arguments"
 
 
 def _read_size(text: str) -> tuple[float, float | None]:
-    """Parse WIDTH or WIDTHxHEIGHT in centimeters."""
+    """Parse a size WIDTH or WIDTHxHEIGHT, in centimeters."""
     match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(?:x([0-9]+(?:\.[0-9]+)?))?", text.strip(), re.ASCII)
     if match is None:
         raise lib.InputError(f"found {text[:60]!r}, expected WIDTH or WIDTHxHEIGHT in cm, as 12 or 12x9")
@@ -36,7 +36,7 @@ def _read_size(text: str) -> tuple[float, float | None]:
 
 
 class PictureCommand(click.Command):
-    """A command that stores its arguments, as metadata for the picture."""
+    """A command that stores the words of its command line, which become metadata of the picture."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         ctx.meta[_ARGUMENTS] = list(args)
@@ -74,7 +74,7 @@ picture_options: Callable[[F], F] = stack(
 class Drawing:
     """The result of a plot command: the figure, or None if there is nothing to draw.
 
-    `file` is the system for the metadata, `messages` are printed on standard error, `status` is the exit status.
+    The picture stores the system `file`; the `messages` go to standard error, and `status` is the exit status.
     """
 
     figure: Figure | None
@@ -87,9 +87,9 @@ Draw = Callable[[dict[str, Any], SearchProgress], Drawing]
 
 
 def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
-    """Make the decorated function the command `kahanmaps plot NAME`, with `options` and the common picture options.
+    """Make the decorated function the command `kahanmaps plot NAME`, with its own `options` and those of all pictures.
 
-    The function gets the values of the options, with the requested `Style` as "style", and returns a `Drawing`.
+    The function gets a dict of option values, "style" being a `Style`, and the progress; it returns a `Drawing`.
     """
 
     def decorate(draw: Draw) -> click.Command:
@@ -136,7 +136,7 @@ def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
 
 
 def window_from(options: dict[str, Any], axes: int) -> lib.Window | None:
-    """Return the window requested by --window for `axes` axes; None without --window."""
+    """Return the window of --window for a picture with `axes` axes; None if the option is not given."""
     return None if options["window"] is None else lib.require_window(lib.to_floats(options["window"]).tolist(), axes)
 
 
@@ -155,7 +155,7 @@ def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> 
 
 
 def command_line() -> str:
-    """Return the current PictureCommand as it would be typed in a shell."""
+    """Return the command line of the running PictureCommand as it would be typed in a shell."""
     context = click.get_current_context()
-    words = context.command_path.split()[1:]  # the first word is the name of the program file
+    words = context.command_path.split()[1:]  # the first word is the name of the program file, not "kahanmaps"
     return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])

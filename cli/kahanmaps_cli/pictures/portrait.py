@@ -16,7 +16,7 @@ from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kin
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
-# Orbits in one variable are drawn against the step number, and only their beginning is of interest.
+# Orbits in one variable are plotted against the step number; a hundred steps suffice to see their beginning.
 _DEFAULT_STEPS, _DEFAULT_STEPS_IN_ONE_VARIABLE = 1000, 100
 
 
@@ -89,7 +89,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     _require_consistent(options)
     file = opt.load_system(options["system"], options)
     eps = opt.eps_of(file, options)
-    file.map.at(lib.rational(1) if eps is None else eps)  # raises the same errors for an invalid eps as other commands
+    file.map.at(lib.rational(1) if eps is None else eps)  # raises the errors of other commands for an invalid eps
     notes: list[str] = []
     field = lib.field_of(file)
     starts = initial_points(file, field, eps, options)
@@ -113,7 +113,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
             notes.append(f"axes {', '.join(axis_names)}: the projection with the largest spread (--axes chooses)")
     euler = None
     if options["euler"]:
-        # `file.system` raises InputError if there is no quadratic vector field.
+        # `file.system` raises InputError for a map that is no Kahan map of a quadratic vector field.
         arguments = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
         euler = lib.follow_orbits(lib.MethodEnsemble(*arguments, kernel="numpy"), steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
@@ -124,7 +124,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
     if field is not None:
         flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], portrait.window)
-        if options["levels"] or options["euler"]:  # arrows would be invisible between gray lines
+        if options["levels"] or options["euler"]:  # arrows of the field would be invisible between gray lines
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
             flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, orbits, options["backward"]))
@@ -170,7 +170,7 @@ def _require_consistent(options: dict[str, Any]) -> None:
 
 
 def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:
-    """Return the requested initial points, or automatic ones around an equilibrium of the field."""
+    """Return the initial points given by the options; by default choose them around an equilibrium of `field`."""
     if require_one_kind_of_starts(options) is not None:
         return requested_starts(file, options)
     if field is None:
@@ -187,7 +187,7 @@ def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps:
 def _requested_axes(
     file: lib.SystemFile, eps: Any, options: dict[str, Any]
 ) -> tuple[lib.PointFunction | str, ...] | None:
-    """Return the requested axes, or the only possible axes; None if the points determine the axes."""
+    """Return the axes given by the options, or the only possible axes; None if the points of the orbits decide."""
     text, count = options["axes"], 3 if options["three_axes"] else 2
     if text is not None:
         texts = [axis_text.strip() for axis_text in text.split(",")]

@@ -1,1 +1,1 @@
-"""The work of longer commands between the parsing of options and the printing of results."""
+"""The code that long commands run after their options are parsed and before their results are printed."""

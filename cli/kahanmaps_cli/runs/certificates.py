@@ -1,4 +1,4 @@
-"""The option --certificate of checks and searches, which writes their proofs as a script for another program."""
+"""The option --certificate of checks and searches: it writes a script in which another program verifies the proofs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refuse_certificate_with_eps(options: dict[str, Any]) -> None:
 
 
 def write_certificate(options: dict[str, Any], name: str, write: Callable[[str], Any], status: int = 0) -> int:
-    """Write the certificate if requested; return `status`, or 3 instead of 0 if a requested certificate is missing."""
+    """Write the certificate if requested; return `status`, or 3 instead of 0 if no certificate could be written."""
     path = options["certificate"]
     if path is None:
         return status

@@ -1,4 +1,4 @@
-"""The options and the run that `compare` and `plot compare` share."""
+"""The options that `compare` and `plot compare` share, and the comparison that they request."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ comparison_options: Callable[[opt.F], opt.F] = opt.stack(
 
 
 def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **extra: Any) -> lib.Comparison:
-    """Run the comparison that is requested by the options of `comparison_options`."""
+    """Run the comparison that the options of `comparison_options` request; `extra` is passed on to `compare`."""
     starts_option = require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
     _ = file.real_approximation.system  # first refuse a map without a quadratic system
@@ -51,6 +51,6 @@ def requested_comparison(options: dict[str, Any], progress: Callable[[str], None
 
 
 def early_messages(result: lib.Comparison) -> list[str]:
-    """Return a sentence for each method with orbits that ended early."""
+    """Return a sentence for each method some of whose orbits ended early."""
     early_runs = [(lib.METHODS[run.method].title, run.early, len(run.ends)) for run in result.runs if run.early]
     return [f"{title} ended early in {len(ends)} of {n} orbits: {ends[0].message}" for title, ends, n in early_runs]

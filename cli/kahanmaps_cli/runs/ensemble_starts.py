@@ -1,7 +1,7 @@
-"""Initial points of many orbits: given, from a .npy file, from text with a point per line, on a grid, or random.
+"""Initial points of many orbits: typed, read from a .npy or a text file, on a grid or a line, or random.
 
-Text files contain integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line
-with names of variables assigns the columns to them.
+A text file has one point a line: integers, fractions p/q and decimals, separated by commas or blanks; # starts a
+comment. If the first line consists of the names of the variables, it assigns the columns to them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MAGIC = b"\x93NUMPY"
 
 
 def require_one_kind_of_starts(options: Mapping[str, Any], *, random_by_default: bool = False) -> str | None:
-    """Return the option that gives the initial points; None if there is none. Raises UsageError for several."""
+    """Return the name of the option that gives the initial points, or None; raise UsageError for several options."""
     sources = [name for name in ("start", "starts", "grid", "line", "count") if options.get(name) not in (None, ())]
     flags = ["--random" if name == "count" else f"--{name}" for name in sources]
     if len(sources) > 1:
@@ -69,7 +69,7 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
 
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
-    """Return the entries of a record that determine the initial points."""
+    """Return the JSON entries that determine the initial points; `orbits` is their number if they are random."""
     if options["start"]:
         points = [list(map(lib.format_number, x)) for x in options["start"]]
         return {"initial_points": {"points": points}, "seed": None}
@@ -81,9 +81,9 @@ def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
 
 
 def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
-    """Read initial points from a file, or standard input for "-", as an array (n, dim) of doubles.
+    """Read initial points from a file, or from standard input for "-", as an array (n, dim) of doubles.
 
-    Raises InputError with file and line of the first mistake.
+    Raises InputError that names the file and the line of the first mistake.
     """
     import numpy as np
 
@@ -91,7 +91,7 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
     if path == "-":
         data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
     else:
-        # Reading a pipe or a device may never end; but /dev/fd/63, which a shell passes for <(...), is allowed.
+        # Refuse a device or named pipe, which may never end; but accept /dev/fd/63, which a shell passes for <(...).
         mode = os.stat(path).st_mode
         is_of_shell = stat.S_ISFIFO(mode) and path.startswith(("/dev/fd/", "/dev/stdin"))
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
@@ -141,14 +141,14 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
 
 
 def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArray:
-    """Read the array of a .npy file without unpickling anything."""
+    """Read the array of a .npy file; pickled objects are refused, since unpickling may execute code."""
     import numpy as np
 
     if len(data) > MAX_NPY_BYTES:
         raise InputError(f"{where}: found more than {MAX_NPY_BYTES} bytes, expected fewer")
     try:
         rows = np.load(io.BytesIO(data), allow_pickle=False)
-    except Exception as error:  # numpy parses the header as Python, which may raise any error
+    except Exception as error:  # numpy evaluates the header as a Python literal, which may raise any exception
         message = [*str(error).splitlines(), type(error).__name__][0]
         raise InputError(f"{where}: found a .npy file that cannot be read: {message[:200]}") from None
     dtype, shape, dim = rows.dtype, rows.shape, len(variables)

@@ -1,4 +1,4 @@
-"""Options and execution of a scan, shared by `scan` and `plot scan`."""
+"""Options and execution of a scan of degree growth over parameters, shared by `scan` and `plot scan`."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ scan_options: Callable[[F], F] = opt.stack(
 
 
 def names_of(options: dict[str, Any]) -> list[str]:
-    """Return the parameters given by --over."""
+    """Return the names of the parameters given by --over."""
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
     repeated = next((name for name in names if names.count(name) > 1), None)
     if repeated is not None:
@@ -50,7 +50,7 @@ def names_of(options: dict[str, Any]) -> list[str]:
 
 
 def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, SearchProgress]:
-    """Run the scan of a command line; return the scan and its progress, which counts the work."""
+    """Run the scan that a command line requests; return its result and its progress, which counts the units of work."""
     names = names_of(options)
     if opt.is_inline(options, system):
         assigned_names = {"eps", *(name for name, _ in options["parameters"])}
@@ -70,8 +70,8 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
 
     def interrupt() -> None:
         if not has_begun.is_set():
-            # During the first ten seconds code may be compiled: there is no partial result then, and a callback of the
-            # compiler would swallow an exception.
+            # Code may still be compiled, for up to ten seconds: there is no partial result yet, and an exception in a
+            # callback of the compiler would be lost.
             os.write(2, b"interrupted\n")
             os._exit(INTERRUPTED)
         stop_requested.set()
@@ -90,7 +90,7 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
 
 
 def ending(result: lib.Scan, search: SearchProgress) -> int:
-    """Return the exit status, and print why the scan stopped early."""
+    """Print why the scan stopped early, if it did; return the exit status."""
     if search.is_over:
         return 3
     if result.ended == "complete":

@@ -18,7 +18,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def search_options(section: str) -> Callable[[F], F]:
-    """Return the options of a search; `section` is the section of a system file that --toml prints."""
+    """Return the options of a search; `section` is the section of a system file in which --toml prints the formulas."""
     return opt.stack(
         opt.eps_options,
         opt.symbolic_option,
@@ -32,14 +32,14 @@ def search_options(section: str) -> Callable[[F], F]:
 
 
 def require_one_form(options: dict[str, Any]) -> None:
-    """Refuse more than one of --toml, --latex and --json, and --certificate with --eps."""
+    """Refuse --certificate with --eps, and more than one of --toml, --latex and --json."""
     if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
         raise click.UsageError("give one of --toml, --latex and --json")
     refuse_certificate_with_eps(options)
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
-    """Return the names given by --symbolic, except eps, and the number eps (None if it is symbolic)."""
+    """Return a pair: the names given by --symbolic except eps, and the number eps (None if eps is symbolic)."""
     names = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
     eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     if eps is not None and "eps" in names:
@@ -48,13 +48,13 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """Return the keyword arguments of a search: symbols, eps, effort, seed, and the options with these `names`."""
+    """Return the keyword arguments of a search: symbols, eps, effort, seed, and the options called `names`."""
     symbols, eps = symbols_and_eps(options)
     return {"symbols": symbols, "eps": eps, **opt.pick(options, *names, "effort", "seed")}
 
 
 def scope(result: Any) -> str:
-    """Return the text after the name in a heading: the eps and symbols for which the formulas of a result hold."""
+    """Return the text that follows the name of the system in a heading: for which eps and symbols the formulas hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
     eps_text = lib.eps_suffix(result.eps, result.file.map)
@@ -62,7 +62,7 @@ def scope(result: Any) -> str:
 
 
 def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:
-    """Return the data for JSON that are needed to repeat a search, and the work of the search."""
+    """Return the JSON entries that are needed to repeat a search, and the number of units of work that it took."""
     return {
         **envelope(name),
         "system": result.file.name,
@@ -90,8 +90,8 @@ def print_search(
 ) -> None:
     """Print the result of a search as text, JSON, TOML or LaTeX, as requested.
 
-    Each of `formulas` is a triple: a name, an object with `text`, `verdict` and `evidence`, and its origin as text.
-    `last_line` is printed after the formulas.
+    Each of `formulas` is a triple: name, object with `text`, `verdict` and `evidence`, origin (a text). `last_line` is
+    printed after the formulas, in the text form only.
     """
     if options["as_json"]:
         print_json(record(name, result, search))
@@ -115,7 +115,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search, and on standard error what it leaves undecided; return the exit status."""
+    """Print the result of a search; print what remains undecided on standard error. Return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

@@ -1,4 +1,4 @@
-"""Orbits on a terminal: numbers are shortened so that each row of the table fits on a line."""
+"""Orbits on a terminal: numbers are shortened so that each row of the table fits on one line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MIN_BALL_WIDTH = 22  # minimal width of a column of balls: three digits and the
 
 
 class OrbitTable(Writer):
-    """Print points as rows of a table, or on narrow terminals one coordinate per line."""
+    """Print the points of an orbit as rows of a table; on a narrow terminal print each coordinate on its own line."""
 
     def header(self, header: dict[str, Any]) -> None:
         print_stdout(title(header))
@@ -23,7 +23,7 @@ class OrbitTable(Writer):
         self._width = columns()
         self._step_width = max(6, len(str(header["steps"])))
         self._cell_width = (self._width - self._step_width) // len(names) - 2
-        self._has_digits = False  # whether some counts of digits are shown without the word "digits"
+        self._has_digits = False  # whether some digit counts lack the word "digits"
         min_width = _MIN_BALL_WIDTH if header["arithmetic"].startswith("ball") else _MIN_WIDTH
         self._is_table = self._cell_width >= min_width
         if self._is_table:
@@ -50,7 +50,7 @@ class OrbitTable(Writer):
 
 
 def _decimal_forms(text: str) -> list[str]:
-    """Return decimal forms of a long rational number with digit counts of its two integers, the longest form first.
+    """Return decimal forms of a long rational number with the digit counts of numerator and denominator, longest first.
 
     >>> _decimal_forms("-133567234372186342562607635605/125821231910581795318152718151")
     ['-1.06156 (30/30 digits)', '-1.06156 (30/30)', '-1.06 (30/30)', '-1.06 (30)']
@@ -59,7 +59,7 @@ def _decimal_forms(text: str) -> list[str]:
     if match is None:
         return []
     sign, numerator, denominator = match[1], match[2], match[3] or "1"
-    # Python refuses to convert thousands of digits to an integer, and a double would overflow
+    # The leading 18 digits suffice; Python refuses to convert thousands of digits, and a double would overflow.
     value = int(numerator[:18]) / int(denominator[:18])
     power = len(numerator[18:]) - len(denominator[18:])
     mantissa, exponent = f"{value:.5e}".split("e")

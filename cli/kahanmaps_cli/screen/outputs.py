@@ -1,7 +1,7 @@
-"""Output files of commands: a file that cannot be written, or is also an input, is refused before the computation.
+"""Output files of commands: a file that is not writable, or is also an input, is refused before the computation.
 
-An audit hook of Python reports every file that a command opens for reading. Files are compared by device and inode, not
-by name, so that links are recognized.
+A Python audit hook records every file that a command opens for reading. Files are compared by device and inode
+instead of by name, so that links are recognized.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ Identity = tuple[int, int]
 
 
 class _Files:
-    """The files that a command has read, and the files that it will write, by device and inode."""
+    """The files that a command has read or will write, identified by device and inode."""
 
     def __init__(self) -> None:
         self.read: set[Identity] = set()
         self.written: dict[Identity, str] = {}
-        with suppress(OSError, ValueError, AttributeError):  # standard input is closed or missing
+        with suppress(OSError, ValueError, AttributeError):  # standard input may be closed or missing
             self.note(sys.stdin.fileno())
 
     def note(self, path: Any, is_written: bool = False) -> None:
@@ -55,7 +55,7 @@ class _Files:
 
 
 class OutputFile(click.Path):
-    """A file to write to (`-`: standard output); if `grows`, it is written in place, else replaced at the end."""
+    """A file to write to, `-` for standard output; it is written in place if `grows`, otherwise replaced atomically."""
 
     name = "file"
 
@@ -66,7 +66,7 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
-            # Check before the computation that the file can be written.
+            # Before the computation starts, refuse a file that is not writable.
             folder, target = lib.resolve_path(path).parent, Path(path)
             if not path or not folder.is_dir():
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
@@ -78,7 +78,7 @@ class OutputFile(click.Path):
 
 
 class OutputFolder(click.Path):
-    """A folder to write files to: call `will_write` for each file before the first file is written."""
+    """A folder for output files: the command calls `will_write` for every file before it writes the first one."""
 
     def __init__(self) -> None:
         super().__init__(file_okay=False)
@@ -86,10 +86,10 @@ class OutputFolder(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = super().convert(value, param, ctx)
         if ctx is not None:
-            _recorded_files(ctx)  # from now on the files that the command reads are recorded
+            _recorded_files(ctx)  # start to record the files that the command reads
         if ctx is None or ctx.resilient_parsing:
             return path
-        # Check before the computation that files can be written to the folder: create it, then remove it again.
+        # Before the computation, refuse a folder that is not writable: create it if it is missing, and remove it again.
         folder = Path(os.fsdecode(path))
         missing = [directory for directory in (folder, *folder.parents) if not directory.exists()]
         try:
@@ -104,12 +104,12 @@ class OutputFolder(click.Path):
 
 
 def file_name(name: str) -> str:
-    """Replace all characters that are unsafe in a file name."""
+    """Replace the characters of `name` that are unsafe in a file name by underscores."""
     return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
 
 
 def deliver(path: str, content: bytes) -> bool:
-    """Write to a file atomically, or to standard output for the path `-`; return True if the target was a file."""
+    """Write `content` to a file atomically, or to standard output for the path `-`; return whether it was a file."""
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
@@ -119,7 +119,7 @@ def deliver(path: str, content: bytes) -> bool:
 
 
 def will_write(path: str) -> None:
-    """Record a file that this command will write; refuse it if the command has read it."""
+    """Record a file that the running command will write; refuse it if the command has read it."""
     _recorded_files(click.get_current_context()).note(path, is_written=True)
 
 
@@ -131,10 +131,10 @@ def _recorded_files(context: click.Context) -> _Files:
     return files
 
 
-@cache  # install it only once: an audit hook cannot be removed
+@cache  # once per process, since an audit hook cannot be removed
 def _install_hook() -> None:
     def record(event: str, arguments: tuple[Any, ...]) -> None:
-        """Record every file that the running command opens for reading, including databases of results."""
+        """Record every file, including every database, that the running command opens for reading."""
         if event == "open" and (arguments[2] or 0) & os.O_ACCMODE == os.O_RDONLY and not isinstance(arguments[0], int):
             path = arguments[0]
         elif event == "sqlite3.connect":

@@ -23,9 +23,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import printable
 
-_MIN_TIMED_STEP = 16  # first step with an estimate: earlier steps are too fast to be timed
+_MIN_TIMED_STEP = 16  # first step with an estimate of the time left: earlier steps are too fast to be timed
 _MIN_SECONDS = 0.01  # shorter times cannot be measured reliably
-_MAX_LOG_GROWTH = 22.0  # logarithm of the growth of the time beyond which no number is printed
+_MAX_LOG_GROWTH = 22.0  # maximal log(total time / elapsed time) for which the time left is printed as a number
 
 
 def print_stderr(message: str) -> None:
@@ -48,9 +48,9 @@ def as_typed(words: Iterable[str]) -> str:
 
 
 class Progress:
-    """Show progress inside a `with` block, whose end clears the line. It may be called with sentences at any rate.
+    """Show the latest progress message during a `with` block; call the object with each message, as often as needed.
 
-    On a terminal a thread updates the elapsed time between two sentences, since a step may take minutes.
+    On a terminal a thread updates the elapsed time between two messages, since a step may take minutes.
     """
 
     def __init__(self, quiet: bool = False) -> None:
@@ -59,7 +59,7 @@ class Progress:
         self._start = self._latest = time.monotonic()
         self._shown_length = 0
         self._sentence = ""
-        self._lock = RLock()  # reentrant: a signal handler may print while the lock is held
+        self._lock = RLock()  # reentrant: a signal handler may print while the main program has acquired the lock
         self._has_ended = Event()
 
     def __call__(self, sentence: str) -> None:
@@ -76,7 +76,7 @@ class Progress:
             _write(text + "\n")
             return
         with self._lock:
-            try:  # cut the line: a line longer than the terminal cannot be redrawn
+            try:  # cut the line: a line longer than the terminal is wide could not be overwritten
                 width = max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
             except (OSError, ValueError):
                 width = 80
@@ -90,7 +90,7 @@ class Progress:
                 self._draw(time.monotonic())
 
     def clear(self) -> None:
-        """Clear the line on a terminal until the next sentence."""
+        """Clear the progress line on a terminal until the next message."""
         with self._lock:
             self._sentence = ""
             if self._shown_length:
@@ -110,35 +110,35 @@ class Progress:
 
 
 class SearchProgress(Progress):
-    """Progress of a search with a time limit (--seconds), which also counts its units of work.
+    """Progress of a search with a time limit (--seconds); it also counts the units of work of the search.
 
     `options` are the options of the command: "quiet" and, if the command has them, "effort" and "seconds"; `since` is
-    the time from which the limit is counted (default: now). When the limit expires, the search is abandoned, a message
-    names the current step, and the exit status is 3. If a function catches TimeLimit and returns a partial result, the
-    message is also printed, and `is_over` is true after the block.
+    the reading of time.monotonic() from which the limit is counted (default: the start of the block). When the limit
+    expires, TimeLimit interrupts the search, a message names the current step, and the exit status is 3. If a function
+    catches TimeLimit and returns a partial result, the message is printed too, and `is_over` is true after the block.
     """
 
     def __init__(self, options: Mapping[str, Any], since: float | None = None) -> None:
         super().__init__(options["quiet"])
-        self.work: dict[str, Any] = {}  # the effort and the units of work, set at the end of the block
-        self._was_over: bool | None = None  # set at the end of the block
+        self.work: dict[str, Any] = {}  # effort and units of work, set at the end of the block
+        self._was_over: bool | None = None  # the value of `is_over` at the end of the block
         self._effort, self._seconds, self._since = options.get("effort"), options.get("seconds"), since
 
     def __call__(self, sentence: str) -> None:
-        if self.is_over:  # after a partial result the caller may call other functions
+        if self.is_over:  # the function that returned a partial result may call others
             raise lib.TimeLimit
         super().__call__(sentence)
 
     @property
     def is_over(self) -> bool:
-        """Whether the time limit has expired; after the block, whether it had expired at its end."""
+        """Whether the time limit has expired; after the block, whether it had expired when the block ended."""
         if self._was_over is not None:
             return self._was_over
         return self._time_is_over()
 
     @property
     def ending(self) -> str:
-        """Return the message that the search was stopped, which names the step."""
+        """Return the message that the search was stopped by the time limit, with the current step."""
         return f"stopped after {self._seconds:g} s (--seconds){self._sentence and ': '}{self._sentence}"
 
     def __enter__(self) -> Self:
@@ -166,9 +166,9 @@ class SearchProgress(Progress):
 class TimeLeft:
     """Estimate the remaining time of steps that become more expensive.
 
-    The time of the first n steps is fitted by a power of n, from its values at about n/2 and n (quadratic growth of
-    heights gives an exponent between 3 and 4), or by an exponential if it grew by two fifths or more from each of
-    the last four calls to the next. The estimate is meant as a lower bound.
+    The time T(n) of the first n steps is modelled by a power of n through T at about n/2 and n (if heights grow
+    quadratically, the exponent is between 3 and 4), or by an exponential if at each of the last three calls the time
+    had grown by at least 40 percent since the previous call. The estimate is meant as a lower bound.
 
     >>> clock = iter([0.0, 1.0, 8.0])
     >>> left = TimeLeft(64, lambda: next(clock))
@@ -187,14 +187,14 @@ class TimeLeft:
         self._recent_steps: list[tuple[int, float]] = []
 
     def __call__(self, step: int) -> str:
-        """Return the estimate as text to append to a progress message; empty if it is too early for an estimate."""
+        """Return the estimate as text to append to a progress message; empty if no estimate is possible yet."""
         elapsed = self._clock() - self._start
         self._recent_steps = [*self._recent_steps[-3:], (step, elapsed)]
         if step >= 2 * self._latest[0] and step >= _MIN_TIMED_STEP:
             self._reference, self._latest = self._latest, (step, elapsed)
         if step >= self._steps:
             return ""
-        # `growth` is log(time of all steps / time of the steps up to this one).
+        # `growth` is log(T(all steps) / T(step)).
         (first, first_time), *later = self._recent_steps
         n, t = self._reference
         is_exponential = all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent_steps))

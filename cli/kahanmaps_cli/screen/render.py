@@ -25,12 +25,12 @@ CLAIMS_SHOWN = 40
 
 
 def envelope(command: str) -> dict[str, str]:
-    """Return the first keys of the JSON object of every command."""
+    """Return the first entries of the JSON object that every command prints: those that identify the command."""
     return {"command": command, "version": lib.__version__}
 
 
 def record_of(command: str, file: lib.SystemFile, arithmetic: str, **entries: Any) -> dict[str, Any]:
-    """Return the JSON object of a command for a system, with the system file."""
+    """Return the JSON object of a command for a system, which includes the content of the system file."""
     common = {"system": file.name, "convention": lib.convention(file.map), "arithmetic": arithmetic}
     return {**envelope(command), **common, **entries, "document": dict(file.document)}
 
@@ -43,7 +43,7 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(
     report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
 ) -> int:
-    """Print a report, and numbers `measured` in addition (if any); return the exit status for the verdict."""
+    """Print a report and, if given, the numbers `measured` along an orbit; return the exit status for the verdict."""
     if as_json:
         name = click.get_current_context().info_name or ""
         entries = {} if measured is None else {"measured": measured.to_json()}
@@ -63,7 +63,7 @@ def print_report(
 
 
 def exit_status(report: lib.Report) -> int:
-    """Return 0 if all claims hold, 1 if one is refuted, 3 if one is undecided or the requested orbit ended early."""
+    """Return 0 if all claims hold, 1 if one is refuted, otherwise 3: one is undecided or the orbit ended early."""
     if report.verdict is lib.Certainty.REFUTED:
         return 1
     if report.verdict is lib.Certainty.UNDECIDED or report.ended_early:
@@ -72,7 +72,7 @@ def exit_status(report: lib.Report) -> int:
 
 
 def verdict_style(finding: lib.Finding) -> str:
-    """Return the style of a verdict: red for an unexpected verdict, none for a control that is refuted as expected."""
+    """Return the style of a verdict: red if it is not the expected one, none for a control refuted as expected."""
     if not finding.is_as_expected:
         return "bold red"
     return "" if finding.control else VERDICT_COLORS[str(finding.verdict)]
@@ -81,7 +81,7 @@ def verdict_style(finding: lib.Finding) -> str:
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
     from rich.table import Table
 
-    # If there are many findings, print the first ones and all that are not proved.
+    # Of many findings, print the first ones and, further on, those that are controls or not proved.
     is_long = len(report.findings) > CLAIMS_SHOWN
     shown_findings = [
         f
@@ -112,7 +112,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     if len(shown_findings) < len(report.findings):
         print_stdout(f"{len(report.findings) - len(shown_findings)} more claims, all proved (--json has all)")
     if not verbose:
-        # The short table omits hypotheses, further evidence and witnesses.
+        # The table without -v omits hypotheses, further evidence and witnesses, which are printed here.
         hypotheses = list(dict.fromkeys(text for f in shown_findings for text in f.evidence.data.get("hypotheses", ())))
         if hypotheses:
             hidden_text = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
@@ -131,7 +131,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
 
 
 def json_number(value: Any) -> Any:
-    """Return a JSON number, the text inf, -inf or nan, or for a complex number the list of its two parts."""
+    """Return a real number for JSON (inf, -inf and nan as text), or the list of real and imaginary part."""
     number = complex(value)
     if isinstance(value, complex) or getattr(value, "dtype", None) == "complex128":
         return [lib.json_float(number.real), lib.json_float(number.imag)]

@@ -1,4 +1,4 @@
-"""Robust standard streams: closed streams are replaced, and a pipe without a reader is not an error."""
+"""Robust standard streams: a closed stream is replaced, and writing to a pipe without a reader is no error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class _Pipe(io.FileIO):
-    """A pipe that drops everything written after its reader (e.g. head) has closed it."""
+    """A pipe that discards everything written after its reader (such as head) has closed it."""
 
     is_read = True
 
@@ -25,7 +25,7 @@ class _Pipe(io.FileIO):
 
 
 class _NullOutput(io.FileIO):
-    """The null device in place of a closed standard output; it records that output was lost."""
+    """The null device in place of a closed standard output; `has_lost` records whether output was discarded."""
 
     has_lost = False
 
@@ -35,10 +35,10 @@ class _NullOutput(io.FileIO):
 
 
 def prepare_standard_streams() -> None:
-    """Replace closed streams by the null device, and make the exit status independent of a pipe's reader.
+    """Replace closed streams by the null device; let the exit status not depend on whether a pipe still has a reader.
 
-    If a stream stayed closed (`>&-`), the next opened file would have its file descriptor. Characters that the encoding
-    of a stream cannot represent are written as escapes.
+    Without the replacement, the next opened file would get the descriptor of the closed stream (`>&-`). Characters that
+    cannot be represented in the encoding of a stream are written as escape sequences.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -62,19 +62,19 @@ def prepare_standard_streams() -> None:
 
 
 def is_read() -> bool:
-    """Whether standard output still had a reader when a buffer was last written."""
+    """Whether standard output still had a reader when data were last written to it."""
     raw = _raw_output()
     return not isinstance(raw, _Pipe) or raw.is_read
 
 
 def output_was_lost() -> bool:
-    """Whether something was printed although standard output was closed from the beginning; flush it first."""
+    """Whether output was lost, since standard output was closed from the beginning; flush standard output first."""
     raw = _raw_output()
     return isinstance(raw, _NullOutput) and raw.has_lost
 
 
 def discard_unwritable_output() -> None:
-    """Discard buffered output that cannot be written: Python would try again at exit, and fail with status 120."""
+    """Discard buffered output that cannot be written: at exit Python would retry, fail, and return status 120."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

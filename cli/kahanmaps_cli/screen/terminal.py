@@ -1,7 +1,7 @@
 """Output on a terminal: colors, and lines broken at words with a hanging indent.
 
-In a pipe, lines are unbroken and contain tabs. Colors appear on a terminal, or as --color says; all information is also
-in the text. The colors are named ones that are legible on light and dark backgrounds: no yellow, blue or gray.
+In a pipe, lines are unbroken and contain tabs. Colors appear on a terminal, or as --color requests; they carry no
+information of their own. Yellow, blue and gray are illegible on some backgrounds, so they are not used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # Maximal number of characters of a number on a terminal.
 NUMBER_WIDTH = 40
-_LABEL_WIDTH = 12  # width of the first cell of a line
+_LABEL_WIDTH = 12  # width of the first cell of a line, its label
 _COLOR_CHOICES = {"auto": None, "always": True, "never": False}
 
 
@@ -34,14 +34,14 @@ def on_terminal() -> bool:
 
 
 def columns() -> int:
-    """The width of the terminal."""
-    from shutil import get_terminal_size  # loads four modules for compression
+    """The width of the terminal in characters, at least 20."""
+    from shutil import get_terminal_size  # imported here: shutil loads four modules for compression
 
     return max(20, get_terminal_size().columns)
 
 
 def is_colored() -> bool:
-    """Whether standard output is colored: by --color, NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, or on a terminal."""
+    """Whether output is colored: --color decides, then NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, then the terminal."""
     context = click.get_current_context(silent=True)
     if context is not None and context.color is not None:
         return context.color
@@ -62,7 +62,7 @@ def paint(text: str, style: str) -> str:
 
 
 def console() -> Console:
-    """Return a rich console that ignores markup, and writes no escape sequences if output is not colored."""
+    """Return a rich console that prints markup as it is, and writes no escape sequences unless output is colored."""
     from rich.console import Console
 
     colored = is_colored()
@@ -77,14 +77,14 @@ def console() -> Console:
 
 
 def abbreviated(text: str, width: int = 400) -> str:
-    """Return a formula, shortened if it is long and goes to a terminal; a pipe gets the complete formula."""
+    """Return a formula, shortened to `width` if standard output is a terminal; a pipe gets the complete formula."""
     return shorten(text, width) if on_terminal() else text
 
 
 def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
-    """Print lines of cells separated by tabs; on a terminal the first cell is a label before the other cells.
+    """Print lines of tab-separated cells; on a terminal the first cell of a line is a label, and long lines are broken.
 
-    Verdicts are colored, and lines that start with # are headings. `hang` is the width of the label.
+    Verdicts are colored, and lines that start with # are bold headings. `hang` is the width of the label.
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")
@@ -109,23 +109,23 @@ def print_raw(text: str, end: str = "\n") -> None:
 
 
 def styled(text: str, style: str = "") -> Text:
-    """Return text for a table of rich, with control characters escaped."""
+    """Return a text as a cell of a rich table, with control characters escaped."""
     from rich.text import Text
 
     return Text(printable(text), style=style)
 
 
 def print_entry(head: str, text: str, style: str = "") -> None:
-    """Print a list entry; all heads of the list have equal length. On a terminal continuation lines are indented."""
+    """Print an entry of a list whose heads have equal length; on a terminal its continuation lines are indented."""
     head, text = printable(head), printable(text)
     lines = _wrap(text, head, len(head)) if on_terminal() else head + text
     click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_colored())
 
 
 def print_table(rows: Sequence[Sequence[str]], text_count: int = 1) -> None:
-    """Print a table, with tabs unless on a terminal; the first `text_count` columns are text, the others numbers.
+    """Print a table, tab-separated unless on a terminal; the first `text_count` columns are text, the others numbers.
 
-    Tabs are also used if the terminal is too narrow for the numbers, since a broken number would look like two numbers.
+    It is also tab-separated on a terminal too narrow for the numbers: a broken number would look like two numbers.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     min_width = sum(min(width, 10) for width in widths[:text_count]) + sum(widths[text_count:]) + 3 * len(widths) + 1
@@ -145,7 +145,7 @@ def print_table(rows: Sequence[Sequence[str]], text_count: int = 1) -> None:
 
 
 def _wrap(text: str, first_label: str, hang: int) -> str:
-    """Break `first_label` and `text` at blanks into lines of the width of the terminal, with a hanging indent."""
+    """Break `first_label` and `text` into lines of the terminal's width; all but the first are indented by `hang`."""
     margins = {"initial_indent": first_label, "subsequent_indent": " " * hang}
     return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first_label  # type: ignore[arg-type]
 

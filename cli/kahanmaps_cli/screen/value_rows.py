@@ -1,4 +1,4 @@
-"""Tables over ranges of parameter values: -p a=-2..2 or -p a=-2..2:1/4, in all combinations."""
+"""Tables over ranges of parameters: -p a=-2..2 (step 1) or -p a=-2..2:1/4; several ranges are combined."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import print_stdout
 
-_MAX_ROWS = 10_000  # maximal number of combinations of values
+_MAX_ROWS = 10_000  # maximal number of combinations of parameter values
 
 Row = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The result for one combination of values: a line, a JSON record, a full display, a reason why it is undecided."""
+    """The result for one parameter combination: table line, JSON record, full display, why it is undecided (or "")."""
 
     line: str
     record: Callable[[], dict[str, Any]]
@@ -36,10 +36,10 @@ class Cell:
 def table(
     system: str | None, options: dict[str, Any], compute: Callable[[lib.SystemFile, SearchProgress], Cell]
 ) -> int:
-    """Print a line (with --json a record) for each combination of values; without ranges, print the full result.
+    """Print a line (or a JSON record) for each combination of parameter values; without ranges, print the full result.
 
-    An error at one combination is printed on standard error, and the table continues; if all combinations fail, the
-    error is raised. --seconds limits the total time. Returns the exit status.
+    An error for one combination is printed on standard error at the end; if all combinations fail, the first error is
+    raised. --seconds limits the total time. Returns the exit status.
     """
     quiet, begin = options["quiet"], time.monotonic()
     rows = rows_of(options["parameters"], system)
@@ -81,7 +81,7 @@ def table(
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
-    """Return pairs (name, value) for each combination (the last range varies fastest); None if there is no range."""
+    """Return a row of pairs (name, value) for each combination, the last range varying fastest; None without ranges."""
     if not any(lib.is_range(value) for _, value in parameters):
         return None
     if system == "-":

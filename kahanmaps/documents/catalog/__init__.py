@@ -1,7 +1,7 @@
-"""The catalogue of named systems: each is a TOML file in this folder with equations, known facts and sources.
+"""The catalogue of named systems: for each a TOML file in this folder with its equations, known facts and sources.
 
-The folder maps contains maps other than Kahan's. `load` finds systems and maps by name, and also generates systems such
-as lv(7,3) (documents/families.py).
+The subfolder maps contains maps that are not Kahan maps. `load` finds systems and maps by name. It also generates the
+members of families such as lv(7,3), see documents/families.py.
 
 >>> names()[:3]
 ('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
@@ -13,11 +13,11 @@ x3' = -3/2*x1*x2
 >>> top.catalog["title"]
 'Euler top'
 
-The files have the format of all system files; the name of a file is the name of its system. Each fact begins with its
-status: Proved (in the named source; without a source, by the stated argument or by tests/documents/test_catalog.py),
-Refuted (at a point), Measured (a finite computation modulo a prime, which is no proof), Classical, or Origin (how the
-file was made). Degrees, growth, verdict and relations are also given as structured data, see
-`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py recomputes them.
+A file has the format of all system files, and its name is the name of the system. Each fact begins with its status:
+Proved (in the source named; if none is named, by the argument stated or by tests/documents/test_catalog.py), Refuted
+(at a point), Measured (by a finite computation modulo a prime, which is no proof), Classical, or Origin (how the file
+was made). Degrees, growth, verdict and relations are also structured data (`kahanmaps.documents.structured_facts`);
+tests/laboratory/test_further_systems.py and tests/documents/test_catalog_maps.py recompute them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class UnknownSystem(InputError, KeyError):
-    """Raised if no system of the catalogue has the given name."""
+    """Raised if the catalogue has no system of a given name."""
 
 
 _ENDING = ".toml"
@@ -54,7 +54,7 @@ def names() -> tuple[str, ...]:
 
 
 def map_names() -> tuple[str, ...]:
-    """Return the names of all maps of the catalogue other than Kahan maps, in alphabetical order.
+    """Return the names of the maps in the catalogue that are not Kahan maps, in alphabetical order.
 
     >>> "lyness" in map_names()
     True
@@ -68,7 +68,7 @@ def _names_in(folder: Path) -> tuple[str, ...]:
 
 
 def text_of(name: str) -> bytes:
-    """Return the text of the file of a system or map of the catalogue. Raises KeyError for other names."""
+    """Return the content of the file of a system or map in the catalogue. Raises KeyError for any other name."""
     generated = family_member(name)
     if generated is not None:
         from kahanmaps.documents.toml_text import to_toml
@@ -82,7 +82,7 @@ def text_of(name: str) -> bytes:
 
 
 def titles() -> dict[str, tuple[int, str]]:
-    """Return a dict from the names of all systems, then of all maps, to dimension and title, without parsing the files.
+    """Return a dict {name: (dimension, title)} of all systems and then all maps; no file is parsed completely.
 
     >>> titles()["lorenz"]
     (3, 'Lorenz system')
@@ -100,7 +100,7 @@ def titles() -> dict[str, tuple[int, str]]:
 
 
 class Catalogue(Mapping[str, "SystemFile"]):
-    """The named systems and maps: a mapping from names to system files, each of which is read on first access.
+    """The named systems and maps: a mapping from names to system files, which are read when they are accessed.
 
     >>> catalogue = Catalogue()
     >>> "lorenz" in catalogue, catalogue["lorenz"].dim
@@ -143,17 +143,17 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
     """Load a system from the catalogue or from a TOML file.
 
     Args:
-        reference: a name of the catalogue (euler-top stands for euler_top), or a path: a `Path`, or text that ends in
-            .toml, contains a path separator or names an existing file. The catalogue takes precedence; write ./name for
-            a file with the same name.
+        reference: a name of the catalogue (euler-top stands for euler_top) or a path. A path is a `Path`, or a text
+            that ends in .toml, contains a path separator or names an existing file. A name of the catalogue takes
+            precedence over a file of the same name, which is given as ./name.
         parameters, values: exact numbers (int, Fraction, text such as "2/3") that replace default values of parameters.
 
     Returns:
         The system file.
 
     Raises:
-        InputError: for a name that is not in the catalogue, and for a file that cannot be read; SystemFileError, a
-            subclass, for a file with mistakes, for unknown parameters and inexact values.
+        InputError: for a name that is not in the catalogue, and for a file that cannot be read. SystemFileError, a
+            subclass: for a file with mistakes, for unknown parameters and for inexact values.
 
     >>> load("henon_heiles", {"c": "-6"}).parameters, load("henon_heiles", c=1).parameters
     ({'c': -6}, {'c': 1})
@@ -184,7 +184,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
             name = underscored
         if generated is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
-        has_ending = "." in reference and "(" not in reference  # a file extension, perhaps mistyped
+        has_ending = "." in reference and "(" not in reference  # the ending of a file name, perhaps mistyped
         has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)
         if not (has_ending or has_separator or os.path.exists(reference)):
             raise _unknown_system(reference)
@@ -192,14 +192,14 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 
 
 def _unknown_system(name: str) -> InputError:
-    if not name or len(name) > 60 or not name.isprintable():  # this cannot be the name of a system
+    if not name or len(name) > 60 or not name.isprintable():  # no system can have such a name
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_HINT}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())
     from difflib import get_close_matches
 
     similar_names = get_close_matches(normalized, known_names, 3)
-    # Then suggest names that contain the given text, e.g. "volterra".
+    # Suggest also the names that contain the given text: henon_heiles for "heiles".
     longer_names = [known for known in known_names if len(normalized) > 2 and normalized in known]
     similar_names = list(dict.fromkeys([*similar_names, *longer_names]))[:3]
     question = f", did you mean {' or '.join(similar_names)}?" if similar_names else ":"

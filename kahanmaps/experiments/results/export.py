@@ -1,21 +1,21 @@
-"""Export of results as JSON lines with all data, or as CSV and Parquet tables with one column for every entry.
+"""Export of results: JSON lines with all data, or a CSV or Parquet table with a column for every entry.
 
-JSON lines are lossless. In a table a dict becomes several columns (heights.max), a list becomes JSON text, and None or
-an absent entry becomes an empty cell. The columns of a table, in this order:
+JSON lines are lossless. In a table the entries of a dict are separate columns (heights.max), a list is a cell of JSON
+text, and None or an absent entry is an empty cell. A table has the following columns in this order:
 
     experiment number key task      always
     document m seed parameters.a    the entries of the system spec; entries of "family" without prefix
     eps steps                       options
-    outcome verdict                 always; a missing task has no outcome
+    outcome verdict                 always; empty for a task without a result
     dimension heights.max           entries of the result
     message                         always
     seconds peak_memory host finished   unless the export is stable
 
-If entries have the same name, one of them keeps it, in this order: fixed columns, options, system spec, result. The
-other entries are called option.seed, family.seed (system.document) or result.seed in all rows of the export.
+If several entries have the same name, the first of them in this order keeps it: fixed column, option, system spec,
+result. The names of the others get a prefix in all rows: option.seed, family.seed (system.document), result.seed.
 
-A stable export omits everything that depends on where, when and how the tasks were run, so that two exports of the same
-tasks have the same bytes.
+A stable export omits all that depends on where, when and how the tasks were run: two stable exports of the same tasks
+are equal byte by byte.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ from kahanmaps.version import __version__
 FIRST_COLUMNS = ("experiment", "number", "key", "task")
 MIDDLE_COLUMNS = ("outcome", "verdict")
 LAST_COLUMNS = ("message",)
-RUN_COLUMNS = ("seconds", "peak_memory", "host", "finished")  # a stable export omits these, and stderr and versions
+RUN_COLUMNS = ("seconds", "peak_memory", "host", "finished")  # omitted in a stable export, like stderr and versions
 _COLUMNS = (*FIRST_COLUMNS, *MIDDLE_COLUMNS, *LAST_COLUMNS, *RUN_COLUMNS)
 RESERVED = frozenset((*_COLUMNS, "system", "options", "result", "stderr", "versions"))
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
-_MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
-_MAX_ROWS = 10_000  # number of rows in one row group of Parquet
-_MAX_CHARACTERS = 50_000_000  # number of characters in one row group: rows with long lists may take gigabytes
+_MAX_DIGITS = 2_000  # maximal length of a text that may be recognized as a number
+_MAX_ROWS = 10_000  # maximal number of rows in one row group of a Parquet file
+_MAX_CHARACTERS = 50_000_000  # maximal number of characters in a row group: rows with long lists take much memory
 
 
-# The path of a value in a row: "option", "system" or "result", followed by keys.
+# The path of an entry of a row: "option", "system" or "result", followed by nested keys.
 Entry = tuple[str, ...]
 
 
 def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the path of keys and the value of each entry in nested dicts; a list is a single value.
+    """Yield (path of keys, value) for each entry of nested dicts; a list is one value.
 
     >>> list(flatten({"a": 1, "b": {"c": [2, 3]}}))
     [(('a',), 1), (('b', 'c'), [2, 3])]
@@ -66,7 +66,7 @@ def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
-    """Yield paths and values of the entries of a row: its options, its system spec, its result."""
+    """Yield (path, value) for each entry of a row: its options, the entries of its system spec, those of its result."""
     result = row.record.result if row.record is not None else None
     for section, data in (("option", row.task.options), ("system", row.task.system), ("result", result)):
         yield from flatten(data or {}, (section,))
@@ -74,7 +74,7 @@ def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
 
 @lru_cache(10_000)  # thousands of rows have the same few entries
 def names_of(entry: Entry) -> tuple[str, str]:
-    """Return the short name of an entry, and the long name used if another entry has the same short name.
+    """Return the short name of an entry, and its long name, which is used if another entry has the same short name.
 
     >>> names_of(("system", "family", "m")), names_of(("result", "heights", "max"))
     (('m', 'family.m'), ('heights.max', 'result.heights.max'))
@@ -102,12 +102,12 @@ def to_text(value: Any) -> str:
 
 
 def cell(value: Any) -> str:
-    """Return a value as text for a CSV file; text that a spreadsheet would execute is escaped by an apostrophe."""
+    """Return a value as the text of a CSV cell; an apostrophe precedes a text that a spreadsheet would execute."""
     return spreadsheet_safe(to_text(value)) if isinstance(value, str) else to_text(value)
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a finite number, True or False, or the text of an exact number: 7/3, 21.2031."""
+    """Whether a value is a finite number, True or False, or a text that denotes an exact number, such as 7/3."""
     if isinstance(value, str):
         return len(value) <= _MAX_DIGITS and NUMBER.fullmatch(value) is not None
     return isinstance(value, int | float) and -inf < value < inf
@@ -127,11 +127,11 @@ def nearest_double(value: Any) -> float:
 
 
 def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
-    """Write one JSON object per line: a header, a result for each row, and a last line with the number of results.
+    """Write one JSON object per line: a header, each row, and finally the number of rows.
 
-    Entries that a task without a record lacks are null. Dicts inside a line are sorted by their keys.
+    A value that is missing because a task has no record is null. The keys of dicts inside a line are sorted.
     """
-    from kahanmaps.maps.convention import CONVENTION  # loads FLINT: only when results are written
+    from kahanmaps.maps.convention import CONVENTION  # imported here, since it loads FLINT
 
     omitted = {*RUN_COLUMNS, "stderr", "versions"} if stable else set()
     header = {"record": "header"} if stable else {"record": "header", "version": __version__}
@@ -144,9 +144,9 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
 
 
 def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
-    """Write a table with a header row. `rows` is called twice: first for the names of the columns, then for the values.
+    """Write a CSV table with a header. `rows` is called twice: first to find the columns, then to write the values.
 
-    Open files with newline="": without it some systems translate "\\n".
+    `stream` should be opened with newline="": otherwise some systems replace "\\n" by two characters.
     """
     layout = _Layout(rows(), stable)
     stream.write(csv_line(map(cell, layout.names)))
@@ -156,12 +156,12 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
-    """Write the same table as `write_csv` in the format Parquet, which needs pyarrow.
+    """Write the table of `write_csv` as a Parquet file, which needs pyarrow.
 
-    `rows` is called twice, and the complete file replaces `path`. A column has the type int64, bool or float64 if this
-    type represents all its values exactly (a float64 column may contain integers up to 2^53), and text otherwise. A
-    text column NAME whose values are all exact numbers such as 7/3 is followed by NAME.number with the nearest doubles.
-    The bytes of a stable export also depend on the version of pyarrow.
+    `rows` is called twice, and the complete file replaces `path`. The type of a column is int64, bool or float64 if
+    this type represents all its values exactly (for float64 integers up to 2^53), and text otherwise. If all values of
+    a text column NAME are exact numbers such as 7/3, a column NAME.number of the nearest doubles follows. The bytes of
+    a stable export also depend on the version of pyarrow.
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
@@ -205,7 +205,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
 
 
 class _Layout:
-    """The `names` of the columns of a table; if `typed`, their `types`, and the columns `numbers` of exact numbers."""
+    """The columns of a table: `names`; if `typed`, also their `types` and `numbers`, the columns of exact numbers."""
 
     def __init__(self, rows: Iterable[Row], stable: bool, typed: bool = False) -> None:
         kinds: defaultdict[Entry, set[str]] = defaultdict(set)
@@ -219,7 +219,7 @@ class _Layout:
             for entry in sorted(entry for entry in kinds if entry[0] == section):
                 name, long_name = names_of(entry)
                 name = long_name if name in used_names else name
-                while name in used_names:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
+                while name in used_names:  # two entries can have equal long names: {"a": {"b": 1}, "a.b": 2}
                     name = f"{section}.{name}"
                 used_names.add(name)
                 names.append(name)
@@ -233,13 +233,13 @@ class _Layout:
         entry_of = {name: entry for entry, name in self._column_of.items()}
         for name in (name for name in self.names if name in entry_of):
             value_kinds = kinds[entry_of[name]] - {"none"}
-            if value_kinds:  # the first type that fits; a column without values has the type string
+            if value_kinds:  # the first suitable type; a column of empty cells has the type string
                 self.types[name] = next(type_ for type_, fitting in _KINDS_OF_TYPE.items() if value_kinds <= fitting)
             if {"number"} <= value_kinds <= _NUMBER_KINDS:
                 self.numbers.append(name)
 
     def cells(self, row: Row) -> dict[str, Any]:
-        """Return the values of a row by the names of their columns."""
+        """Return a dict from the names of the columns to the values of a row."""
         fixed = row_data(row)
         cells = {name: fixed[name] for name in self._fixed_columns}
         for entry, value in entries(row):
@@ -250,7 +250,7 @@ class _Layout:
 
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
-# For each type of Parquet the kinds of values that it represents (small: integers up to 2^53); the first fit is used.
+# Type of a Parquet column -> kinds of values it represents exactly ("small": integers up to 2^53); the first is chosen.
 _KINDS_OF_TYPE = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},
@@ -272,7 +272,7 @@ def _kind_of_value(value: Any) -> str:
 
 
 def row_data(row: Row) -> dict[str, Any]:
-    """Return the entries that every row has, in the order of JSON lines; entries of a missing record are None."""
+    """Return the entries that all rows have, in the order of JSON lines; those of a missing record are None."""
     task, record = row.task, row.record
     of_record = ("verdict", "result", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished")
     return {
@@ -288,5 +288,5 @@ def row_data(row: Row) -> dict[str, Any]:
 
 
 def _json_line(record: Mapping[str, Any]) -> str:
-    """Return a line of JSON; only dicts inside the record are sorted by keys."""
+    """Return a dict as a line of JSON; its keys remain in their order, the keys of dicts inside it are sorted."""
     return "{" + ", ".join(f"{json.dumps(name)}: {_ENCODER.encode(value)}" for name, value in record.items()) + "}\n"

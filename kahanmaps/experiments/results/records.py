@@ -1,8 +1,8 @@
-"""The data types of a batch: tasks with their keys, limits, and records of their outcomes.
+"""The data types of a batch: tasks and their keys, limits, and records of the outcomes of tasks.
 
-All of them are plain data that JSON can represent, since they are sent between processes and stored in databases;
-matrices and polynomials of FLINT can be neither sent nor stored. The key of a task is a hash of its canonical text, so
-that the same question has the same key in every batch, on every machine.
+All of them consist of plain data that JSON can represent, since they are sent between processes and stored in
+databases. Matrices and polynomials of FLINT can be neither sent nor stored. The key of a task is a hash of its
+canonical text, so that equal tasks have equal keys in every batch and on every machine.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from hashlib import sha256
 from typing import Any, Protocol
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
-# A function that returns the canonical text of the document of a system from its digest.
+# A function that maps the digest of a system document to the canonical text of the document.
 Documents = Callable[[str], str]
 
-KEY_LENGTH = 32  # hexadecimal digits: 128 bits make collisions negligible
+KEY_LENGTH = 32  # number of hexadecimal digits: with 128 bits collisions are negligible
 
 
 def canonical(data: Any) -> str:
-    """Return plain data as canonical JSON: sorted names, no spaces, ASCII.
+    """Return plain data as canonical JSON: sorted keys, no spaces, ASCII.
 
     >>> canonical({"m": 2, "eps": "1/10"})
     '{"eps":"1/10","m":2}'
@@ -32,7 +32,7 @@ def canonical(data: Any) -> str:
 
 
 def digest(text: str) -> str:
-    """Return the hash that identifies the task or document with this canonical text."""
+    """Return the hash of a canonical text, which identifies a task or a document."""
     return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
 
 
@@ -43,7 +43,7 @@ def encodable(text: str) -> str:
 
 @dataclass(frozen=True)
 class Task:
-    """A task: the name of its kind, the spec of its system, and the values of all options.
+    """A task: the name of its kind, the spec of its system, and a value for each of its options.
 
     `system` is {"family": {"m": 3, "seed": 7, ...}}, or {"document": DIGEST, "name": ..., "parameters": {...}}, or None
     for tasks without a system. `options` are canonical: a value for every option of the kind of task, with numbers as
@@ -59,28 +59,28 @@ class Task:
 
     @cached_property
     def text(self) -> str:
-        """The canonical text, from which `from_text` restores the task."""
+        """The canonical text of the task, from which `from_text` restores it."""
         return canonical({"task": self.kind, "system": self.system, "options": self.options})
 
     @cached_property
     def key(self) -> str:
-        """The hash of the canonical text."""
+        """The hash of the canonical text of the task."""
         return digest(self.text)
 
     @property
     def documents(self) -> list[str]:
-        """The digests of the documents of the task's system and of its second system."""
+        """The digests of the documents of the system of the task, and of a second system if there is one."""
         specs = (self.system, self.options.get("other"))
         return [spec["document"] for spec in specs if isinstance(spec, Mapping) and "document" in spec]
 
     @classmethod
     def from_text(cls, text: str) -> Task:
-        """Return the task with this canonical text."""
+        """Return the task from its canonical text."""
         data = json.loads(text)
         return cls(data["task"], data["system"], data["options"])
 
     def value(self, name: str) -> Any:
-        """Return the option or the entry of the system spec with this name, e.g. parameters.a; None if absent."""
+        """Return the value of the option or system spec entry called `name`, such as parameters.a; None if absent."""
         if name in self.options:
             return self.options[name]
         spec = self.system or {}
@@ -103,13 +103,13 @@ def system_words(spec: Mapping[str, Any] | None) -> str:
 
 
 def option_words(values: Mapping[str, Any]) -> str:
-    """Return names with their values as text: m=3 seed=0 size=null."""
+    """Return options as text, such as m=3 seed=0 size=null."""
     return " ".join(f"{name}={v if isinstance(v, str) else json.dumps(v)}" for name, v in values.items())
 
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """Limits of one task: `time` in seconds, `memory` in bytes beyond the memory of an idle worker; None: no limit.
+    """Limits of one task, None for no limit: `time` in seconds, `memory` in bytes beyond the memory of an idle worker.
 
     Limits are not part of the task or its key: a task that exceeded its time limit may be run again with a larger one.
     """
@@ -127,7 +127,7 @@ class Job:
 
 
 class Outcome(StrEnum):
-    """The outcome of a task. All outcomes except `ok` are failures; a check that refutes its claim is `ok` too.
+    """The outcome of a task: `ok` (even if a check refutes its claim) or a kind of failure.
 
     `lost` means that the worker was killed from outside in every attempt. This outcome is never stored: the task
     remains without a result.
@@ -141,17 +141,17 @@ class Outcome(StrEnum):
     LOST = "lost"
 
 
-VERDICTS = ("proved", "supported", "refuted", "undecided")  # verdicts of checks; user-defined tasks may have others
-STORED_OUTCOMES = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
+VERDICTS = ("proved", "supported", "refuted", "undecided")  # verdicts of checks; tasks of users may have others
+STORED_OUTCOMES = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # outcomes of stored results
 
 
 @dataclass(frozen=True)
 class Record:
-    """The record of a task: its outcome, result, cost and environment.
+    """The record of a task: its outcome, its result, its cost, and where it was run.
 
-    `result` is plain data, None unless the outcome is ok; `verdict` is the verdict of a check. `message` explains a
-    failure, and `stderr` is the end of the output of the worker. `seconds` and `peak_memory` (bytes; None: unknown)
-    refer to this task alone. `host`, `versions` and `finished` (UTC, ISO 8601) say where and when it was run.
+    `result` is plain data, None unless the outcome is ok; `verdict` is that of a check. `message` explains a failure,
+    and `stderr` is the end of the output of the worker. `seconds` and `peak_memory` (bytes; None: unknown) are those of
+    this task alone. `host`, `versions` and `finished` (UTC, ISO 8601) say where and when the task was run.
     """
 
     key: str
@@ -183,7 +183,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a plan: the experiment, the number of the row (from 0), the task, and its record (None if missing)."""
+    """A row of a plan: experiment, number (from 0), task, and the record of the task, None if it is missing."""
 
     experiment: str
     number: int
@@ -192,7 +192,7 @@ class Row:
 
 
 class Executor(Protocol):
-    """Runs jobs: accepts them while `is_free` is true; `wait` returns their records, also for tasks with an error."""
+    """An executor of jobs: `submit` takes one while `is_free` is true; `wait` returns records, also of failed tasks."""
 
     @property
     def is_free(self) -> bool:
@@ -200,13 +200,13 @@ class Executor(Protocol):
 
     @property
     def in_flight(self) -> int:
-        """The number of jobs submitted whose records have not been returned."""
+        """The number of submitted jobs whose records have not been returned yet."""
 
     def submit(self, job: Job) -> None:
         """Accept a job; `wait` will return its record."""
 
     def wait(self, timeout: float) -> list[Record]:
-        """Return the finished records as soon as there is one, or none after `timeout` seconds."""
+        """Return the records of finished jobs as soon as there is one; an empty list after `timeout` seconds."""
 
     def close(self) -> None:
-        """Kill all jobs in flight without waiting for them. May be called twice."""
+        """Kill all jobs in flight without waiting for them. Closing twice has no effect."""

@@ -1,18 +1,18 @@
 """The database of the results of a batch: one SQLite file, which one process writes while others may read it.
 
-A store contains experiments with their plans (the tasks in order), the texts of tasks and of their system documents,
-and the latest result of every task. A task is stored once, even if it is planned several times, so that a changed batch
-reuses the results of the tasks that it shares with the old batch.
+A store contains the experiments with their plans (rows of tasks in order), the texts of tasks and system documents, and
+the latest result of each task. A task is stored once even if it is planned several times. Hence a changed batch reuses
+the results of all tasks that it has in common with the previous batch.
 
 Three rules ensure consistency:
 
-* every result reported as stored is on the disk: each method that writes is one transaction, and a kill at any time
-  leaves the state before or after the transaction;
-* there is one writer: opening for writing takes a lock that the operating system releases when the process ends;
-* readers do not block the writer for long: they read in chunks, and fetch each chunk completely before they yield its
-  first row. Only counts are single queries; a count of a million tasks takes a second.
+* a result that is reported as stored is on the disk: each method that writes is one transaction, so that a kill at
+  any time leaves the state before or after it;
+* there is one writer: opening for writing takes a lock, which the operating system releases when the process ends;
+* readers block the writer only briefly: they read in chunks, and fetch a chunk completely before they yield its first
+  row. Only counts are single queries; counting a million tasks takes a second.
 
-The rollback journal of SQLite is used, never WAL: it is safe on all file systems, including network file systems.
+SQLite's rollback journal is used, never WAL: it is safe on all file systems, including network file systems.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ from kahanmaps.experiments.results.records import (
     encodable,
 )
 
-# Increase the format if older versions cannot read the file. Format 2 is format 1 with two more, unused columns.
+# Increase the format if older versions cannot read the file. Format 2 is format 1 with two more columns, both unused.
 FORMATS = (1, 2)
-APPLICATION_ID = 0x4B61684D  # "KahM", which identifies our databases
+APPLICATION_ID = 0x4B61684D  # "KahM" in ASCII, which identifies databases of kahanmaps
 SKIPPED = "TABLE skipped (experiment INTEGER, system TEXT, reason TEXT, PRIMARY KEY (experiment, system))"
 SCHEMA = f"""
 CREATE TABLE document (digest TEXT PRIMARY KEY NOT NULL, text TEXT NOT NULL);
@@ -78,15 +78,15 @@ CREATE INDEX result_summary ON result (task, outcome, verdict, seconds);
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = 1;
 """
-PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
-RESULT_CHUNK = 50  # rows read with their results, each of which may take megabytes
-MAX_FOUND_TASKS = 20  # number of tasks found for one prefix of a key
-MAX_CONFLICTS_SHOWN = 5  # keys of conflicting tasks in the result of a merge
+PLAN_CHUNK = 1000  # number of rows of a plan that are read at once
+RESULT_CHUNK = 50  # number of rows that are read at once with their results, each of which may take megabytes
+MAX_FOUND_TASKS = 20  # maximal number of tasks returned for one prefix of a key
+MAX_CONFLICTS_SHOWN = 5  # maximal number of keys of conflicting tasks in the result of a merge
 
 _BUSY_SECONDS = 30.0  # seconds of waiting for a lock of another process
-_MIN_BYTES = 512  # the smallest page that SQLite has
-# KiB of cache for SQLite. Planning accesses the index of keys at random: unless the index of a million keys fits into
-# the cache, every key causes the write of a page.
+_MIN_BYTES = 512  # the smallest page size of SQLite
+# KiB of cache for SQLite. Planning accesses the index of keys in random order: if the cache does not hold the index of
+# a million keys, every key causes a page to be written.
 _CACHE_KIB = 128 << 10
 _MACHINE_CODES = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 # fmt: off
@@ -98,19 +98,18 @@ _SELECTED_COLUMNS = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"
 
 
 class StoreError(InputError):
-    """Raised for a database that cannot be used at all or for the requested operation; the message says what to do."""
+    """Raised for a database that cannot be used, or not for the requested operation; the message says what to do."""
 
 
 class Unavailable(KahanmapsError, OSError):
-    """Raised for a database that is temporarily unusable: the disk is full or broken, or the file was removed."""
+    """Raised if a database is temporarily unusable, for example since the disk is full or the file was removed."""
 
 
 @dataclass(frozen=True)
 class StoredExperiment:
-    """A planned experiment: `total` is the number of rows of its plan, `tasks` the number of different tasks.
+    """A planned experiment: `total` is the number of rows of its plan, `tasks` the number of distinct tasks in it.
 
-    `id` is the number of the experiment in the database. `offset` is the number of rows in the plans of earlier
-    experiments.
+    `id` is the number of the experiment in the database. `offset` is the sum of `total` over all earlier experiments.
     """
 
     name: str
@@ -124,10 +123,10 @@ class StoredExperiment:
 
 @dataclass(frozen=True)
 class ExperimentStatus:
-    """The progress of an experiment. `total` counts rows of its plan, all other counts refer to different tasks.
+    """The progress of an experiment: `total` counts the rows of its plan, all other counts refer to distinct tasks.
 
-    Hence `missing` and the `outcomes` add up to `tasks`. `seconds` is the total time of the latest attempts; `skipped`
-    lists the systems omitted from the plan, with reasons.
+    Hence `tasks` is the sum of `missing` and of all `outcomes`. `seconds` is the total time of the latest attempts;
+    `skipped` lists pairs of a system that the plan omits, and the reason.
     """
 
     name: str
@@ -142,10 +141,10 @@ class ExperimentStatus:
 
 @dataclass(frozen=True)
 class Planned:
-    """The result of planning. `total` counts rows of the plan, all other counts refer to different tasks.
+    """The result of planning: `total` counts the rows of the plan, all other counts refer to distinct tasks.
 
-    `known` counts tasks that were already in the store, `new_tasks` those that were not, `dropped` those that were only
-    in the plan that was replaced. `is_resumed` is true if the same definition had been planned before.
+    `known` counts tasks that the store already contained, `new_tasks` those that it did not, `dropped` those that only
+    the replaced plan contained. `is_resumed` is true if the stored plan had the same definition.
     """
 
     total: int
@@ -157,10 +156,10 @@ class Planned:
 
 @dataclass(frozen=True)
 class Merged:
-    """The result of a merge: the numbers of new tasks, of new results, and of failures that results `replaced`.
+    """The result of a merge: numbers of new tasks, of new `results`, and of failures that were `replaced` by results.
 
-    `conflicts` counts tasks with different results in the two databases; `conflicting` lists the first few of their
-    keys.
+    `conflicts` counts the tasks with different results in the two databases; `conflicting` contains the keys of the
+    first few of them.
     """
 
     tasks: int
@@ -171,7 +170,7 @@ class Merged:
 
 
 class StoredTask(NamedTuple):
-    """A task with its record (None if missing), its positions (experiment, number), and the number of attempts."""
+    """A task, its record (None if missing), its positions (experiment, row number) in plans, the number of attempts."""
 
     task: Task
     record: Record | None
@@ -180,7 +179,7 @@ class StoredTask(NamedTuple):
 
 
 class Store(HtmlDisplay):
-    """A database of results. `Store.open` opens it; close it, preferably by `with`.
+    """A database of results. `Store.open` opens it; use a `with` block, or close it.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, Store.open(f"{folder}/results.db", create=True) as store:
@@ -190,10 +189,10 @@ class Store(HtmlDisplay):
     ['orbit']
     """
 
-    path: Path  # resolved, since two names of one file must have the same lock
+    path: Path  # with links resolved, since two names of one file must have the same lock
 
     def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
-        self.name = os.fspath(path)  # as given, for messages
+        self.name = os.fspath(path)  # the path as given, for messages
         self._is_readonly = readonly
         self._lock: int | None = None
         self._connection: sqlite3.Connection | None = None
@@ -202,7 +201,7 @@ class Store(HtmlDisplay):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """Open the store in a file, for writing unless `readonly`; if `create`, create a missing file."""
+        """Open the store in a file, for writing unless `readonly`; a missing file is created if `create`."""
         if create and readonly:
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
@@ -220,7 +219,7 @@ class Store(HtmlDisplay):
         return store
 
     def close(self) -> None:
-        """Close the database and release the lock. May be called twice."""
+        """Close the database and release the lock; closing it twice has no effect."""
         if self._connection is not None:
             with suppress(sqlite3.Error):
                 self._connection.close()
@@ -252,7 +251,7 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
-            # After a kill of the writer, opening rolls back its journal, and so has to write even here.
+            # After a kill of the writer, opening the file rolls back its journal, and so even a reader has to write.
             may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
             has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
             mode = "rw" if may_write or has_journal else "ro&immutable=1"
@@ -260,16 +259,16 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
         address = f"{self.path.as_uri()}?mode={mode}"
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
-        self._is_initialized(create)  # before locking, so that no lock file is created beside a foreign file
+        self._is_initialized(create)  # before locking, so that no lock file appears beside a file of another program
         if not self._is_readonly:
-            # The operating system releases the lock of the writer when the process ends. The locked file cannot be the
-            # database itself: closing any of its descriptors would drop the locks of SQLite.
+            # The operating system releases this lock when the process ends. The locked file is not the database itself:
+            # closing any descriptor of the database would release the locks of SQLite.
             while self._lock is None:
                 descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
                 try:
                     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    # The previous writer may have removed the file after it was opened here. A lock of a removed file
-                    # has no effect.
+                    # The previous writer may have removed the lock file after it was opened here; a lock on a removed
+                    # file has no effect.
                     with suppress(FileNotFoundError):
                         if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
                             self._lock = descriptor
@@ -279,19 +278,19 @@ class Store(HtmlDisplay):
                     if self._lock is None:
                         os.close(descriptor)
             self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
-            self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_initialized(create):  # again: another process may have done it before the lock
+            self._execute("PRAGMA journal_mode = DELETE")  # older versions of kahanmaps used WAL
+            if not self._is_initialized(create):  # another process may have created the tables meanwhile
                 with self._transaction():
-                    for statement in SCHEMA.split(";"):  # executescript would commit
+                    for statement in SCHEMA.split(";"):  # `executescript` would commit the transaction
                         self._execute(statement)
-        if not self._execute("SELECT 1 FROM sqlite_master WHERE name = 'skipped'").fetchone():  # an older version
+        if not self._execute("SELECT 1 FROM sqlite_master WHERE name = 'skipped'").fetchone():  # an older file
             self._execute(f"CREATE {'TEMP ' * self._is_readonly}{SKIPPED}")
         if self._is_readonly:
             self._execute("PRAGMA query_only = ON")
 
     def _is_initialized(self, create: bool) -> bool:
-        """Whether the file is one of our databases (False if empty and `create`). Raises StoreError otherwise."""
-        # Read the schema first: pragmas succeed even for files that SQLite cannot read.
+        """Whether the file is a database of kahanmaps (False: empty, and `create`). Raises StoreError otherwise."""
+        # The schema is read first, since pragmas succeed even for a file that SQLite cannot read.
         queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
         tables, application, version = [self._execute(sql).fetchone()[0] for sql in queries]
         if not (tables or application or version):
@@ -327,16 +326,16 @@ class Store(HtmlDisplay):
         return rows
 
     def _fetch_plan(self, sql: str, experiment: StoredExperiment, size: int, *values: int) -> Iterator[list[Any]]:
-        """Yield the rows of a query for each chunk of `size` rows of the plan, so that each read is bounded."""
+        """Yield, for each chunk of `size` rows of the plan, the rows of a query, so that each read is bounded."""
         for first in range(0, experiment.total, size):
             yield self._fetch(sql, (experiment.id, first, first + size - 1, *values))
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        """Execute all statements in the block, or none of them."""
+        """Execute all statements in the block as one transaction: all of them or none."""
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
-        # The connection commits at the end of the block, or rolls back.
+        # At the end of the block the connection commits the transaction, or after an exception rolls it back.
         with self._translate_errors(), self._require_connection() as connection:
             connection.execute("BEGIN IMMEDIATE")
             yield
@@ -346,7 +345,7 @@ class Store(HtmlDisplay):
         try:
             yield
         except sqlite3.Error as error:
-            # An error without a code comes from Python's module: the text is not UTF-8.
+            # An error without a code comes from Python's sqlite3 module: a text is not UTF-8.
             code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
             kind = Unavailable if code in _MACHINE_CODES else StoreError
             if kind is Unavailable:
@@ -363,7 +362,7 @@ class Store(HtmlDisplay):
 
     @contextmanager
     def _report_damage(self, entry: str) -> Iterator[None]:
-        """Report parsing errors in the block as damage of the file; `entry` names the parsed entry."""
+        """Report parsing errors in the block as damage of the database; `entry` names the entry that is parsed."""
         try:
             yield
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -375,7 +374,7 @@ class Store(HtmlDisplay):
             return Task.from_text(text)
 
     def _record(self, key: str, row: Sequence[Any]) -> Record | None:
-        """Return the record in a row of the columns `_SELECTED_COLUMNS`; None if the task has no result."""
+        """Return the record in `row`, which has the columns `_SELECTED_COLUMNS`; None if the task has no result."""
         if row[0] is None:
             return None
         cells = dict(zip((*_COLUMNS, "attempts"), row, strict=True))
@@ -394,7 +393,7 @@ class Store(HtmlDisplay):
     # Experiments and their plans
 
     def experiments(self, names: Sequence[str] | None = None) -> list[StoredExperiment]:
-        """Return the planned experiments in order; if `names` are given, only the experiments with these names."""
+        """Return the planned experiments in order; if `names` is given, only those with these names."""
         rows = self._fetch(
             "SELECT name, definition, limits, total, tasks, id, "
             "(SELECT max(number) + 1 FROM plan WHERE experiment = e.id) FROM experiment AS e ORDER BY id"
@@ -426,11 +425,11 @@ class Store(HtmlDisplay):
         documents: Mapping[str, str],
         skipped: Iterable[tuple[str, str]] = (),
     ) -> Planned:
-        """Plan tasks in the given order; after a kill or an exception the previous plan is unchanged.
+        """Store the plan of an experiment: tasks in order. After a kill or an exception the previous plan is unchanged.
 
-        `definition` determines the tasks. If it equals the stored definition, `tasks` is not read, and only the limits
-        are updated. Otherwise this plan replaces the stored plan; all results are kept. `documents` (digest to text) is
-        read after `tasks`, whose iterator may fill it. `skipped` lists omitted systems with reasons.
+        `definition` determines the tasks. If it equals the stored one, `tasks` is not read, and only limits are
+        updated. Otherwise the new plan replaces the stored plan; all results remain. `documents` (digest to text) is
+        read after `tasks`, whose iterator may fill it. `skipped` lists pairs of an omitted system and the reason.
         """
         with self._transaction():
             sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"
@@ -460,7 +459,7 @@ class Store(HtmlDisplay):
     def _replace_plan(
         self, experiment: str, definition: str, limits: TaskLimits, tasks: Iterable[tuple[str, str]]
     ) -> Planned:
-        """Plan the tasks with these keys and texts; delete old tasks that neither a plan nor a result refers to."""
+        """Store a plan of (key, text) pairs; delete tasks of the old plan to which no plan and no result refers."""
         values = (experiment, definition, digest(definition), canonical(asdict(limits)))
         self._execute(
             "INSERT INTO experiment (name, definition, digest, limits, total, tasks) VALUES (?, ?, ?, ?, 0, 0) ON "
@@ -493,7 +492,7 @@ class Store(HtmlDisplay):
         return Planned(total, distinct - new_tasks, new_tasks, dropped)
 
     def _add_tasks(self, tasks: Sequence[tuple[str, str]]) -> int:
-        """Add tasks, given by keys and texts, and return the number of new ones."""
+        """Add tasks, given as pairs (key, text), and return the number of those that were not in the store."""
         sql = "INSERT OR IGNORE INTO task (key, text) VALUES (?, ?)"
         return self._require_connection().executemany(sql, tasks).rowcount
 
@@ -506,7 +505,7 @@ class Store(HtmlDisplay):
         retry_failed: bool = False,
         shard: tuple[int, int] = (1, 1),
     ) -> Iterator[Job]:
-        """Yield a job for each task without a result, once, in plan order; results may be added during the iteration.
+        """Yield a job once for each task without a result, in plan order; results may be added during the iteration.
 
         If `retry_failed`, failed tasks are included, each once even if it fails again. `shard` = (i, n) selects the
         i-th of n disjoint parts of the tasks.
@@ -529,17 +528,17 @@ class Store(HtmlDisplay):
     def _pending_query(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
-        """Return the SQL text that selects the pending tasks in a chunk of the plan, and values to run it with.
+        """Return a pair: the SQL text that selects the pending tasks in a chunk of a plan, and its parameters.
 
-        `format` inserts the columns and a JOIN into the text. The values are, for each experiment, the experiment and
-        the last three parameters of the text.
+        `format` inserts the columns and a JOIN into the text. There is a tuple of parameters for each experiment: the
+        experiment itself, and the last three parameters of the text.
         """
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
         chosen = self.experiments(experiments)
-        # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once and is in
-        # one shard, without a list of the tasks already yielded.
+        # A task planned several times belongs to its first row in the chosen experiments. Hence it is yielded once and
+        # lies in one shard, without a list of the tasks already yielded.
         restriction = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
         sql = f"""
             SELECT {{}} FROM plan AS p {{}}
@@ -556,16 +555,16 @@ class Store(HtmlDisplay):
     # Results
 
     def add(self, records: Sequence[Record]) -> None:
-        """Store all records or none. A record replaces the earlier one, but a failure never replaces a success.
+        """Store all of the records or none; a record replaces an earlier one, but a failure does not replace a success.
 
         Records with the outcome `lost` are ignored.
         """
         records = [record for record in records if record.outcome is not Outcome.LOST]
         rows = []
-        for record in records:  # values that JSON cannot represent raise an error here
+        for record in records:  # raise an error here for values that JSON cannot represent
             if not math.isfinite(record.seconds):
                 raise ValueError(f"a record cannot have taken {record.seconds} seconds")
-            columns = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
+            columns = {name: getattr(record, name) for name in _COLUMNS}  # not `asdict`, which would copy the results
             for name in ("result", "versions"):
                 columns[name] = None if columns[name] is None else canonical(dict(columns[name]))
             columns |= {name: columns[name] and encodable(columns[name]) for name in ("verdict", "message", "stderr")}
@@ -580,7 +579,7 @@ class Store(HtmlDisplay):
                 self._put_result(task, old_row if is_kept else row, (attempts or 0) + 1)
 
     def _find_result(self, key: str) -> Sequence[Any] | None:
-        """Return the id of a task, the columns of its result (None without one), its attempts; None for no task."""
+        """Return (id, *columns of the result, attempts) of a task (None for each missing column); None for no task."""
         sql = f"SELECT t.id, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
         row: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
         return row
@@ -591,8 +590,8 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """Yield the tasks with their records in plan order; if `missing`, also the tasks without a record."""
-        stored = self.experiments(experiments)  # errors are raised by this call, not when the first row is read
+        """Yield the rows of the plans in order with the records of their tasks; if `missing`, also rows without one."""
+        stored = self.experiments(experiments)  # raises its errors here, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED_COLUMNS}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
@@ -606,10 +605,10 @@ class Store(HtmlDisplay):
         )
 
     def merge(self, other: str | os.PathLike[str]) -> Merged:
-        """Add the experiments and results of another database, all or nothing; merging again changes nothing.
+        """Add the experiments and results of another database, all or none; a repeated merge changes nothing.
 
-        New experiments are added with their plans. Of two results of a task a success replaces a failure; otherwise the
-        result of this database is kept. Two experiments of the same name must have the same definition.
+        New experiments are added with their plans. Of two results of a task, a success replaces a failure; otherwise
+        the result of this database remains. Experiments of the same name must have equal definitions.
         """
         new_tasks = results = replaced = conflicts = 0
         conflicting: list[str] = []
@@ -631,7 +630,7 @@ class Store(HtmlDisplay):
                     planned = self._replace_plan(experiment.name, experiment.definition, experiment.limits, tasks)
                     self._replace_skipped(experiment.name, source._skipped(experiment))
                     new_tasks += planned.new_tasks
-            for (name,) in source._fetch("SELECT digest FROM document"):  # one at a time: each document may be long
+            for (name,) in source._fetch("SELECT digest FROM document"):  # one at a time, since a document may be long
                 self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, source.document(name)))
             sql = f"""
                 SELECT r.task, t.key, t.text, {_SELECTED_COLUMNS} FROM result AS r JOIN task AS t ON t.id = r.task
@@ -696,7 +695,7 @@ class Store(HtmlDisplay):
         return int(self._fetch(sql)[0][0])
 
     def find(self, prefix: str) -> list[StoredTask]:
-        """Return at most 20 tasks whose key begins with this prefix of at least 4 digits."""
+        """Return at most 20 tasks whose keys begin with `prefix`, which has at least 4 hexadecimal digits."""
         prefix = prefix.lower()
         if not re.fullmatch(f"[0-9a-f]{{4,{KEY_LENGTH}}}", prefix):
             raise StoreError(
@@ -706,7 +705,7 @@ class Store(HtmlDisplay):
         tasks = self._fetch(
             f"SELECT t.id, t.key, t.text, {_SELECTED_COLUMNS} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
-            (prefix, f"{prefix}g", MAX_FOUND_TASKS),  # g comes after every hexadecimal digit
+            (prefix, f"{prefix}g", MAX_FOUND_TASKS),  # in this order g follows every hexadecimal digit
         )
         places_sql = (
             "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
@@ -726,7 +725,7 @@ class Store(HtmlDisplay):
 
 
 def _parse_dict(text: str) -> dict[str, Any]:
-    """Return the dict encoded in JSON. Raises ValueError or TypeError for any other text."""
+    """Return the dict that a JSON text encodes. Raises ValueError or TypeError for any other text."""
     table = json.loads(text)
     if not isinstance(table, dict):
         raise TypeError("found no table in JSON")

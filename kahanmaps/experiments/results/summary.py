@@ -1,8 +1,8 @@
 """Summaries of results: groups of tasks with counts and quantiles of numbers.
 
-Values that define groups are compared exactly: "1/3" and 0.333 define two groups. Numbers are summarized as the nearest
-doubles. A quantile is a value of the data (nearest rank): the p-quantile of n values is the ceil(p n)-th smallest
-value, and the median of an even number of values is the smaller of the two middle values.
+The values that define groups are compared exactly: "1/3" and 0.333 define two groups. The numbers that are summarized
+are rounded to doubles. Quantiles are of nearest rank: the p-quantile of n values is the ceil(p n)-th smallest of them,
+so that the median of an even number of values is the smaller of the two middle ones.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from kahanmaps.experiments.results.export import Entry, entries, is_number, name
 from kahanmaps.experiments.results.records import STORED_OUTCOMES, VERDICTS, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
-_HEADINGS = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # headings in tables
+_HEADINGS = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # headings of columns
 RUN_COLUMNS = ("seconds", "peak_memory")
 
-# Entries whose values are text even if they look like numbers: an experiment may be called 007, a digest may be
-# 12e34567.
+# Entries that are text even if they look like a number: an experiment may be called 007, and a digest may be 12e34567.
 _TEXT_NAMES = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
 _MAX_SUGGESTIONS = 3  # maximal number of names suggested for an unknown name
 _MAX_LISTED = 60  # maximal number of names in a message
@@ -34,7 +33,7 @@ _MAX_WIDTH = 160  # maximal number of characters of a printed cell
 
 
 class SummaryTable(NamedTuple):
-    """A table of texts. The first `words` columns contain text; the other columns contain numbers (right-aligned)."""
+    """A table of texts: its first `words` columns contain words, the other columns numbers (right-aligned)."""
 
     title: str
     columns: tuple[str, ...]
@@ -44,10 +43,10 @@ class SummaryTable(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """A group of tasks with the same `values`; `outcomes` and `verdicts` map each outcome and verdict to its count.
+    """A group of tasks with equal `values` of the grouping entries; `outcomes` and `verdicts` are dicts of counts.
 
-    `numbers` maps each numeric entry to a dict: the count `n` of its values, `same` (whether all values are the same
-    double), and their `QUANTILES`. `flags` maps each boolean entry to the counts of true and false.
+    `numbers` maps the name of a numeric entry to a dict: the count `n` of its values, `same` (whether they are all the
+    same double), and their `QUANTILES`. `flags` maps the name of a boolean entry to its counts of true and false.
     """
 
     values: tuple[Any, ...]
@@ -61,13 +60,13 @@ class Group:
 
 @dataclass(frozen=True)
 class Summary(HtmlDisplay):
-    """Groups of tasks, sorted by the values that define them: numbers before texts, None (unknown) last."""
+    """Groups of tasks, sorted by the values that define the groups: numbers before texts, and None last."""
 
     by: tuple[str, ...]
     groups: tuple[Group, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the summary as plain data; quantiles that exceed all doubles are None."""
+        """Return the summary as plain data; a quantile that exceeds all doubles is None."""
         groups = []
         for group in self.groups:
             data = {"group": dict(zip(self.by, group.values, strict=True)), **asdict(group)}
@@ -78,9 +77,9 @@ class Summary(HtmlDisplay):
         return {"by": list(self.by), "groups": groups}
 
     def tables(self, digits: int = 6) -> list[SummaryTable]:
-        """Return tables of counts, numbers and flags as text; empty tables and columns of zeros are omitted.
+        """Return tables of counts, numbers and flags; tables without rows and columns of zeros are omitted.
 
-        Floats have `digits` significant digits, and long text is shortened.
+        All cells are text: floats have `digits` significant digits, and long text is shortened.
         """
         counts = [{"tasks": g.tasks, "missing": g.missing, **g.outcomes, **g.verdicts} for g in self.groups]
         names = [name for name in dict.fromkeys(name for c in counts for name in c) if any(c.get(name) for c in counts)]
@@ -118,7 +117,7 @@ class Summary(HtmlDisplay):
 
 
 class _GroupBuilder:
-    """Collects the counts and numbers of a group while rows are read; a number takes eight bytes."""
+    """Collects the counts and numbers of a group while rows are read; each number takes eight bytes."""
 
     def __init__(self, values: tuple[Any, ...]) -> None:
         self.values = values
@@ -144,18 +143,18 @@ class _GroupBuilder:
 def summarise(
     rows: Iterable[Row], by: Sequence[str] = (), values: Sequence[str] | None = None, *, stable: bool = False
 ) -> Summary:
-    """Group rows by the entries named in `by`, and return counts and quantiles for each group.
+    """Return counts and quantiles for each group of rows; rows with equal entries `by` form a group.
 
-    A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; an entry of the
-    system spec (m, parameters.a); or an entry of the result (dimension, heights.max). A name with several meanings has
-    the meaning that is first in this list; option.seed, family.seed and result.seed are unambiguous. Rows without the
-    entry form a group with the value None.
+    A name in `by` is one of task, experiment, system, document, outcome, verdict, message; or the name of an option, of
+    an entry of the system spec (m, parameters.a), or of an entry of the result (dimension, heights.max). If a name has
+    several of these meanings, the first applies; option.seed, family.seed and result.seed are unambiguous. The rows
+    without an entry `by` form a group with the value None.
 
-    Numbers (integers, floats, texts such as "7/3" or "21.2031") of the results are summarized, and unless `stable` also
-    seconds and peak_memory of all records. Entries in `by` are constant in a group and not summarized. If `values` are
-    given, only entries with these names are summarized. An entry of a result named seconds is called result.seconds.
+    The numbers in results (integers, floats, texts such as "7/3" or "21.2031") are summarized, and so are seconds and
+    peak_memory of all records unless `stable`. Entries in `by` are constant in a group and not summarized. `values`, if
+    given, names the entries to summarize. An entry of a result that is called seconds is named result.seconds.
 
-    Rows are read once, and only their numbers are stored. Raises InputError for names that no row has.
+    Rows are read once, and only their numbers are stored. Raises InputError for a name that no row has.
 
     >>> from kahanmaps.experiments.results.records import Outcome, Record, Task
     >>> def row(number, m, height):
@@ -172,7 +171,7 @@ def summarise(
     10      height  2       no      2.5     2.5     2.5     3.5     3.5
     """
     by = tuple(dict.fromkeys(by))
-    groups: dict[tuple[Any, ...], _GroupBuilder] = {}  # the keys identify and sort the groups
+    groups: dict[tuple[Any, ...], _GroupBuilder] = {}  # sort keys of the values in `by` -> group
     seen_entries, numeric_names = set[Entry](), set(() if stable else RUN_COLUMNS)
     has_results = False
     for row in rows:
@@ -183,7 +182,7 @@ def summarise(
             short_name, long_name = names_of(entry)
             for name in (short_name, long_name):
                 if name in by:
-                    entry_values.setdefault(name, value)  # if entries have the same name, the first one keeps it
+                    entry_values.setdefault(name, value)  # of several entries with this name, the first counts
             if entry[0] == "result":
                 has_results = True
                 numbers[long_name if short_name in RUN_COLUMNS else short_name] = value
@@ -204,7 +203,7 @@ def summarise(
                     group.flags[name][to_text(value)] += 1
                 else:
                     group.numbers[name].append(nearest_double(value))
-    if groups:  # without rows no name can be recognized as unknown
+    if groups:  # without rows every name would be unknown
         short_names, full_names = ({names_of(entry)[k] for entry in seen_entries} for k in (0, 1))
         for name in by:
             if name not in full_names:
@@ -216,13 +215,13 @@ def summarise(
 
 
 def _sort_key_and_value(row: Row, name: str, value: Any) -> tuple[Any, Any]:
-    """Return the sort key and the value of a row for a name in `by`; `value` is the entry with this name.
+    """Return (sort key, value) of a row for a name in `by`; `value` is the entry of the row with this name, or None.
 
-    Numbers come first, then false and true, texts, None. Only equal values have equal keys.
+    The keys sort numbers first, then false and true, texts, None. Keys are equal only if the values are equal.
     """
     if name == "system":
         text: str | None = system_words(row.task.system)
-        return (2, text, canonical(row.task.system)), text  # systems in different files may have the same name
+        return (2, text, canonical(row.task.system)), text  # the spec distinguishes systems with equal names
     if name not in _TEXT_NAMES:
         if value is None:
             return (3,), value

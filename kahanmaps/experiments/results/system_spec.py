@@ -1,11 +1,11 @@
-"""The spec of the system of a task, as plain data, and the system constructed from it.
+"""The spec of the system of a task, as plain data, and the construction of the system from its spec.
 
     {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}                      a random member, constructed when needed
     {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the catalogue
 
-A document is the content of a system file as plain data. A spec refers to a document by its digest: hence a task does
-not depend on the path of the file but on its content. The name of a system is part of its spec, since reports print it.
-A spec contains all parameters or all arguments of the random construction: equal systems have equal specs.
+A document is the content of a system file as plain data. A spec refers to a document by its digest: hence a task
+depends on the content of the file, not on its path. The name of the system is part of the spec, since reports print it.
+A spec contains all parameters, or all arguments of the random construction, so that equal systems have equal specs.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ from kahanmaps.family.random_members import (
     random_member_with_eigenvalues,
 )
 
-_MAX_CACHED_SYSTEMS = 16  # systems cached by a worker: consecutive tasks often differ only in eps
+_MAX_CACHED_SYSTEMS = 16  # number of systems that a worker caches: consecutive tasks often differ only in eps
 
 
 def document_text(file: SystemFile) -> str:
-    """Return the content of a system file as canonical text, without the entries for the catalogue."""
+    """Return the content of a system file as canonical text, without the entries that only the catalogue uses."""
     return canonical({key: value for key, value in file.document.items() if key != "catalog"})
 
 
-ENDINGS = (".toml", ".ode")  # of system files
+ENDINGS = (".toml", ".ode")  # suffixes of the names of system files
 
 
 def find_file(reference: str, folder: Path) -> SystemFile:
-    """Return the system for a name of the catalogue, or for a path ending in .toml or .ode, relative to `folder`."""
+    """Return the system of a catalogue name, or of a path ending in .toml or .ode and relative to `folder`."""
     if reference.endswith(ENDINGS):
         return load(folder / reference)
-    # Any other path would give its system a name that depends on the machine.
+    # With any other path the name of the system would depend on the machine.
     if reference not in names() and ("/" in reference or os.path.exists(reference)):
         raise InputError(f"found {show(reference)}, expected a name of the catalogue or a path that ends in .toml")
     return load(reference)
 
 
 def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
-    """Return the spec of a system file with its parameters; add the document of the file to `documents`."""
+    """Return the spec of the system in `file`, with its parameters; add the document of the file to `documents`."""
     text = document_text(file)
     key = digest(text)
     documents[key] = text
@@ -64,7 +64,7 @@ def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
 
 
 def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the spec of the random member with these values of the seed and of the options in `FAMILY`.
+    """Return the spec of a random member; `values` contains its seed and the values of the options in `FAMILY`.
 
     >>> family_spec({"m": 3, "seed": 7, "eps": "1/10"})
     {'family': {'draw': 'eigenvalues', 'size': 2, 'm': 3, 'seed': 7}}
@@ -76,7 +76,7 @@ def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> SystemFile:
-    """Return the system of a spec; `document` maps the digest of a document to its text.
+    """Return the system that a spec describes; `document` maps the digest of a document to its text.
 
     >>> system_from({"family": {"draw": "generic", "m": 2, "seed": 1}}, {}.__getitem__).name
     'random member, generic, m = 2, seed 1'

@@ -1,9 +1,9 @@
-"""Run tasks within their limits in worker processes on this machine (pebble); no worker outlives this process.
+"""Run tasks within their limits in worker processes on this machine (by pebble); no worker outlives this process.
 
-Separate processes are needed since FLINT may abort its process, ignores Ctrl-C and allocates memory without bound. A
-worker runs tasks for some seconds and is then replaced. If a task fails in a worker that has run other tasks before, or
-if this worker dies, the task is run again in a fresh worker, and the second outcome is recorded. Hence records do not
-depend on the order of tasks. A task whose worker is killed from outside is run again a few times before it is lost.
+Tasks need processes of their own, since FLINT may abort the process, ignores Ctrl-C and allocates memory without bound.
+A worker runs tasks for some seconds and is then replaced. If a task fails unexpectedly, or kills its worker, after this
+worker has run other tasks, the task is run again in a fresh worker, and the second outcome is recorded: so records do
+not depend on the order of tasks. A task whose worker is killed from outside is tried a few times before it is lost.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.processes import end_with_parent
 from kahanmaps.version import __version__
 
-# A task is lost after this number of attempts in which its worker was killed from outside. A lost task has no result,
-# and the next run of the batch attempts it again.
+# A task is lost after so many attempts in which its worker was killed from outside. A lost task has no result, so that
+# the next run of the batch runs it again.
 TRIES = 5
-GROUP_SECONDS = 5.0  # seconds of work for one worker process: its start takes about 0.2 s
-TAIL_LENGTH = 2000  # characters stored of a message, a traceback, or the output of a worker
+GROUP_SECONDS = 5.0  # seconds after which a worker process is replaced: its start takes about 0.2 s
+TAIL_LENGTH = 2000  # maximal number of characters stored of a message, a traceback, or the output of a worker
 
-# Error messages of Python, FLINT, GMP and OpenBLAS for lack of memory.
+# Error messages by which Python, FLINT, GMP and OpenBLAS report lack of memory.
 _MEMORY_PHRASES = (
     *("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc", "not enough memory"),
     *("memory allocation", "memory alloc failed", "malloc failed", "too many memory regions"),
 )
-# Signals raised by a fault in the process or by its own limits: the task, or a library that it called, has crashed. All
-# other signals are sent from outside, e.g. when a job is cancelled or the machine shuts down. The system sends SIGKILL
-# also for lack of memory; this case cannot be recognized.
+# These signals come from a fault in the process or from its own limits: the task, or a library that it called, has
+# crashed. All others come from outside, e.g. when a job is cancelled or the machine shuts down. The system also sends
+# SIGKILL if memory is exhausted; this case cannot be distinguished.
 _CRASH_SIGNALS = {
     *(Signals.SIGSEGV, Signals.SIGABRT, Signals.SIGFPE, Signals.SIGBUS, Signals.SIGILL),
     *(Signals.SIGSYS, Signals.SIGTRAP, Signals.SIGXCPU, Signals.SIGXFSZ),
@@ -66,25 +66,25 @@ class WorkersError(KahanmapsError):
     """Raised if worker processes cannot be started."""
 
 
-# In this process
+# Code of the parent process
 
 
 @dataclass
 class _Attempt:
-    """A job in flight (submitted, its record not yet returned), with the history of its attempts."""
+    """A job in flight (submitted, but its record is not yet returned), and what happened in its attempts."""
 
     job: Job
     documents: dict[str, str]
     tries: int = 0  # number of attempts in which the worker was killed from outside
-    had_fault: bool = False  # whether an earlier attempt failed for a reason that may lie in its worker
-    begun: float = 0.0  # time of the start of this attempt
+    had_fault: bool = False  # whether an attempt failed for a reason that may lie in earlier tasks of its worker
+    begun: float = 0.0  # time at which the current attempt began
 
 
 class LocalWorkers:
-    """An executor that runs at most `jobs` worker processes on this machine.
+    """An executor that runs jobs on this machine, in at most `jobs` worker processes at a time.
 
-    `documents` returns the text of a system document from its digest. A job is lost after `tries` attempts in which the
-    worker was killed from outside. `submit` and `wait` raise WorkersError if no worker can be started.
+    `documents` maps the digest of a system document to its text. A job is lost after `tries` attempts in which its
+    worker was killed from outside. `submit` and `wait` raise WorkersError if no worker process can be started.
     """
 
     def __init__(
@@ -106,17 +106,17 @@ class LocalWorkers:
 
     @property
     def in_flight(self) -> int:
-        """The number of jobs submitted whose records have not been returned."""
+        """The number of submitted jobs whose records have not been returned yet."""
         return len(self._running)
 
     def submit(self, job: Job) -> None:
-        """Give a job to an idle worker, or to a new one."""
+        """Give a job to an idle worker, or start a new one."""
         self._begin(_Attempt(job, {key: self._documents(key) for key in job.task.documents}))
 
     def wait(self, timeout: float) -> list[Record]:
-        """Return the finished records, after at most `timeout` seconds."""
+        """Return the records of finished jobs, after at most `timeout` seconds; the list may be empty."""
         wait_for(self._running, timeout, FIRST_COMPLETED)
-        # A pool that breaks while it accepts a task never sets the result of the future.
+        # If a pool breaks while it accepts a task, pebble never sets the result of the future of this task.
         ended = [future for future, (worker, _) in self._running.items() if future.done() or not worker.pool.active]
         records = []
         for future in ended:
@@ -138,11 +138,11 @@ class LocalWorkers:
             thread.join()
 
     def _begin(self, attempt: _Attempt) -> None:
-        # A second attempt is made in a fresh worker, one that has not run any task.
+        # The attempt after a failed one is made in a fresh worker, which has not run any task.
         is_retry = attempt.tries > 0 or attempt.had_fault
         if is_retry or not self._idle:
             worker = _Worker()
-            self._workers.append(worker)  # before its start, so that `close` always kills it
+            self._workers.append(worker)  # before the process starts, so that `close` kills every worker
         else:
             worker = self._idle.pop()
         attempt.begun = time.monotonic()
@@ -152,11 +152,11 @@ class LocalWorkers:
             self._end(worker)
             if worker.process is None:
                 raise WorkersError(f"a worker process cannot be started: {error.__cause__ or error}") from error
-            return self._begin(attempt)  # the idle worker had died
+            return self._begin(attempt)  # the idle worker had died before it got the task
         self._running[future] = worker, attempt
 
     def _record(self, worker: _Worker, attempt: _Attempt, future: Future[str]) -> Record | None:
-        """Return the record of a job that has ended, or None if the job must be run again in a fresh worker."""
+        """Return the record of a job whose attempt has ended; None if the job is to be run again in a fresh worker."""
         from pebble import ProcessExpired
 
         was_fresh, worker.is_fresh = worker.is_fresh, False
@@ -165,12 +165,12 @@ class LocalWorkers:
         if error is None:
             try:
                 data |= json.loads(future.result())
-            except (ValueError, RecursionError) as parse_error:  # e.g. an integer with more digits than Python parses
+            except (ValueError, RecursionError) as parse_error:  # such as an integer of too many digits for Python
                 data |= {"outcome": Outcome.FAILED, "message": f"the result cannot be kept: {parse_error}"}
             worker.seconds += data["seconds"]
-            # An unexpected error, with a traceback, may be caused by earlier tasks of this worker.
+            # Earlier tasks of this worker may be the cause of an unexpected error, which comes with a traceback.
             is_doubtful = data["outcome"] == Outcome.FAILED and "stderr" in data
-            is_exhausted = data["outcome"] == Outcome.OUT_OF_MEMORY  # earlier tasks may have used the memory
+            is_exhausted = data["outcome"] == Outcome.OUT_OF_MEMORY  # earlier tasks may have taken the memory
             is_retry = attempt.tries > 0 or attempt.had_fault
             if is_doubtful or is_exhausted or is_retry or worker.seconds >= self._group_seconds:
                 self._end(worker)
@@ -180,7 +180,7 @@ class LocalWorkers:
                 attempt.had_fault = True
                 return None
             return _record_of(data)
-        # Pebble also reports a broken pool if the worker ended with status 0 or before it accepted the task.
+        # Pebble reports a broken pool too if the worker ended with status 0, or before it accepted the task.
         status = error.exitcode if isinstance(error, ProcessExpired) else worker.exitcode
         data["stderr"] = output = worker.printed()
         is_ready = worker.is_ready
@@ -198,7 +198,7 @@ class LocalWorkers:
                 return None
             return _record_of({**data, "outcome": Outcome.LOST, "message": ending_text})
         lacks_memory = any(phrase in output.lower() for phrase in _MEMORY_PHRASES)
-        # A signal that reports a fault may also be sent from outside, but hardly twice.
+        # A signal that indicates a fault may also come from outside, but hardly in two attempts.
         if not was_fresh or not (lacks_memory or attempt.had_fault or (status is not None and status > 0)):
             attempt.had_fault = True
             return None
@@ -207,7 +207,7 @@ class LocalWorkers:
         return _record_of({**data, "outcome": Outcome.CRASHED, "message": ending_text})
 
     def _end(self, worker: _Worker) -> None:
-        """Kill a worker. A thread waits for the end of its pool, which takes some tenths of a second."""
+        """Kill a worker; a thread waits for the end of its pool, which takes some tenths of a second."""
         self._workers.remove(worker)
         worker.kill()
         self._ending = [thread for thread in self._ending if thread.is_alive()]
@@ -216,21 +216,21 @@ class LocalWorkers:
 
 
 class _Worker:
-    """A process in a pool of its own, which runs one task after the other.
+    """A worker: a process in a pebble pool of its own, which runs tasks one after another.
 
-    The workers of a pool of pebble share one pipe with one lock. A worker that is killed while it holds the lock, or
-    while it sends a result, would block all other workers. Hence each worker has its own pool, which is discarded when
-    the worker dies.
+    All workers of a pebble pool share one pipe with one lock. A worker that is killed while it holds the lock, or while
+    it sends a result, would block all others. Hence each worker has a pool of its own, which is discarded when the
+    worker dies.
     """
 
     def __init__(self) -> None:
-        from pebble import ProcessPool  # not needed for `kahanmaps --help`
+        from pebble import ProcessPool  # imported here, since `kahanmaps --help` does not need it
 
         self.seconds = 0.0
-        self.is_fresh = True  # True until it runs its first task
+        self.is_fresh = True  # whether the worker has not run a task yet
         self._documents: set[str] = set()
         with TemporaryFile() as file:
-            # The output file of the worker, as a connection: multiprocessing cannot pass an unnamed file otherwise.
+            # The file for the output of the worker, as a Connection: multiprocessing passes no other unnamed file.
             self._output = Connection(os.dup(file.fileno()))
         fcntl(self._output.fileno(), F_SETFL, os.O_APPEND)
         self._context = _Context()
@@ -238,7 +238,7 @@ class _Worker:
         self.pool: Any = ProcessPool(1, initializer=_begin, initargs=arguments, context=self._context)
 
     def start_task(self, attempt: _Attempt) -> Future[str]:
-        """Start a task and return the future of its record as text."""
+        """Start a task and return the future of its record, which is JSON text."""
         os.ftruncate(self._output.fileno(), 0)
         new_documents = {key: text for key, text in attempt.documents.items() if key not in self._documents}
         self._documents.update(new_documents)
@@ -249,26 +249,26 @@ class _Worker:
 
     @property
     def process(self) -> SpawnProcess | None:
-        """The process, None before it is started."""
+        """The process of the worker; None before its start."""
         return self._context.process
 
     @property
     def exitcode(self) -> int | None:
-        """The exit status as in `subprocess`; None while the process runs."""
+        """The exit status of the process as in `subprocess`; None while it runs."""
         return None if self.process is None else self.process.exitcode
 
     @property
     def is_ready(self) -> bool:
-        """Whether the worker waits for tasks."""
+        """Whether the process has been prepared and accepts tasks."""
         return not os.fstat(self._output.fileno()).st_mode & S_IWUSR
 
     def printed(self) -> str:
-        """Return the end of the output of the process since its task began."""
+        """Return the end of what the process has printed since its current task began."""
         begin = max(0, os.fstat(self._output.fileno()).st_size - TAIL_LENGTH)
         return os.pread(self._output.fileno(), TAIL_LENGTH, begin).decode("utf-8", "replace").strip()
 
     def kill(self) -> None:
-        """Kill the process and all processes that its tasks have started."""
+        """Kill the process and all processes that its tasks started."""
         self.pool.stop()
         if self.process is not None and self.process.pid is not None:
             with suppress(ProcessLookupError, PermissionError):
@@ -276,23 +276,23 @@ class _Worker:
             self.process.kill()
 
     def end(self) -> None:
-        """Kill the process; leave no zombie, no thread and no open file."""
+        """Kill the process, and remove its zombie, its threads and its open files."""
         self.kill()
-        with suppress(Exception):  # pebble may raise any exception for a dead worker
+        with suppress(Exception):  # for a dead worker pebble may raise any exception
             self.pool.join()
         self._output.close()
 
 
 class _Context(SpawnContext):
-    """The context in which pebble starts the single process of a pool, and refuses to replace it."""
+    """The context in which pebble starts the only process of a pool; it refuses to start another one."""
 
     process: SpawnProcess | None = None
 
-    # Pebble calls these two methods.
+    # Methods that pebble calls.
 
     def Process(self, *args: Any, **keywords: Any) -> SpawnProcess:  # type: ignore[override]
         if self.process is not None:
-            raise OSError("the worker has ended")  # this error breaks the pool, as intended
+            raise OSError("the worker has ended")  # this error breaks the pool, as is intended
         self.process = _Process(*args, **keywords)
         return self.process
 
@@ -301,7 +301,7 @@ class _Context(SpawnContext):
 
 
 class _NoLock:
-    """A lock without effect, for a pipe with a single user. A semaphore would outlive a killed parent."""
+    """A lock without effect, for a pipe that one process uses; a semaphore would remain after a kill of the parent."""
 
     def acquire(self, block: bool = True, timeout: float | None = None) -> bool:
         return True
@@ -311,17 +311,17 @@ class _NoLock:
 
 
 class _Process(SpawnProcess):
-    """A process that does not import the main module, has a fixed hash seed, and starts with Ctrl-C blocked."""
+    """A process that does not import the main module, has a fixed hash seed, and starts with SIGINT blocked."""
 
     _starting = Lock()
 
     def start(self) -> None:
         with _Process._starting:
-            # multiprocessing would run the main module: scripts that call `run` would need `if __name__ == "__main__"`.
+            # Otherwise multiprocessing runs the main module: scripts that call `run` need `if __name__ == "__main__"`.
             main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
-            # With a fixed seed no result can depend on the order of sets of texts.
+            # With a fixed hash seed no result depends on the order of the elements of a set.
             seed, os.environ["PYTHONHASHSEED"] = os.environ.get("PYTHONHASHSEED"), "0"
-            # A KeyboardInterrupt while Python starts would be a fatal error with status 1, or a RuntimeError.
+            # A KeyboardInterrupt during the start of Python would be a fatal error with status 1, or a RuntimeError.
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 super().start()
@@ -340,12 +340,12 @@ def _record_of(data: dict[str, Any]) -> Record:
 
 
 def is_from_outside(status: int | None) -> bool:
-    """Whether this exit status, as in `subprocess`, means that the process was killed from outside."""
+    """Whether an exit status, as in `subprocess`, means that the process was killed from outside."""
     return status is not None and status < 0 and -status not in _CRASH_SIGNALS
 
 
 def ending(status: int | None) -> str:
-    """Return a description of how a process ended, from its exit status.
+    """Return a description of how a process with this exit status, as in `subprocess`, ended.
 
     >>> ending(-15), ending(-11), ending(7)
     ('was killed by signal 15 (SIGTERM), from outside', 'was killed by signal 11 (SIGSEGV)', 'ended with status 7')
@@ -362,7 +362,7 @@ def ending(status: int | None) -> str:
     return f"{description}, from outside" + (" or for want of memory" if -status == SIGKILL else "")
 
 
-# In the worker
+# Code of the worker process
 
 
 @dataclass
@@ -370,7 +370,7 @@ class _WorkerState:
     """The state of a worker process."""
 
     pid: int = 0
-    idle: int | None = None  # bytes of address space before its first task
+    idle: int | None = None  # bytes of address space before the first task
     documents: dict[str, str] = field(default_factory=dict)
 
 
@@ -378,41 +378,41 @@ _state = _WorkerState()
 
 
 def _begin(parent: int, output: Connection) -> None:
-    """Prepare the worker: pebble calls this once, before the first task."""
+    """Prepare a worker process; pebble calls this function once, before the first task."""
     end_with_parent(parent)
-    os.setpgid(0, 0)  # processes started by tasks end with the group, and Ctrl-C in a terminal reaches only the parent
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler would wait until a call of FLINT returns
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # pebble ignores SIGINT
-    # Records have their own pipe: output of tasks goes to the file, and their standard input is empty.
+    os.setpgid(0, 0)  # a kill of this group ends processes that tasks started; Ctrl-C reaches the parent only
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait until the current call of FLINT returns
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # undo that pebble ignores SIGINT
+    # Output of tasks goes to a file, since records have a pipe of their own; the standard input of tasks is empty.
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
-    task_kinds()  # import them now, so that no task is charged with the time
+    task_kinds()  # load the tasks now, so that no task is charged with the time of the import
     _state.pid, _state.idle = os.getpid(), _address_space()
-    os.fchmod(output.fileno(), S_IRUSR)  # signal to the parent that the worker is ready
+    os.fchmod(output.fileno(), S_IRUSR)  # the mode of the file tells the parent that the worker is ready
 
 
 def _run_task(text: str, memory: int | None, documents: dict[str, str]) -> str:
-    """Run the task with this canonical text, and return its record as JSON: pickling a result might run its code."""
+    """Run the task with this canonical text; return its record as JSON, since unpickling a result might run code."""
     _state.documents.update(documents)
     data = perform(Task.from_text(text), memory, _state.documents, _state.idle)
     if os.getpid() != _state.pid:
-        os._exit(0)  # the task has forked, and this process is the copy
+        os._exit(0)  # this process is a copy that the task forked
     try:
         return canonical(data)
-    except (ValueError, TypeError, RecursionError) as error:  # JSON cannot represent nan, Fraction or arrays
+    except (ValueError, TypeError, RecursionError) as error:  # JSON cannot represent nan, a Fraction or an array
         message = f"the result cannot be kept: {error}"[:TAIL_LENGTH]
         return canonical({"key": data["key"], "outcome": Outcome.FAILED, "message": message})
 
 
 def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: int | None = None) -> dict[str, Any]:
-    """Run a task and return plain data for its `Record`.
+    """Run a task and return the data of its `Record`.
 
-    `idle` is the address space of a fresh worker. Memory that earlier tasks did not release is charged to this task;
-    otherwise the task would have more memory here than in a fresh worker.
+    `idle` is the address space of a fresh worker in bytes. A task is charged with memory that earlier tasks did not
+    release; otherwise it would have more memory than in a fresh worker.
     """
     with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
-        file.write("5")  # reset the peak: from now on it is the peak of this task
+        file.write("5")  # from now on, VmHWM is the peak memory of this task
     _limit_memory(memory, idle)
     begin = time.perf_counter()
     data: dict[str, Any] = {"key": task.key, "outcome": Outcome.OK}
@@ -428,11 +428,11 @@ def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: 
         if not isinstance(verdict, str | None):
             raise InputError(f"found the verdict {str(verdict)[:100]}, expected a text")
         data |= {"verdict": verdict, "result": result}
-    except BaseException as error:  # every error of a task becomes its record, even SystemExit
+    except BaseException as error:  # any error of a task becomes its record, even SystemExit
         data |= failure(error)
     _limit_memory(None, idle)
     seconds = time.perf_counter() - begin
-    # The largest resident size since the task began, in bytes; without /proc, since the process began.
+    # Peak resident memory in bytes since the task began; without /proc, since the process began.
     peak_memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     with suppress(OSError), open("/proc/self/status") as file:
         peak_memory = next((int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM:")), peak_memory)
@@ -440,11 +440,11 @@ def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: 
 
 
 def failure(error: BaseException) -> dict[str, Any]:
-    """Return the data of the record for an error; an unexpected one includes its traceback."""
+    """Return the data of a record for an error; those of an unexpected error include its traceback."""
     cause: BaseException | None = error
     while cause is not None and not is_out_of_memory(cause):
         cause = cause.__cause__ or cause.__context__
-    if cause is not None:  # MemoryError or an equivalent error, or an error caused by one
+    if cause is not None:  # an error caused by lack of memory, such as MemoryError
         return {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
     if isinstance(error, InputError):
         return {"outcome": Outcome.FAILED, "message": str(error)[:TAIL_LENGTH]}
@@ -465,7 +465,7 @@ def _versions() -> dict[str, str]:
 
 
 def _limit_memory(memory: int | None, idle: int | None) -> None:
-    """Limit the address space to `idle` (default: its current size) plus `memory`; None removes the limit."""
+    """Limit the address space to `memory` bytes above `idle` (default: its current size); None removes the limit."""
     with suppress(OSError, ValueError):  # the system refuses a limit below the current size
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard

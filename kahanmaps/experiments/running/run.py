@@ -1,9 +1,9 @@
-"""The loop that runs jobs and yields their records.
+"""The loop that runs the jobs of a batch and yields their records.
 
     for record in run("study.toml", jobs=2): ...                 nothing is stored
     for record in run("study.toml", "results.db", jobs=2): ...   each record is stored before it is yielded
 
-`Batch` is the loop itself, for any jobs and any executor.
+`Batch` is this loop for any jobs and any executor.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from kahanmaps.experiments.results.store import Planned, Store
 from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
-_WAIT_SECONDS = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time in which the last list was written
-GRACE_SECONDS = 10.0  # seconds that tasks in flight have after an interrupt
+_WAIT_SECONDS = 0.1  # the longest wait: an interrupt is noticed, and an empty list is yielded, after at most this time
+_COLLECTION_FACTOR = 4  # records are collected for this multiple of the time that writing the previous list took
+GRACE_SECONDS = 10.0  # seconds after an interrupt for which tasks in flight may continue
 
 
 class Batch:
-    """An iterable that yields records in lists as they arrive: at least ten lists a second, some of them empty.
+    """An iterable of lists of records, yielded as jobs end: at least ten lists a second, some of them empty.
 
-    Since writing waits for the disk, records of short tasks are collected in one list, for four times as long as it
-    took to write the last list. A caller that stores each list at once loses at most one list and the tasks in flight.
+    Since writing waits for the disk, the records of short tasks are collected in one list, for four times as long as
+    writing the last list took. A caller that stores each list at once can lose one list and the tasks in flight.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE_SECONDS) -> None:
@@ -43,7 +43,7 @@ class Batch:
         return self._deadline is not None
 
     def interrupt(self) -> None:
-        """Submit no further jobs, and abandon jobs in flight after `grace` seconds (safe in a signal handler)."""
+        """Submit no further jobs, and abandon jobs in flight after `grace` seconds; a signal handler may call this."""
         self._deadline = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
@@ -76,7 +76,7 @@ class Batch:
 
 
 def plan(spec: Spec, store: Store) -> dict[str, Planned]:
-    """Plan all experiments of a spec in a store; earlier results are kept."""
+    """Store the plans of all experiments of a spec in a store; results in the store remain."""
     return {
         experiment.name: store.plan(
             experiment.name,
@@ -98,10 +98,10 @@ def executor_for(
     group_seconds: float = GROUP_SECONDS,
     on_message: Callable[[str], None] | None = None,
 ) -> Executor:
-    """Return an executor: `jobs` local worker processes, or the workers of a dask `scheduler`.
+    """Return an executor that runs jobs in `jobs` local worker processes or, if given, on the workers of a `scheduler`.
 
-    The scheduler is given as "tcp://host:port" or by its scheduler file. Short tasks are run in groups of about
-    `group_seconds`. `python` is the path of the interpreter on the workers, if it differs from the local one;
+    The dask scheduler is given as "tcp://host:port" or by its scheduler file. Short tasks are run in groups of about
+    `group_seconds`. `python` is the path of the interpreter on the workers if it differs from the local one.
     `on_message` is called with messages about waiting for the cluster.
     """
     if scheduler is None:
@@ -123,14 +123,14 @@ def run(
 ) -> Iterator[Record]:
     """Run the tasks of a spec and yield their records as they finish.
 
-    `spec` is a path, the text of a spec (a text with a line break), or a Spec. With `db`, the path of a database, tasks
-    with a record in it are not run again, and every record is stored before it is yielded; without `db` nothing is
+    `spec` is a path, the text of a spec (a text with a line break), or a Spec. `db` is the path of a database: tasks
+    with a record in it are not run again, and every record is stored before it is yielded. Without `db` nothing is
     stored. The tasks run in `jobs` local worker processes or on the workers of a dask `scheduler`. `only` names the
-    experiments to run, `shard` = (i, n) selects the i-th of n parts of the tasks, and `retry_failed` runs failed tasks
-    again. A task that is killed from outside at every attempt is yielded as lost, and has no record in `db`. Closing
-    the generator kills the tasks in flight.
+    experiments to run, `shard` = (i, n) selects the i-th of n parts of the tasks, and `retry_failed` includes failed
+    tasks. A task that is killed from outside at every attempt is yielded as lost and not stored. Closing the generator
+    kills the tasks in flight.
 
-    Raises SpecError, StoreError.
+    Raises SpecError for an invalid spec, and StoreError for a database that cannot be used.
 
     >>> table = '[experiments.space]\\ntask = "family-space"\\nsystem = "family"\\naxes = {m = "2..3", seed = "0..1"}'
     >>> sorted(record.result["dimension"] for record in run(table))
@@ -153,7 +153,7 @@ def run(
 
 
 def _jobs(spec: Spec, names: Sequence[str], shard: tuple[int, int]) -> Iterator[Job]:
-    """Yield the jobs of a spec in order, each task once."""
+    """Yield the jobs of a spec in order; a task that occurs several times is yielded once."""
     seen_keys = set()
     part, parts = shard
     experiments = [experiment for experiment in spec.experiments if experiment.name in names]

@@ -1,1 +1,1 @@
-"""The drift of integrals along float orbits of several methods."""
+"""The comparison of Kahan's method with other methods: drift of integrals along float orbits, errors, work."""

@@ -1,7 +1,7 @@
 """Numerical experiments with Kahan's method and other methods: drift of functions, errors, orders, work.
 
-All methods use the float engine (maps/floats), which advances all initial points together. Nothing is proved here: all
-numbers are measured in double precision, and do not depend on the kernel.
+All methods use the float engine (maps/floats), which advances all initial points together. All numbers are measured in
+double precision and do not depend on the kernel; nothing is proved.
 """
 
 from __future__ import annotations
@@ -39,31 +39,31 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
 
 DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
-BINS = 200  # number of bins of steps; the largest error in each bin is kept
+BINS = 200  # number of bins of step numbers; a drift curve contains the largest error in each bin
 MAX_STEPS = 10**9
-MAX_FUNCTIONS = 12  # number of functions whose drift is measured
-MAX_STARTS = 100_000  # initial points
-_CANDIDATE_STARTS = 40  # initial points that are tried if none is given
-_STARTS_PER_SIZE = 5  # candidates of one size; the coordinates of the next ones are half as large
-_PROBE_STEPS = 1000  # steps of RK4 that the orbit of a candidate must complete
+MAX_FUNCTIONS = 12  # maximal number of functions whose drift is measured
+MAX_STARTS = 100_000  # maximal number of initial points
+_CANDIDATE_STARTS = 40  # number of initial points that are tried if none is given
+_STARTS_PER_SIZE = 5  # number of candidates of one size; the next candidates have coordinates half as large
+_PROBE_STEPS = 1000  # number of RK4 steps that the orbit of a candidate must complete
 _REFERENCE_STARTS = 4  # maximal number of initial points for which errors are measured
-_MAX_HALVINGS = 6  # number of times t at which the reference solution is tried; each t is half of the previous one
-_MIN_LOG_STEPS, _MAX_LOG_STEPS = 1, 14  # base-2 logarithms of the smallest and largest number of steps
-_MIN_SIZES = 5  # step sizes needed before the order counts as converged
-_MAX_SLOPE_CHANGE = 0.004  # the order counts as converged if the slope between step sizes changes by less
-_ROUNDING_ERROR = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
-_MIN_COMPILED_STEPS = 20_000  # of all orbits together: for fewer steps numpy is faster than loading compiled code
+_MAX_HALVINGS = 6  # number of times at which the reference solution is tried; each time is half of the previous one
+_MIN_LOG_STEPS, _MAX_LOG_STEPS = 1, 14  # log2 of the smallest and of the largest number of steps
+_MIN_SIZES = 5  # minimal number of step sizes before the measured order counts as converged
+_MAX_SLOPE_CHANGE = 0.004  # maximal change of the slope log2(error ratio) between step sizes for a converged order
+_ROUNDING_ERROR = 1000 * 2.0**-53  # times the root of the number of steps: smaller relative errors are rounding errors
+_MIN_COMPILED_STEPS = 20_000  # steps of all orbits together: for fewer, numpy is faster than compiled code
 _MAX_NUMBER_CHARACTERS = 60  # maximal length of a printed number; JSON output has all characters
 _COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
 
 
 @dataclass(frozen=True, eq=False)
 class DriftCurve:
-    """The largest error of a function in each bin of steps along the orbits of a method, and the step of this error.
+    """The drift of a function along the orbits of a method: the largest error in each bin of step numbers.
 
-    The error is exactly 0 if all values in the bin are equal to the initial values. Bins without values are omitted;
-    `undefined` counts points at which the function is undefined. `last` is the error at the last step, NaN if
-    undefined.
+    `errors` has the largest error of each bin, exactly 0 if all values in the bin equal the initial values; `steps` has
+    the step at which it occurs. Bins without values are omitted; `undefined` counts the points at which the function
+    is undefined. `last` is the error at the last step, NaN if undefined.
     """
 
     method: str
@@ -75,15 +75,15 @@ class DriftCurve:
 
     @property
     def largest(self) -> float:
-        """The largest error of all steps; NaN if there are no values."""
+        """The largest error over all steps; NaN if there are no values."""
         return float(self.errors.max()) if len(self.errors) else float("nan")
 
 
 @dataclass(frozen=True)
 class StepError:
-    """The largest error of a method at a fixed time, after `steps` steps with half the time step `eps`.
+    """The largest error of a method at a fixed time that is reached in `steps` steps; `eps` is half their length.
 
-    `evaluations` counts evaluations of f for one initial point.
+    `evaluations` is the number of evaluations of f for one initial point.
     """
 
     eps: fmpq
@@ -94,13 +94,13 @@ class StepError:
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """The measurements for one method.
+    """The measurements for one method in a comparison.
 
-    `ends` says how the orbit of each initial point ended. The counts over all orbits are `evaluations` of f, solved
-    linear `systems`, `repeated` steps (in which an implicit method needed more iterations), and `failures` (orbits that
-    ended since Newton's method found no solution). `errors` are measured at the time of the reference solution, by
-    decreasing step size; `order` is log2 of the quotient of the errors for a step size and half of it, the smallest
-    ones above the rounding error (None: there are none). `seconds` is None without a clock.
+    `ends` says how the orbit of each initial point ended. Sums over all orbits are `evaluations` of f, solved linear
+    `systems`, `repeated` steps (with additional iterations of an implicit method), and `failures` (orbits for which
+    Newton's method found no solution). `errors` are those at the time of the reference solution, by decreasing step
+    size. `order` is log2 of the quotient of the errors for a step size and half of it, the smallest above the rounding
+    error (None: there are none). `seconds` is None without a clock.
     """
 
     method: str
@@ -115,7 +115,7 @@ class MethodRun:
 
     @property
     def early(self) -> list[OrbitEnd]:
-        """The ends of the orbits that did not complete their steps."""
+        """The ends of those orbits that did not complete their steps."""
         return [end for end in self.ends if not end.is_complete]
 
 
@@ -123,11 +123,10 @@ class MethodRun:
 class Comparison(ResultPart):
     """The result of `compare`.
 
-    `relative` maps the name of a function I to True if its errors are divided by |I(x_0)|, to False if its errors are
-    absolute. `labels` are the names of functions in plots. `origins` are the origins of functions: declared, theorem,
-    found, flow or requested. `time` is the time at which errors are measured, None without a reference solution.
-    `skipped` maps each requested method that the system does not admit to the reason. `eps` is half the time step
-    (exact).
+    `labels`, `origins` and `relative` are dicts from the name of a function I: to its label in plots; to its origin,
+    which is declared, theorem, found, flow or requested; and to True if its errors are divided by |I(x_0)|, to False if
+    they are absolute. `time` is the time at which errors are measured, None without a reference solution. `skipped`
+    maps each requested method that the system does not admit to the reason. `eps` is exact, half the time step.
     """
 
     file: SystemFile = field(repr=False)
@@ -144,11 +143,11 @@ class Comparison(ResultPart):
     notes: tuple[str, ...]
 
     def drift(self, method: str, function: str) -> DriftCurve:
-        """Return the drift of a function along the orbits of a method."""
+        """Return the drift of the function named `function` along the orbits of the method named `method`."""
         return next(curve for curve in self.curves if (curve.method, curve.function) == (method, function))
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return all measured curves as rows of one table; the entry "kind" of a row is drift or error."""
+        """Return the drift and error curves as rows of one table; the entry "kind" of a row is drift or error."""
         rows: list[tuple[Any, ...]] = []
         for curve in self.curves:
             for step, value in zip(curve.steps.tolist(), curve.errors.tolist(), strict=True):
@@ -164,7 +163,7 @@ class Comparison(ResultPart):
         return data_frame(self.rows())
 
     def write(self, path: str | Path) -> None:
-        """Write `rows` to a file, whose suffix is .csv or .parquet (which needs pandas and pyarrow)."""
+        """Write `rows` to a .csv or .parquet file; the format .parquet needs pandas and pyarrow."""
         rows, suffix = self.rows(), Path(path).suffix
         if suffix not in (".csv", ".parquet"):
             raise InputError(f"found {path}, expected a name that ends with .csv or .parquet")
@@ -175,7 +174,7 @@ class Comparison(ResultPart):
             write_atomically(path, self.to_pandas().to_parquet(index=False))
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data without the drift curves; for these use `rows`."""
+        """Return plain data without the drift curves, which `rows` contains."""
         methods = []
         for run in self.runs:
             drift = {c.function: attributes(c, "largest", "last") for c in self.curves if c.method == run.method}
@@ -202,7 +201,7 @@ class Comparison(ResultPart):
         }
 
     def tables(self) -> Iterator[list[list[str]]]:
-        """Yield tables as rows of cells: one table of the methods, and one of the drift of each function."""
+        """Yield tables, each a list of rows of cells: one of the methods, and one of the drift of each function."""
         head = ["# method", "order", "measured", "error", "f per step", "systems per step", "orbits"]
         has_seconds = any(run.seconds is not None for run in self.runs)
         rows = [head + ["seconds"] * has_seconds]
@@ -224,7 +223,7 @@ class Comparison(ResultPart):
 
     @property
     def text(self) -> str:
-        """The tables and notes, as `print` shows them."""
+        """The tables and notes as text, as `print` shows them."""
         eps = eps_record_suffix({"eps": _short_number(self.eps), "time_step": _short_number(2 * self.eps)})
         lines = [f"# {self.file.name}{eps}, {counted(self.steps, 'step')}, measured in floating point"]
         for rows in self.tables():
@@ -235,7 +234,7 @@ class Comparison(ResultPart):
         return self.text
 
     def remarks(self) -> list[str]:
-        """Return sentences that explain the numbers and list missing measurements."""
+        """Return sentences that explain the numbers in the tables and say what could not be measured."""
         sentences = []
         if self.time is not None:
             sentences.append(f"error: at time {_short_number(self.time)}, against Taylor solutions in balls")
@@ -270,25 +269,26 @@ def compare(
 
     Args:
         system: a quadratic system.
-        start, x0: one initial point or several, exact numbers; floats are taken exactly. By default a random small one.
-        eps: half the time step of all methods, an exact number.
+        start, x0: one initial point or several, exact; floats are taken exactly. By default a small random point.
+        eps: half the time step of all methods (exact).
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps over which the drift is measured, by default 10,000.
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
-        integrals: functions, texts or pairs (name, text); by default known integrals, or the results of a quick search.
-        linear_bins: whether the bins of the drift have equal lengths; by default they grow with the step.
+        integrals: functions, as texts or pairs (name, text); by default known integrals or results of a quick search.
+        linear_bins: whether all bins of the drift have the same length; by default later bins are longer.
         orders: whether to measure errors and orders, for which a reference solution is computed.
-        seed: the random seed of the initial point.
+        seed: the random seed of the default initial point.
         kernel: "numpy" or "numba" (default: numba if installed); the numbers are the same.
         clock: a function such as `time.perf_counter` that measures the seconds of each method; by default none.
         progress: called with a sentence at each stage.
 
     Returns:
-        A `Comparison`: errors |I(x_n) - I(x_0)|/|I(x_0)| of each function I (their maximum over all initial points, for
-        each of about 200 bins of steps), and errors against a Taylor solution in balls. All errors are measured.
+        A `Comparison`: for each function I the errors |I(x_n) - I(x_0)|/|I(x_0)| (maximum over all initial points and
+        the steps n in each of about 200 bins), and the errors of orbits against a Taylor solution in ball arithmetic.
+        All errors are measured.
 
     Raises:
-        InputError: for invalid values, and if a function is undefined at an initial point.
+        InputError: for invalid values, and for a function that is undefined at an initial point.
 
     >>> result = compare("euler_top", [1, "1/2", "1/3"], "1/20", 1000, methods=["kahan", "rk4"], kernel="numpy")
     >>> [f"{run.method} {run.order:.2f}" for run in result.runs]
@@ -338,7 +338,7 @@ def compare(
         for k, points in enumerate(ensemble.records(steps, 1 if functions else steps)):
             with np.errstate(all="ignore"):
                 for function, bins, (initial_value, scale) in zip(functions, function_bins, initial, strict=True):
-                    if k:  # at step 0 errors are 0 by definition
+                    if k:  # at step 0 every error is 0 by definition
                         bins.add(ensemble.step - len(points) + 1, np.abs(function(points) - initial_value) / scale)
             progress(f"{METHODS[name].title}: step {ensemble.step} of {steps}")
             if (ensemble.failed_at >= 0).all():
@@ -363,10 +363,10 @@ def compare(
 
 
 def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
-    """Return a random initial point with small rational coordinates, determined by the seed.
+    """Return a random initial point with small rational coordinates, which `seed` determines.
 
-    The function tries 40 candidates of decreasing size and returns the first from which RK4 completes a thousand steps,
-    so that methods can be compared; if none does, it returns the first candidate. `eps` is half the time step.
+    Of 40 candidates of decreasing size, the function returns the first from which RK4 completes a thousand steps, so
+    that the methods can be compared; if there is none, it returns the first candidate. `eps` is half the time step.
 
     >>> small_start(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "1/10")
     (1/2, 2/3)
@@ -411,7 +411,7 @@ def _exact_starts(system: QuadraticSystem, points: Any, eps: fmpq, seed: int) ->
 def _choose_methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
-    """Return the admitted methods, a dict (omitted method -> reason), and a function that makes orbits of a method."""
+    """Return the admitted methods, a dict {omitted method: reason}, and a function that starts orbits of a method."""
     if isinstance(requested, str) or not hasattr(requested or (), "__iter__"):
         raise InputError(f"found methods = {requested!r}, expected a list such as ['kahan', 'rk4']")
     names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))
@@ -445,7 +445,7 @@ def _choose_methods(
 def _initial_values(
     functions: Sequence[WatchedFunction], starts: Sequence[Sequence[fmpq]]
 ) -> tuple[list[tuple[FloatArray, FloatArray]], dict[str, bool]]:
-    """Return pairs (initial values, divisors of errors) of functions, and a dict: name -> are errors relative?"""
+    """Return (initial values, divisors of the errors) of each function, and {name: whether its errors are relative}."""
     points = np.array([to_floats(start) for start in starts])
     initial, relative = [], {}
     for function in functions:
@@ -453,7 +453,7 @@ def _initial_values(
         if None in exact_values or not np.isfinite(values).all():
             problem = "is not defined in floating point at the initial point: choose another one"
             raise InputError(f"{function.name} {problem}")
-        # Decide exactly whether I(x_0) = 0: its value in doubles may be a rounding error instead of 0.
+        # Whether I(x_0) = 0 is decided exactly: in doubles a value that is 0 may be a rounding error.
         relative[function.name] = all(value != 0 for value in exact_values) and bool((values != 0.0).all())
         initial.append((values, np.abs(values) if relative[function.name] else np.ones_like(values)))
     return initial, relative
@@ -462,9 +462,9 @@ def _initial_values(
 def _references(
     system: QuadraticSystem, starts: Sequence[Sequence[fmpq]], eps: fmpq, progress: Callable[[str], None]
 ) -> tuple[fmpq | None, FloatArray | None]:
-    """Return a time in which the solutions change by about their own norm, and the solutions at this time.
+    """Return a time in which each solution changes by about its own norm, and the solutions at this time.
 
-    The time is the time step times a power of 2, with the sign of eps. If no solution is found, both are None.
+    The time is a power of 2 times the time step, with the sign of eps. If no solution can be computed, both are None.
     """
     speeds = [max(abs(entry) for entry in system.over(QQ).value(start)) for start in starts]
     times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]
@@ -489,7 +489,7 @@ def _measure_errors(
     references: FloatArray,
     progress: Callable[[str], None],
 ) -> tuple[tuple[StepError, ...], float | None]:
-    """Return the errors at `time` by decreasing step size, and the measured order; None if it cannot be measured."""
+    """Return the errors at `time` by decreasing step size, and the measured order, None if it could not be measured."""
     errors: dict[int, StepError] = {}
     reference_size = float(np.abs(references).max())
 
@@ -499,7 +499,7 @@ def _measure_errors(
         ensemble.advance(steps)
         repeated = int(ensemble.near_singular.sum()) if name in IMPLICIT else 0
         evaluations = work(name, steps * len(references), repeated)[0] / len(references)
-        error = float(np.abs(ensemble.x - references).max())  # NaN if an orbit has ended
+        error = float(np.abs(ensemble.x - references).max())  # NaN if an orbit ended early
         return StepError(half_step, steps, error, evaluations)
 
     slopes: list[float] = []
@@ -526,7 +526,7 @@ def _measure_errors(
 
 
 def _bin_edges(steps: int, linear: bool) -> NDArray[np.int64]:
-    """Return the ends 0 = e_0 < e_1 < ... = steps of the bins; bin k contains the steps e_(k-1) < n <= e_k."""
+    """Return the ends 0 = e_0 < e_1 < ... = steps of the bins; bin k contains the steps n with e_(k-1) < n <= e_k."""
     if steps <= BINS:
         return np.arange(steps + 1)
     ends = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
@@ -534,7 +534,7 @@ def _bin_edges(steps: int, linear: bool) -> NDArray[np.int64]:
 
 
 class _Bins:
-    """The largest error in each bin among the steps that were added."""
+    """The largest error in each bin of steps, updated when errors are added."""
 
     def __init__(self, edges: NDArray[np.int64]) -> None:
         self._bin_edges = edges
@@ -544,7 +544,7 @@ class _Bins:
         self._last = float("nan")
 
     def add(self, first: int, errors: FloatArray) -> None:
-        """Add errors (steps, orbits) at the steps first, first + 1, ...; NaN if undefined."""
+        """Add `errors` (steps, orbits) at the steps `first`, `first` + 1, ...; NaN stands for undefined errors."""
         is_missing = ~np.isfinite(errors)
         self._undefined += int(is_missing.sum())
         errors = np.where(is_missing, -1.0, errors).max(axis=1)
@@ -556,6 +556,6 @@ class _Bins:
                 self._largest[bins[row]], self._steps[bins[row]] = errors[row], first + row
 
     def curve(self, method: str, function: str) -> DriftCurve:
-        """Return the curve of the largest errors, without empty bins."""
+        """Return the drift curve of the largest errors; empty bins are omitted."""
         is_used = self._largest >= 0
         return DriftCurve(method, function, self._steps[is_used], self._largest[is_used], self._undefined, self._last)

@@ -26,19 +26,19 @@ from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _MAX_NAME = 30  # maximal number of characters of the name of a function
-_EFFORT = -2  # effort of the search for integrals, which then takes at most a few seconds
+_EFFORT = -2  # effort of the search for integrals, with which it takes at most a few seconds
 
 
 class TwoPointFunction:
-    """An integral that depends on x and its Kahan image x~: the modified H, or x^T M x~/eps with a matrix M."""
+    """An integral that depends on x and its Kahan image x~: the modified H, or x^T M x~/eps for a matrix M."""
 
-    of_arrays = True  # ensembles evaluate it at arrays of points
+    of_arrays = True  # ensembles may call it with arrays of points
 
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
         self._function, self._eps = function, eps
         hamiltonian = function.hamiltonian
-        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # values at points (x, x~)
+        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # returns values at pairs (x, x~)
         if isinstance(function, ModifiedHamiltonian):
             polynomials = (hamiltonian.H, *hamiltonian.gradient)
             H, *gradient = (PointFunction("", _as_function(hamiltonian, polynomial)) for polynomial in polynomials)
@@ -50,7 +50,7 @@ class TwoPointFunction:
             self._values = lambda x, image: ((x @ matrix) * image).sum(axis=1) / to_float(eps)
 
     def at(self, start: Sequence[fmpq]) -> fmpq | None:
-        """Return the exact value at the point x = `start`; None at an indeterminacy point of the Kahan map."""
+        """Return the exact value at the point x = `start`; None if x is an indeterminacy point of the Kahan map."""
         try:
             value: fmpq | None = self._function.value(QQ, self._eps, start)
         except SingularStep:
@@ -58,7 +58,7 @@ class TwoPointFunction:
         return value
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the values at points (..., dim), computed with one step of the Kahan map for all points at once."""
+        """Return the values at points (..., dim), computed with one Kahan step x -> x~ for all points together."""
         flat_points = points.reshape(-1, points.shape[-1])
         with np.errstate(all="ignore"):
             values = self._values(flat_points, images_of(self._function.map.at(self._eps), flat_points))
@@ -69,11 +69,11 @@ WatchedFunction = PointFunction | TwoPointFunction
 
 
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
-    """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
+    """Return a dict from names to known integrals of the Kahan map of a system, and to H of the differential equation.
 
-    They come in this order: the integrals claimed in the file; the modified H of a cubic Hamiltonian H; for a member
-    (A, H) of the family the integrals from powers of A; and H itself, which the Kahan map does not conserve. `eps` is
-    half the time step (exact).
+    The order is: integrals claimed in the file; the modified H of a cubic Hamiltonian H; for a member (A, H) of the
+    family, integrals from powers of A; and H itself, which the Kahan map does not conserve. `eps` is half the time step
+    (exact).
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
@@ -86,7 +86,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     if hamiltonian is not None and eps != 0:
         functions["modified H"] = TwoPointFunction(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
         if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
-            letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # as in check-integrals
+            letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # the letters of check-integrals
             for power in range(1, hamiltonian.dim // 2):
                 integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
                 functions[integral.name] = TwoPointFunction(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
@@ -98,11 +98,11 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
 def watched_functions(
     file: SystemFile, eps: fmpq, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[list[WatchedFunction], dict[str, str]]:
-    """Return the known integrals of the Kahan map and of the flow, and a dict from the name to the origin of each.
+    """Return the known integrals of the Kahan map and of the flow, and a dict from their names to their origins.
 
     Integrals of the map are the `known_functions` or, if there are none, normalized integrals from a quick search.
-    Integrals of the flow are limits for eps -> 0 of integrals that depend on eps. The origin is "declared", "theorem",
-    "found" or "flow". `eps` is half the time step (exact).
+    Integrals of the flow are limits of integrals of the map for eps -> 0. An origin is "declared", "theorem", "found"
+    or "flow". `eps` is half the time step (exact).
 
     >>> from kahanmaps.documents.catalog import load
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
@@ -138,10 +138,10 @@ def watched_functions(
 
 
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
-    """Return H and the integrals claimed in the file; if no integral is claimed, those that follow from theorems.
+    """Return H and the integrals claimed in the file or, if the file claims none, those that follow from theorems.
 
-    Claimed integrals are normalized by `measured_integrals`, since an integral whose limit for eps -> 0 is constant has
-    a small drift along orbits of every method. Raises InputError if no integral is known.
+    Claimed integrals are normalized by `measured_integrals`: if the limit of an integral for eps -> 0 is constant, its
+    drift is small along the orbits of every method. Raises InputError if no integral is known.
     """
     functions = functions_of(file, eps)
     functions |= {
@@ -162,9 +162,9 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
 
 
 def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
-    """Return the functions for pairs (name, text): each text is "known", a name in `functions_of`, or a formula.
+    """Return the functions for pairs (name, text); each text is "known", a name in `functions_of`, or a formula.
 
-    A formula may contain eps. Raises InputError for invalid text, for a repeated name, and if no integral is known.
+    A formula may contain eps. Raises InputError for an invalid text or a repeated name, and if no integral is known.
     """
     available = functions_of(file, eps)
     functions: list[WatchedFunction] = []
@@ -184,13 +184,13 @@ def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[st
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """Return the function with this name in `functions_of`, or an expression, free of eps if `eps` is None."""
+    """Return the function that a name in `functions_of` or a formula denotes; it has no eps if `eps` is None."""
     function = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if function is None else function
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return a function of x alone, by name or as an expression. Raises InputError if it depends on the image x~."""
+    """Return the function of x that a name or a formula denotes. Raises InputError if it depends on the image x~."""
     available = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     rational_functions = {
         name: function.function for name, function in available.items() if isinstance(function, PointFunction)

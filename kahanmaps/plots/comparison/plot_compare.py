@@ -1,4 +1,4 @@
-"""Pictures of a comparison of methods: drift over time, error against step size, work against precision."""
+"""Pictures of a comparison of methods: drift against time, error against step size, work against precision."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
 
 KINDS = ("drift", "error", "work")
 SCALES = ("loglog", "semilog")
-_MIN_PANEL_WIDTH = 5.5  # minimal width in centimetres of panels side by side
-_MIN_CLIPPED_ERROR = 1e3  # smaller errors are never replaced by an arrow
-_MAX_PANELS = 6  # number of panels of one picture; each panel shows one function
-_DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the error axis if all errors are 0
+_MIN_PANEL_WIDTH = 5.5  # minimal width in centimetres of panels that are side by side
+_MIN_CLIPPED_ERROR = 1e3  # no arrow at the top replaces an error below this bound
+_MAX_PANELS = 6  # maximal number of panels of one picture; each panel shows the drift of one function
+_DEFAULT_LIMITS = (1e-17, 1e-15)  # limits of the error axis if all errors are exactly 0
 
 
 def plot_comparison(
     result: Comparison, style: Style | None = None, *, show: str = "drift", scale: str = "loglog"
 ) -> Figure:
-    """Plot the "drift", "error" or "work" of a comparison. Raises InputError if this was not measured.
+    """Plot the "drift", "error" or "work" of a comparison; raise InputError if it was not measured.
 
-    "drift" is the picture of `plot_drift`. "error" plots errors of the solution at a fixed time against the time step;
-    the slope of each dotted line is an order. "work" plots these errors against the number of evaluations of f.
+    "drift" is the picture of `plot_drift`. "error" plots the error of the solution at a fixed time against the time
+    step; each dotted line has an order as its slope. "work" plots this error against the number of evaluations of f.
     """
     style = style or Style()
     if show == "drift":
@@ -61,7 +61,7 @@ def plot_comparison(
         axes.set_xscale("log")
         axes.set_yscale("log")
         handles = []
-        line_starts: dict[int, tuple[float, float]] = {}  # order -> step and least error, where its dotted line starts
+        line_starts: dict[int, tuple[float, float]] = {}  # order -> time step and error at which its dotted line starts
         for k, run in enumerate(runs):
             samples = [sample for sample in run.errors if sample.error > 0]
             x = [abs(to_float(2 * sample.eps)) if show == "error" else sample.evaluations for sample in samples]
@@ -72,7 +72,7 @@ def plot_comparison(
             if order not in line_starts or samples[0].error < line_starts[order][1]:
                 line_starts[order] = x[0], samples[0].error
         if show == "error":
-            # A dotted line for each order, a little below the best method of this order; a mark at the requested step.
+            # Draw a dotted line for each order, a little below its best method, and a line at the time step.
             low, high = axes.get_ylim()
             for order, (step, error) in sorted(line_starts.items()):
                 y = error / 3
@@ -80,7 +80,7 @@ def plot_comparison(
                 axes.plot(
                     [step, end], [y, y * (end / step) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1
                 )
-                # Label the lines at small steps, where lines of different orders are far apart.
+                # The label of a line is at its end with small steps, where lines of different orders are far apart.
                 write_beside(axes, str(order), (end, y * (end / step) ** order), (13, 0), color="0.4", fontsize="small")
             axes.set_ylim(low, high)
             axes.axvline(abs(to_float(time_step(result.eps))), color="0.85", linewidth=0.8, zorder=0)
@@ -93,11 +93,11 @@ def plot_comparison(
 
 
 def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "loglog") -> Figure:
-    """Plot the errors of functions against the step number: one panel for each function, one line for each method.
+    """Plot the drift of functions against the step: a panel for each function, and in it a line for each method.
 
-    `scale` is "loglog", or "semilog" with a linear axis of steps. Errors of exactly 0 are drawn in a band labelled 0 at
-    the bottom; an arrow at the top stands for errors above `clipped_from`. A cross ends the line of an orbit that ended
-    early, at the step given in the legend. Raises InputError for an unknown scale.
+    `scale` is "loglog", or "semilog" with a linear axis of steps. Errors of exactly 0 lie in a band at the bottom that
+    is labelled 0. An arrow at the top stands for errors above `clipped_from`. If an orbit ended early, its line ends in
+    a cross, and the legend gives the step. Raises InputError for an unknown scale.
     """
     if scale not in SCALES:
         raise InputError(f"found the scale {scale[:40]!r}, expected {' or '.join(SCALES)}")
@@ -146,7 +146,7 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
                     axes.plot(curve.steps[clipped_indices[:1]], [limit], marker="^", **mark_style)
                 elif len(heights) and curve.method in ended:
                     axes.plot(curve.steps[-1:], heights[-1:], marker="x", **mark_style)
-            # Break the line before the name only: the name may be a formula that contains spaces.
+            # A line break only before the name, which may be a formula that contains spaces.
             function, kind = result.labels[name], "relative" if result.relative[name] else "absolute"
             if "$" in function:
                 is_long = letter_count(f"{kind} error of {function}") * LETTER_WIDTH * style.font_size > height
@@ -168,10 +168,10 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
 
 
 def clipped_from(result: Comparison, name: str) -> float:
-    """Return the bound above which errors of a function are shown as an arrow at the top.
+    """Return the error of the function `name` above which `plot_drift` draws an arrow at the top.
 
-    The bound is 1000, or ten times the largest error of completed orbits if this is larger. Without a bound a diverging
-    orbit would flatten all other curves.
+    The bound is 1000, or ten times the largest error along completed orbits if this is larger. Without it an orbit that
+    diverges would flatten all other curves.
     """
     methods = {run.method for run in result.runs if not run.early}
     curves = [curve for curve in result.curves if curve.function == name and curve.method in methods]
@@ -179,5 +179,5 @@ def clipped_from(result: Comparison, name: str) -> float:
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return color and line style of the k-th method; after seven methods colors repeat with other line styles."""
+    """Return color and line style of the k-th method; colors repeat after seven methods, with other line styles."""
     return {"color": COLORS[k % len(COLORS)], "linestyle": LINES[(k + k // len(COLORS)) % len(LINES)]}

@@ -1,1 +1,1 @@
-"""Invariant curves and the planes that contain them."""
+"""Invariant curves of Kahan maps, and the planes that contain these curves."""

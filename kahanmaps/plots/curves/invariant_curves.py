@@ -1,13 +1,13 @@
-"""The orbits of a Kahan map of the family in the planes of its normal form, and the invariant cubics that contain them.
+"""Orbits of a Kahan map of the commuting family in the planes of its normal form, and their invariant cubics.
 
-The data are computed here, and plotted by `plot_invariant_curves.py`. Each real root of chi has a real plane with a
-cubic h and symplectic coordinates (u, v), in which h is kappa (u^3 - 3 u v^2) if it has three real linear factors, and
-kappa (u^3 + 3 u v^2) if it has one; if h has a repeated factor, (u, v) are the coordinates of `family show
---normal-form`. A pair of complex roots has one plane, with the complex coordinates of the normal form at the root with
-positive imaginary part.
+The data are computed here and plotted by `plot_invariant_curves.py`. Each real root of chi has a real plane with a
+cubic Hamiltonian h and symplectic coordinates (u, v). In these coordinates h = kappa (u^3 - 3 u v^2) if h has three
+real linear factors, and h = kappa (u^3 + 3 u v^2) if it has one. If h has a repeated factor, (u, v) are the coordinates
+of `family show --normal-form`. A pair of complex roots has one plane, with the complex coordinates of the normal form
+at the root with positive imaginary part.
 
-Steps are computed in floating-point numbers of 256 bits, so that all plotted digits are correct. A point closer to
-infinity than 2^-96 counts as a pole, and ends the orbit.
+Steps are computed with floating-point numbers of 256 bits, so that all plotted digits are correct. A point at a
+distance below 2^-96 from infinity counts as a pole and ends the orbit.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transform_cubic
 
-MAX_POINTS = 1_000_000  # number of points of all orbits together
-MAX_STARTS = 7  # the number of colors
-BITS = 256  # of the floating-point numbers
-_POLE_BITS = 96  # a point within 2^-96 of infinity counts as a pole
-_PROGRESS_STEPS = 2_000  # steps between two progress messages
-_MAX_COORDINATE = 1e60  # largest drawn coordinate: its cube does not overflow
+MAX_POINTS = 1_000_000  # maximal number of points of all orbits together
+MAX_STARTS = 7  # maximal number of initial points: the number of colors
+BITS = 256  # precision of the floating-point numbers
+_POLE_BITS = 96  # a point at a distance below 2^-96 from infinity counts as a pole
+_PROGRESS_STEPS = 2_000  # number of steps between two progress messages
+_MAX_COORDINATE = 1e60  # maximal coordinate in a picture: its cube does not overflow
 
 Numbers = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneOrbit:
-    """An orbit in one plane: its curve `cubic`, and its coordinates `u` and `v` at the steps from 0 on.
+    """An orbit in one plane: its coordinates `u` and `v` at the steps 0, 1, ..., and the `cubic` that contains it.
 
     In a complex plane u and v are complex, and `cubic` is None.
     """
@@ -53,11 +53,11 @@ class PlaneOrbit:
 
 @dataclass(frozen=True, eq=False)
 class InvariantPlane:
-    """One plane of the normal form: its root of chi as a number and as text, and one orbit for each initial point.
+    """A plane of the normal form: its root of chi (`root`, as text `root_text`), and an orbit for each initial point.
 
-    `h` are the coefficients of the cubic Hamiltonian h(u, v), complex if the root is complex; `shape` is the form of h
-    as text, a constant of `plane_cubics`. `index` is the index of the plane in its splitting, `block` the planar
-    Kahan map in the coordinates (u, v), and `matrix` the 2 x 2 matrix from coordinates of the splitting to (u, v).
+    `h` are the coefficients of the cubic Hamiltonian h(u, v), complex if the root is; `shape` describes h by a constant
+    of `plane_cubics`. `index` is the index of the plane in the splitting, `block` the planar Kahan map in the
+    coordinates (u, v), and `matrix` the 2 x 2 matrix that maps coordinates of the splitting to (u, v).
     """
 
     index: int
@@ -71,16 +71,16 @@ class InvariantPlane:
 
     @property
     def is_real(self) -> bool:
-        """Whether the root is real: only a real plane has a curve to plot."""
+        """Whether the root of chi is real: only a real plane contains a real cubic that can be plotted."""
         return self.root.imag == 0
 
 
 @dataclass(frozen=True, eq=False)
 class InvariantCurves:
-    """The planes of a member with the orbits of all initial points: first the real planes, by increasing root.
+    """The planes of a member with the orbits of all initial points; the real planes come first, by increasing root.
 
-    `poles[k]` is the step at which the k-th orbit reaches a pole, None if all `steps` were taken. `originals[k]` is the
-    orbit in the original variables, with a row for each step.
+    `poles[k]` is the step at which the k-th orbit reaches a pole, or None if it completed `steps` steps. `originals[k]`
+    is this orbit in the original variables, with a row for each step.
     """
 
     variables: tuple[str, ...]
@@ -99,11 +99,11 @@ def find_invariant_curves(
     steps: int,
     progress: Callable[[str], None] = lambda _: None,
 ) -> InvariantCurves:
-    """Compute the orbits of initial points in all planes, and the cubics that contain these orbits.
+    """Compute the orbits of initial points in all planes of the normal form, and the cubics that contain the orbits.
 
-    `starts` are exact points of the system, `eps` is half the time step (exact). A system that is not declared as a
-    member of the family is accepted if it is recognised as one. Raises HypothesisError if there is no normal form: the
-    system is not a member, or chi has a repeated root. Raises InputError for invalid sizes.
+    `starts` are exact points of the system, and `eps` is half the time step (exact). A system that is not declared as a
+    member of the family is accepted if it is recognised as one. Raises HypothesisError if there is no normal form,
+    since the system is not a member or chi has a repeated root. Raises InputError for invalid sizes.
 
     >>> from kahanmaps.documents.catalog import load
     >>> curves = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
@@ -138,7 +138,7 @@ def find_invariant_curves(
             triples = splitting.triples([arb(rational(entry)) for entry in start])
             orbits: list[tuple[Numbers, Numbers]] = []
             curves: list[PlaneCubic | None] = []
-            length, pole = steps + 1, None  # the orbit ends at the first pole in any of the planes
+            length, pole = steps + 1, None  # a pole in any of the planes ends the orbit
             for k, frame in enumerate(frames, 1):
                 f, g, m, n = frame.matrix.entries()
                 U, V, W = triples[frame.index]
@@ -151,11 +151,11 @@ def find_invariant_curves(
                 curves.append(_cubic_through(frame, initial_triple, epsilon) if frame.is_real else None)
             orbits = [(u[:length], v[:length]) for u, v in orbits]
             orbits_by_start.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
-            # The orbit in the variables of the system, with a row for each step.
+            # The orbit in the original variables, with a row for each step.
             points = np.zeros((length, splitting.dim))
             for frame, (u, v) in zip(frames, orbits, strict=True):
                 a, b, c, d = (complex(_to_floating_point(entry)) for entry in frame.matrix.inv().entries())
-                # In a complex plane the splitting has columns for real and imaginary parts.
+                # For a complex plane the matrix of the splitting has separate columns for real and imaginary parts.
                 zs = [a * u + b * v, c * u + d * v]
                 columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
                 real_parts = [x for z in zs for x in ((z.real, z.imag) if frame.root.imag else (z.real,))]
@@ -169,7 +169,7 @@ def find_invariant_curves(
 
 
 def _planes_without_orbits(splitting: Splitting) -> list[InvariantPlane]:
-    """Return the planes, still without orbits: first the real planes, by increasing root."""
+    """Return all planes without their orbits: the real planes by increasing root, then the complex planes."""
     rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
     frames = []
     for index, plane in enumerate(splitting.planes):
@@ -179,7 +179,7 @@ def _planes_without_orbits(splitting: Splitting) -> list[InvariantPlane]:
             text = format_number(exact_roots[0]) if exact_roots else f"{float(root.mid()):.5g}"
             shape, matrix = symmetric_coordinates(plane.block)
         else:
-            # If the ball of the real part contains 0, the real part is taken as 0.
+            # The real part is taken as 0 if its ball contains 0.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
@@ -198,7 +198,7 @@ def _planes_without_orbits(splitting: Splitting) -> list[InvariantPlane]:
 def _compute_orbit(
     block: PlanarBlock, initial_triple: Triple, eps: fmpq, length: int, label: str, progress: Callable[[str], None]
 ) -> tuple[Numbers, Numbers]:
-    """Return arrays of u and v at `length` points of an orbit, fewer points if the orbit reaches a pole."""
+    """Return arrays of u and v at `length` points of an orbit; they are shorter if the orbit reaches a pole."""
     P = initial_triple
     us, vs = [], []
     time_step = 2 * arb(eps)
@@ -211,7 +211,7 @@ def _compute_orbit(
         vs.append(_to_floating_point(V / W / time_step))
         P = block.image(P)
         norm = max(abs(entry) for entry in P)
-        # An indeterminacy point ends the orbit at the next step, as a pole does.
+        # The image of an indeterminacy point is undefined: the orbit ends at the next step, as at a pole.
         P = (U, V, W * 0) if norm == 0 else tuple((entry / norm).mid() for entry in P)
         if k % _PROGRESS_STEPS == 0:
             progress(f"{label}, step {k}")
@@ -219,10 +219,10 @@ def _compute_orbit(
 
 
 def _cubic_through(frame: InvariantPlane, initial_triple: Triple, eps: fmpq) -> PlaneCubic:
-    """Return the cubic through the initial point.
+    """Return the invariant cubic through the initial point.
 
-    It is the level of the integral h/(1 + eps^2 D) with the value `numerator`/`denominator`. These two are scaled: the
-    larger one is 1 or -1 (both are 0 at a base point).
+    It is the level h/(1 + eps^2 D) = `numerator`/`denominator`, with D as in `plane_cubics`. Numerator and denominator
+    are scaled such that the larger one is 1 or -1; both are 0 at a base point of the pencil of levels.
     """
     U, V, W = initial_triple
     time_step = 2 * arb(eps)

@@ -1,7 +1,7 @@
-"""Level curves of a rational function in the plane, accurate to rounding errors.
+"""Level curves of a rational function F in the plane, accurate to rounding errors.
 
-The level F = c of F = N/D is the zero set of the polynomial N - c D. It is computed on a grid; then Newton's method
-moves each vertex to the curve.
+The level F = c of F = N/D is the zero set of the polynomial N - c D. This set is approximated on a grid; then Newton's
+method moves each vertex of the approximation to the curve.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from kahanmaps.plots.figures import require_matplotlib
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window
 
-MAX_LEVELS = 200  # number of levels of one function in one picture
-GRID = 301  # grid lines in each direction
-_NEWTON_STEPS = 8  # steps of Newton's method for each vertex
+MAX_LEVELS = 200  # maximal number of levels of one function in one picture
+GRID = 301  # number of grid lines in each direction
+_NEWTON_STEPS = 8  # number of steps of Newton's method for each vertex
 
 
-Levels = tuple[tuple[FloatArray, ...], ...]  # for each level, the components of its curve as arrays (n, 2) of vertices
+Levels = tuple[tuple[FloatArray, ...], ...]  # level -> components of its curve, each an array (n, 2) of vertices
 
 
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
-    """Return the finite values of `function` at initial points (n, dim), increasing and distinct up to rounding."""
+    """Return the finite values of `function` at points (n, dim), sorted; values equal up to rounding occur once."""
     values = np.sort(function(starts))
     levels: list[float] = []
     for value in values[np.isfinite(values)].tolist():
@@ -37,9 +37,9 @@ def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, 
 def level_curves(
     function: PointFunction, plane: Sequence[int], dim: int, levels: Sequence[float], window: Window
 ) -> Levels:
-    """Compute the curves F = level in a window of the plane of two variables, given by their indices.
+    """Compute the curves F = level of the function F in a window of the plane of two variables with indices `plane`.
 
-    Raises InputError if F depends on other variables, and for more than 200 levels.
+    Raises InputError if F depends on other variables, and if there are more than 200 levels.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> circle = level_curves(point_function("x^2 + y^2", "xy"), (0, 1), 2, [1.0], ((-2, 2), (-2, 2)))
@@ -80,9 +80,9 @@ def level_curves(
 def zero_curves(
     value: Callable[[FloatArray], FloatArray], window: Window, on_grid: FloatArray | None = None
 ) -> tuple[FloatArray, ...]:
-    """Compute the zero set of a function of points (..., 2) in a window as curves: arrays (n, 2) of vertices.
+    """Compute the zero set of the function `value` of points (..., 2) in a window as curves, arrays (n, 2) of vertices.
 
-    The curves are computed on a grid, and each vertex is moved onto the zero set. `on_grid` are the
+    The curves are approximated on a grid, and Newton's method moves each vertex onto the zero set. `on_grid` are the
     values of the function on the grid, if they are known.
 
     >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
@@ -100,7 +100,7 @@ def zero_curves(
         if not np.isfinite(values).all():
             values = np.ma.masked_invalid(values)
         contours = [np.asarray(vertices) for vertices in contour_generator(xs, ys, values).lines(0.0)]
-        # Newton's method moves each vertex along the gradient, by less than the mesh size of the grid.
+        # Newton's method moves each vertex along the gradient, in total by at most the mesh size of the grid.
         for vertices in contours:
             x = vertices.copy()
             for _ in range(_NEWTON_STEPS):
@@ -108,7 +108,7 @@ def zero_curves(
                     [(value(x + e * step) - value(x - e * step)) / (2 * step[k]) for k, e in enumerate(np.eye(2))],
                     axis=-1,
                 )
-                slope = gradient * mesh  # in units of the mesh, so that both axes have equal weight
+                slope = gradient * mesh  # in units of the mesh size, so that both axes have equal weight
                 x = x - (value(x) / (slope**2).sum(axis=-1))[:, None] * slope * mesh
             is_closer = np.isfinite(x).all(axis=-1) & (np.abs(x - vertices) <= mesh).all(axis=-1)
             is_closer &= np.abs(value(x)) <= np.abs(value(vertices))

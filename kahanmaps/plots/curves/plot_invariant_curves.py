@@ -1,8 +1,8 @@
-"""Plots of the planes of a member: in each plane the orbit and its invariant cubic, colored by step.
+"""Plots of the planes of a member of the commuting family: orbits and their invariant cubics, colored by step.
 
-Dots of the same color are the projections of the same point to the planes. Each projection moves along its own curve,
-which shows that the map is a product. A panel shows a window with most of the dots, or the whole projective plane
-as a disc.
+Dots of the same color are the projections of the same point of an orbit to the planes. Each projection moves along a
+curve of its own, which shows that the map is a product. A panel shows a window that contains most of the dots, or the
+projective plane as a disc.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CURVE_COLOR, _FLOW_COLOR = "#9a9a9a", "#444444"
-_MIN_DISTANCE = 0.06  # fraction of the panel width: a number closer to the previous one would cover it
-_NUMBERED_STEPS = 4  # number of steps whose dots are numbered
+_MIN_DISTANCE = 0.06  # in units of the panel width: a dot closer to an earlier dot has no number
+_NUMBERED_STEPS = 4  # number of steps at the beginning whose dots are numbered
 
 
 def plot_invariant_curves(
@@ -39,22 +39,22 @@ def plot_invariant_curves(
     original: tuple[int, int] | None = None,
     labels: Sequence[str] = (),
 ) -> Figure:
-    """Plot the cubics and the orbits on them: one panel for each real plane, two panels for each complex plane.
+    """Plot the invariant cubics and the orbits on them: one panel for each real plane, two for each complex plane.
 
-    If `projective`, a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
-    at infinity. `flow` adds the level curve of the differential equation through each initial point, dashed. `original`
-    are the indices of two variables: the first panel then shows the orbit in these variables. `labels` are the names of
-    the initial points, if there are several. Raises InputError for invalid indices.
+    If `projective`, a panel shows the projective plane as a disc; opposite points of its rim are the same point at
+    infinity. `flow` adds a dashed curve through each initial point, the level curve of the differential equation.
+    `original` is a pair of indices of variables: the first panel then shows the orbits in these variables. `labels` are
+    the names of the initial points, if there are several. Raises InputError for invalid indices.
     """
     if original is not None and not all(0 <= k < len(curves.variables) for k in original):
         raise InputError(f"found the variables {original}, expected two numbers from 0 to {len(curves.variables) - 1}")
     panels = panels_of(curves)
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
-    letter_size = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
+    letter_size = style.font_size * CENTIMETRES_PER_INCH / 72  # size of a letter in centimetres
     columns = min(columns, max(1, int(style.width / (12 * letter_size))))  # a panel is at least 12 letters wide
     rows = ceil(count / columns)
-    # The panels are squares, with space for letters and a color bar.
+    # The panels are squares, with space for labels and a color bar.
     panel_width = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter_size)
     height = rows * (panel_width + (4.0 if projective else 5.2) * letter_size) + 4.6 * letter_size
     with drawing(style):
@@ -65,7 +65,7 @@ def plot_invariant_curves(
 
         figure = new_figure(style, height / style.width)
         steps = max(len(x) for x in curves.originals) - 1
-        # A single orbit is colored by step; each of several orbits has its own color and mark.
+        # A single orbit is colored by step; of several orbits each has a color and a mark.
         pen = _Pen(Normalize(0, max(1, steps)) if len(curves.originals) == 1 else None, style)
         grid = iter(figure.subplots(rows, columns, squeeze=False).flat)
         if original is not None:
@@ -100,7 +100,7 @@ def plot_invariant_curves(
 
 
 def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
-    """Return the panels: number of the root, plane, and "uv" for a real plane, "u" or "v" for a complex plane."""
+    """Return triples for the panels: number of the root, plane, and "uv" (real plane), "u" or "v" (complex plane)."""
     panels, number = [], 0
     for plane in curves.planes:
         number += 1
@@ -108,12 +108,12 @@ def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
             panels.append((str(number), plane, "uv"))
         else:
             panels += [(str(number), plane, "u"), (str(number), plane, "v")]
-            number += 1  # count the conjugate root
+            number += 1  # the conjugate root has a number too
     return panels
 
 
 class _Pen:
-    """The style of dots: colored by step if there is a `scale` (for a single orbit), by orbit if there is none."""
+    """The style of dots: with a color `scale`, a single orbit is colored by step; without, each orbit has a color."""
 
     def __init__(self, scale: Any, style: Style) -> None:
         self.scale, self.style = scale, style
@@ -164,7 +164,7 @@ def _draw_plane(
                 axes.plot(*vertices.T, color=_FLOW_COLOR, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
         normals = None
-        if orbit.cubic is not None:  # unit normals of the drawn curve, along which the numbers are placed
+        if orbit.cubic is not None:  # unit normals of the drawn curve; the numbers of dots are shifted along them
             along_u, along_v = orbit.cubic.gradient(x[:_NUMBERED_STEPS], y[:_NUMBERED_STEPS])
             gradients = np.stack([along_u, along_v * view.stretch], axis=1)
             length = np.linalg.norm(gradients, axis=1, keepdims=True)
@@ -174,26 +174,26 @@ def _draw_plane(
 
 Cloud = tuple[Floats, Floats]
 
-_MIN_SHOWN_SHARE = 0.85  # fraction of the dots in the window: orbits repeatedly come close to infinity
-_CUT_ANGLE = 0.7390851  # a direction in which no form with simple coefficients vanishes
-_MARGIN = 0.08  # fraction of the width added on either side for the numbers beside the dots
+_MIN_SHOWN_SHARE = 0.85  # minimal fraction of the dots in the window: orbits repeatedly come close to infinity
+_CUT_ANGLE = 0.7390851  # a direction in which no cubic form with simple coefficients is 0
+_MARGIN = 0.08  # fraction of the width added on each side for the numbers beside dots
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A window of the plane, and the number of dots outside it."""
+    """A window of the plane, and the number of dots outside of it."""
 
     window: Window
     outside: int
 
     @classmethod
     def of(cls, clouds: Sequence[Cloud], window: Window) -> Rectangle:
-        """Return a window with the number of these dots outside it."""
+        """Return the rectangle of a window, with the number of dots of the `clouds` outside of it."""
         return cls(window, count_outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
 
     @classmethod
     def around(cls, clouds: Sequence[Cloud]) -> Rectangle:
-        """Return a window that contains most dots and all initial points."""
+        """Return a rectangle that contains most of the dots and all initial points."""
         points, starts = (
             np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
         )
@@ -205,35 +205,35 @@ class Rectangle:
 
     @property
     def stretch(self) -> float:
-        """The height of the window divided by its width, by which normals are scaled."""
+        """The height of the window divided by its width, by which the normals of curves are scaled."""
         (left, right), (low, high) = self.window
         return (high - low) / (right - left)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
-        """Make the axes square, and set their limits and labels."""
+        """Make the panel square, and set its limits and labels."""
         axes.set_box_aspect(1)
         axes.set(xlim=self.window[0], ylim=self.window[1], xlabel=names[0], ylabel=names[1])
         axes.locator_params(nbins=5)
 
     def place(self, x: Floats, y: Floats) -> Cloud:
-        """Return the positions of points in the panel."""
+        """Return the positions of the points (x, y) in the panel: the points themselves."""
         return x, y
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """Return the components (n, 2) of a curve in the panel."""
+        """Return the components, arrays (n, 2), of a cubic in the window."""
         return zero_curves(cubic.value, self.window)
 
 
 @dataclass(frozen=True)
 class Disc:
-    """The projective plane as a half sphere seen from above: 90 degrees is infinity, 45 degrees distance `length`."""
+    """The projective plane as a half sphere seen from above: 45 degrees is distance `length`, 90 degrees infinity."""
 
     length: float
     stretch: float = 1.0
 
     @classmethod
     def of(cls, plane: InvariantPlane, column: str = "uv") -> Disc:
-        """Return the disc scaled by the conic that the map sends to infinity, or by the dots if the conic is empty."""
+        """Return the disc scaled by the conic that the map sends to infinity or, if it is empty, by the dots."""
         cubic = plane.orbits[0].cubic
         if cubic is not None and plane.shape != "0":
             return cls(cubic.length)
@@ -241,7 +241,7 @@ class Disc:
         return cls(float(np.median(distances)) or 1.0)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
-        """Draw the rim, and hide the axes."""
+        """Draw the rim of the disc, and hide the axes."""
         from matplotlib.patches import Circle
 
         axes.set_aspect("equal")
@@ -250,13 +250,13 @@ class Disc:
         axes.add_patch(Circle((0, 0), 1, fill=False, linewidth=0.6, zorder=1))
 
     def place(self, x: Floats, y: Floats) -> Cloud:
-        """Return the positions of points in the panel."""
+        """Return the positions of the points (x, y) in the disc."""
         x, y = x / self.length, y / self.length
         radius = np.hypot(np.hypot(x, y), 1)
         return x / radius, y / radius
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """Return the components (n, 2) of a curve in the panel; each is closed or joins two points of the rim."""
+        """Return the components, arrays (n, 2), of a cubic in the disc; each closes or joins two points of the rim."""
         domain = ((_CUT_ANGLE, _CUT_ANGLE + 2 * np.pi), (0.0, np.pi / 2))
         pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), domain)
         directions = [np.concatenate([np.cos(p[:, :1]), np.sin(p[:, :1])], axis=1) for p in pieces]
@@ -268,7 +268,7 @@ def _rows(cloud: Cloud) -> Floats:
 
 
 def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
-    """Return the dots of all orbits: (u, v), or in a complex plane the real and imaginary parts of u or v."""
+    """Return the dots of each orbit: (u, v), or for a complex plane the real and imaginary parts of u or of v."""
     if plane.is_real:
         return [(orbit.u, orbit.v) for orbit in plane.orbits]
     values = [orbit.u if column == "u" else orbit.v for orbit in plane.orbits]
@@ -276,9 +276,9 @@ def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
 
 
 def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
-    """Return the window of a plane: it contains most dots, and the origin unless this is far away from the dots.
+    """Return the window of a plane: it contains most of the dots, and the origin unless they are far away from it.
 
-    If the cubic has a threefold symmetry, the origin is the center of the window, and u and v have the same scale.
+    If the cubic h has a threefold symmetry, the origin is the center of the window, and u and v have the same scale.
     """
     clouds = clouds_of(plane, column)
     ranges = []

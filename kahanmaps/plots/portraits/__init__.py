@@ -1,1 +1,1 @@
-"""Portraits of planar maps and sections: orbits, equilibria, separatrices, the flow."""
+"""Phase portraits of planar maps and of projections: orbits, equilibria, separatrices, the flow."""

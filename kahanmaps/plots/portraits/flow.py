@@ -1,7 +1,7 @@
-"""The flow in a phase portrait: the direction of the vector field, equilibria, separatrices and solution curves.
+"""The flow in a phase portrait: directions of the vector field, equilibria, separatrices and solution curves.
 
-Curves are parametrized by arc length, not by time: RK4 solves x' = f/|f| with steps of a fixed fraction of the window.
-Hence curves pass through poles of the solution and look smooth. Default initial points lie around an equilibrium.
+Solution curves are parametrized by arc length, not by time: RK4 solves x' = f/|f| with steps of a fixed fraction of the
+window. So they pass through poles and look smooth. Default initial points of orbits lie around an equilibrium.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in higher dimensions Newton's method starts only from the origin and (1, ..., 1)
-_ZERO_TOLERANCE = 1e-7  # real or imaginary parts below this fraction of the largest eigenvalue count as 0
+_ZERO_TOLERANCE = 1e-7  # relative to the largest eigenvalue: smaller real or imaginary parts count as 0
 _ARROWS_PER_SIDE = 21  # number of arrows along each side of the window
-_STEPS_PER_WINDOW = 400  # number of steps of a curve that crosses the window
-_MAX_STEPS = 6000  # maximal number of steps of a curve; it is then fifteen times as long as the window
-_MIN_SPEED_RATIO = 1e-4  # a curve stops (near an equilibrium) below this fraction of the largest speed in the window
+_STEPS_PER_WINDOW = 400  # number of steps in which a curve crosses the window
+_MAX_STEPS = 6000  # maximal number of steps of a curve, whose length is then fifteen windows
+_MIN_SPEED_RATIO = 1e-4  # near an equilibrium: a curve ends below this fraction of the largest speed in the window
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A point with f = 0, the eigenvalues of the derivative f' at this point, and the eigenvectors of f' as columns."""
+    """An equilibrium `point` of f, the eigenvalues of f' at this point, and the eigenvectors of f' as columns."""
 
     point: FloatArray
     values: NDArray[Any]
@@ -43,12 +43,12 @@ class Equilibrium:
 
     @property
     def expansion(self) -> float:
-        """The largest real part of an eigenvalue."""
+        """The largest real part of an eigenvalue of f'."""
         return round(float(self.values.real.max()), 6)
 
     @property
     def kind(self) -> str:
-        """The kind of the linear part, from its eigenvalues: "center" need not mean a center of the vector field."""
+        """The kind of the linear part f', from its eigenvalues; a "center" need not be a center of the vector field."""
         values, real = self.values, self.values.real
         threshold = _ZERO_TOLERANCE * max(float(np.abs(values).max()), _ZERO_TOLERANCE)
         if (np.abs(values) <= threshold).any():
@@ -79,12 +79,11 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
             if np.abs(velocity).max() <= tolerance:
                 rounded_point = np.round(x, 9)
                 point = rounded_point if np.abs(f(rounded_point)).max() <= tolerance else x
-                # Near a degenerate equilibrium Newton's method ends at slightly different points: keep only one of
-                # these points.
+                # Near a degenerate equilibrium Newton's method ends at slightly different points, of which one is kept.
                 if not any(np.allclose(point, equilibrium.point, atol=1e-3) for equilibrium in all_equilibria):
                     all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -velocity, rcond=1e-10)[0]  # f' may be singular
+            x = x + np.linalg.lstsq(f.jacobian(x), -velocity, rcond=1e-10)[0]  # least squares, since f' may be singular
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
     return all_equilibria
@@ -92,10 +91,10 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The parts of the phase portrait of x' = f(x) that are drawn under the orbits of the map.
+    """The parts of the phase portrait of x' = f(x) that are drawn together with the orbits of the map.
 
-    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f there, in units of the
-    window. `equilibria` are pairs of a kind and a point (2,); `separatrices`, `solutions` are curves (n, 2 or 3).
+    `places` (count, 2) are points of the plane, and `arrows` (count, 2) the directions of f there, relative to the
+    window. `equilibria` are pairs (kind, point). `separatrices` and `solutions` are curves (n, 2) or (n, 3).
     """
 
     places: FloatArray
@@ -106,10 +105,10 @@ class Flow:
 
 
 def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) -> Flow:
-    """Compute arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
+    """Compute arrows, equilibria and separatrices of a planar system in a window of its plane.
 
-    `plane` are the indices of the variables along the axes. In higher dimensions the result is empty, since f then does
-    not give a single direction at a point of the picture.
+    `plane` contains the indices of the variables along the axes. For a system in higher dimension the result is empty,
+    since f does not determine a direction at a point of the picture.
 
     >>> saddle = plane_flow(QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), (0, 1), ((-1, 1), (-1, 1)))
     >>> [kind for kind, _ in saddle.equilibria], len(saddle.separatrices)
@@ -117,7 +116,7 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     """
     if system.dim != 2 or sorted(plane) != [0, 1]:
         return Flow(np.zeros((0, 2)), np.zeros((0, 2)))
-    permutation = list(plane)  # a permutation of (0, 1), hence its own inverse
+    permutation = list(plane)  # a permutation of (0, 1) is its own inverse
     low, high = (np.array(side) for side in zip(*window, strict=True))
     f = VectorField(system)
     cell_centers = (np.arange(_ARROWS_PER_SIDE) + 0.5) / _ARROWS_PER_SIDE
@@ -149,9 +148,9 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
 def projected_solutions(
     system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
-    """Return the solutions through the initial points of orbits as curves in the coordinates `axes`.
+    """Return the solutions of x' = f(x) through the initial points of orbits, as curves in the coordinates `axes`.
 
-    A solution ends at the time of the orbits, or far away from them. Raises InputError if an axis is the step.
+    A solution ends at the time of the last step, or far away from the orbits. Raises InputError for the axis "step".
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
@@ -164,10 +163,10 @@ def projected_solutions(
 
 
 def solution(f: VectorField, start: FloatArray, box: Window, time: float | None = None) -> FloatArray:
-    """Return the solution through `start` as a curve (points, dim) that ends when it closes or leaves the box.
+    """Return the solution through `start` as a curve (points, dim); it ends where it closes or leaves the box.
 
-    `box` has a range for each variable; a curve may leave each range by up to its length. `time` (negative for the
-    past) limits the time of the solution; None means no limit.
+    `box` has a range for each variable; a curve leaves the box when its distance from a range exceeds the length of the
+    range. `time`, negative for the past, limits the time of the solution; None means no limit.
 
     >>> rotation = VectorField(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
     >>> circle = solution(rotation, np.array([1.0, 0.0]), ((-2, 2), (-2, 2)))
@@ -191,7 +190,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     for step_number in range(_MAX_STEPS):
         current_speed = speed(x)
         elapsed += step / current_speed if current_speed > 0 else np.inf
-        # A separatrix (no time limit) starts slowly at its saddle, so a small speed stops only long curves.
+        # A separatrix (without a time limit) starts slowly at its saddle, so at first a small speed does not end it.
         is_slow = current_speed <= min_speed and (step_number > 2 * _STEPS_PER_WINDOW or not np.isinf(time or 0.0))
         if is_slow or (time is not None and elapsed > abs(time)) or np.abs((x - center) / size).max() > 1.5:
             break
@@ -209,22 +208,22 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
 
 START_COUNT = 16  # number of automatic initial points
-_MAX_CENTERS = 4  # maximal number of equilibria tried as centers of initial points
+_MAX_CENTERS = 4  # maximal number of equilibria that are tried as centers of the initial points
 _MAX_SIZES = 24  # maximal number of distances from a center that are tried
 _SIZE_RATIO = 0.8  # quotient of two successive distances
-_TRIAL_STEPS = 300  # steps for which the orbits must stay near the center
+_TRIAL_STEPS = 300  # number of steps for which the orbits must stay near the center
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_MAX_GROWTH = 4.0  # orbits stay near a center if no distance exceeds this multiple of the largest initial distance
+_MAX_GROWTH = 4.0  # maximal ratio of distances from the center to the largest initial one
 
 
 def automatic_starts(
     system: QuadraticSystem, eps: Any, plane: Sequence[int] = (0, 1), *, backward: bool = False
 ) -> FloatArray:
-    """Choose sixteen initial points (16, dim) for a picture, deterministically; eps is half the time step.
+    """Choose sixteen initial points (16, dim) for a picture; the choice is deterministic, eps is half the time step.
 
-    The points lie around the most stable equilibrium that is found: on a ray in the plane of the variables `plane` or,
-    if f is homogeneous (so that all points of a ray move alike), on a circle; other coordinates are shifted a little.
-    Of the distances from the equilibrium that are tried, the largest is taken for which all orbits stay near it.
+    The points lie around the most stable equilibrium found: on a ray in the plane of the variables `plane`, or on a
+    circle if f is homogeneous, since all points of a ray then move alike. Other coordinates are shifted a little. The
+    distance is the largest one tried for which all orbits stay near the equilibrium.
 
     >>> lotka_volterra = QuadraticSystem.from_text(["x", "y"], ["x - x*y", "x*y - y"])
     >>> starts = automatic_starts(lotka_volterra, "1/20")
@@ -232,7 +231,7 @@ def automatic_starts(
     ((16, 2), True)
     """
     plane = [index for index in plane if index < system.dim][:2]
-    # Equilibria by increasing expansion, in a tie those without negative coordinates first; then the origin.
+    # The equilibria by increasing `expansion`, of equal ones those without negative coordinates first; then the origin.
     sorted_equilibria = sorted(
         equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
     )
@@ -242,13 +241,13 @@ def automatic_starts(
     other_indices = [index for index in range(system.dim) if index not in plane]
     candidates: list[tuple[int, FloatArray]] = []
     for center in centers:
-        # For a homogeneous field, smaller initial points around the origin only move more slowly.
+        # For a homogeneous field the orbits of smaller initial points around the origin are the same, but slower.
         is_scaled = system.is_homogeneous and not center.any()
         for k in range(1 if is_scaled else _MAX_SIZES):
             size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SIZE_RATIO**k
             starts = np.tile(center, (START_COUNT, 1))
             if is_scaled and len(plane) == 2:
-                angles = (np.arange(START_COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one to another
+                angles = (np.arange(START_COUNT) + 0.5) * _GOLDEN_ANGLE  # no symmetry maps one angle to another
                 starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
                 starts[:, other_indices] += size / 5
             else:

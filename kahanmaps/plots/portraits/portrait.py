@@ -1,6 +1,6 @@
-"""A phase portrait: orbits projected to two or three axes, with a color for each point, drawn as dots or lines.
+"""Phase portraits: orbits projected to two or three axes, drawn as dots or lines with a color for each point.
 
-The flow and level curves are drawn under the orbits, and a color bar beside the axes.
+The flow and level curves are drawn below the orbits, and a color bar is drawn beside the axes.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.comparison.functions import WatchedFunction
 
-_MAX_NEIGHBOURS = 2000  # all pairs of so many points are compared; a curve with more points looks smooth anyway
-_MIN_NEIGHBOURS = 8  # minimal number of points of an orbit in which a curve is recognized
-_MIN_CURVE_SHARE = 0.9  # fraction of points with two neighbours on a curve; in a cloud of points it is 0.5
-# A line longer than both multiples, of the median line and of the diameter of the orbit, is a gap in an orbit that does
-# not fill its curve. If the rotation number is nearly rational, bunches of points are joined by long but shorter lines.
+_MAX_NEIGHBOURS = 2000  # maximal number of points of which all pairs are compared; more points look smooth anyway
+_MIN_NEIGHBOURS = 8  # minimal number of points of an orbit that may form a curve
+_MIN_CURVE_SHARE = 0.9  # minimal fraction of points with two neighbours for a curve; in a cloud of points it is 0.5
+# A line longer than both multiples (of the median length, and of the diameter of the orbit) is a gap in an orbit that
+# does not fill its curve. For a nearly rational rotation number, long but shorter lines join bunches of points.
 _MAX_LENGTH_RATIO, _MAX_WIDTH_RATIO = 8.0, 0.2
 STEP = "step"
 ORBIT = "orbit"
@@ -40,14 +40,14 @@ ORBIT = "orbit"
 
 @dataclass(frozen=True, eq=False)
 class Portrait:
-    """The data that a portrait shows.
+    """The data that a portrait shows; points are arrays (records, orbits, 2 or 3).
 
-    `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN for missing points; `labels` and `window`
-    have an entry for each axis. `values` (records, orbits) of the function `value_label` color the points; None means
-    one color for each orbit. `left_out` counts points outside the window. `undefined` counts points before the end of
-    an orbit at which an axis or the color has a pole. `euler` are points (records, orbits, 2 or 3) of the explicit
-    Euler method, `levels` are level curves, and `flow` is drawn under the points. `joined` contains for each orbit the
-    pairs (count, 2) of records that are neighbours on its curve; None means that successive records are joined.
+    `points` are the coordinates along the axes, NaN for missing points; `labels` and `window` have an entry for each
+    axis. `values` (records, orbits) of the function called `value_label` color the points; None means one color for
+    each orbit. `left_out` counts the points outside the window, and `undefined` those points of orbits at which an axis
+    or the color has a pole. `euler` are points of the explicit Euler method, `levels` are level curves, and `flow` is
+    drawn below the points. `joined` contains for each orbit the pairs (count, 2) of records that are neighbours on its
+    curve; None means that successive records are joined.
     """
 
     points: FloatArray
@@ -63,7 +63,7 @@ class Portrait:
     joined: tuple[NDArray[np.int64] | None, ...] = ()
 
     def pairs(self, orbit: int) -> NDArray[np.int64]:
-        """Return the pairs (count, 2) of records of an orbit that are joined by lines."""
+        """Return the pairs (count, 2) of records of an orbit that a line joins."""
         joined = self.joined[orbit] if self.joined else None
         steps = np.arange(len(self.points))
         return np.stack([steps[:-1], steps[1:]], axis=1) if joined is None else joined
@@ -78,11 +78,11 @@ def portrait_of(
     euler: Trajectories | None = None,
     join: bool = False,
 ) -> Portrait:
-    """Project orbits to two or three axes, each of which is a function of the point or the word "step".
+    """Project orbits to two or three axes; each axis is a function of the point, or the word "step".
 
-    `color` is "orbit", "step" or a function of the point; by default the window is chosen automatically. If `join`,
-    the neighbours of each point on the curve of its orbit are computed, unless an axis is the step. Raises InputError
-    for other axes or colors.
+    `color` is "orbit", "step" or a function of the point. By default the window is chosen automatically. If `join`, the
+    neighbours of each point on the curve of its orbit are determined, unless an axis is the step. Raises InputError for
+    other axes or colors.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
@@ -132,11 +132,11 @@ def _step_numbers(trajectories: Trajectories) -> FloatArray:
 
 
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
-    """Return pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None if there is no curve.
+    """Return the pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None without a curve.
 
-    Every point p is joined to its nearest neighbour q, and to the nearest point r on the opposite side, that is with
-    (q - p).(r - p) < 0. This reconstructs a smooth curve, in any dimension and with any number of components, if the
-    points are dense enough (Dey and Kumar's NN-crust). NaN and points after the first 2000 are ignored.
+    Each point p is joined to its nearest neighbour q and to the nearest point r on the other side of p, that is, with
+    (q - p).(r - p) < 0. If the points are dense enough, this reconstructs a smooth curve in any dimension and with any
+    number of components (Dey and Kumar's NN-crust). NaN and all points after the first 2000 are ignored.
 
     >>> turn = 2.4 * np.arange(12)
     >>> pairs = neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))
@@ -155,7 +155,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     np.fill_diagonal(distances, np.inf)
     indices = np.arange(len(rows))
     nearest = distances.argmin(axis=1)
-    # (q - p).(r - p) < 0: r and the nearest neighbour q of p are on opposite sides of p
+    # Entry [p, r] is (q - p).(r - p), with the nearest neighbour q of p.
     inner_products = products[nearest] - products[indices, nearest][:, None] - products + squares[:, None]
     opposite_distances = np.where(inner_products < 0, distances, np.inf)
     opposite = opposite_distances.argmin(axis=1)
@@ -174,9 +174,9 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
 _ASPECT = 0.75  # height over width of the axes
 _EULER_COLOR = "#BBBBBB"
 _LEVEL_STYLE: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
-_MAX_JOINED_POINTS = 1_000_000  # maximal number of joined points: they take ten seconds and half a gigabyte
-_MAX_MARKED_ORBITS = 40  # maximal number of orbits with marked initial points: more marks would cover the picture
-_MAX_MARKED_POINTS = 60  # maximal number of points of an orbit that are all drawn as marks
+_MAX_JOINED_POINTS = 1_000_000  # maximal number of joined points, which take ten seconds and half a gigabyte
+_MAX_MARKED_ORBITS = 40  # maximal number of orbits with marks at their initial points; more would cover the picture
+_MAX_MARKED_POINTS = 60  # maximal number of points of an orbit that is drawn with marks
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 _ARROW: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
@@ -184,7 +184,7 @@ _SEPARATRIX_STYLE = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 
 _SOLUTION_STYLE = {"color": "#888888", "linewidth": 0.5}
 _FILLED_MARK: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
 _OPEN_MARK: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
-# This mark is used for no equilibrium and for no orbit.
+# No equilibrium and no orbit has this mark.
 _START_MARK: dict[str, Any] = {"marker": ">", "markersize": 3.5, "markeredgecolor": "black", "markeredgewidth": 0.5}
 _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
     SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
@@ -198,9 +198,9 @@ _EQUILIBRIUM_MARKS: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait as dots or, if `lines` is true, as joined points; if `equal` is true, the axes have equal units.
+    """Draw a portrait as dots or, if `lines`, as joined points; if `equal`, the axes have equal units.
 
-    `note` is printed above the upper right corner. Raises InputError if more than a million points are to be joined.
+    `note` is written above the upper right corner. Raises InputError if more than a million points are to be joined.
     """
     count = portrait.points[..., 0].size
     if lines and count > _MAX_JOINED_POINTS:
@@ -214,16 +214,16 @@ def plot_portrait(
         aspect = _ASPECT
         if in_space:
             aspect = 0.9 if portrait.values is None else 0.8
-        elif equal:  # the window and the color bar determine height over width
+        elif equal:  # the window and the color bar determine the height of the picture
             (x0, x1), (y0, y1) = portrait.window
             aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if portrait.values is not None else 1.0)))
         figure = new_figure(style, aspect)
         if in_space:
-            mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
+            mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are created
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
         handles: dict[str, Any] = {}  # legend text -> handle
         if portrait.flow is not None:
-            # Arrows and curves of the differential equation are drawn under the orbits, equilibria on top of them.
+            # The arrows and curves of the differential equation lie below the orbits, its equilibria above them.
             flow = portrait.flow
             if len(flow.places):
                 axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROW)
@@ -242,9 +242,9 @@ def plot_portrait(
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL_STYLE), autolim=False)
             handles["level curve"] = Line2D([], [], color=_LEVEL_STYLE["colors"], linewidth=_LEVEL_STYLE["linewidths"])
         if portrait.euler is not None:
-            # Lines continue beyond the edge of the window, but matplotlib cannot draw points too far outside.
+            # Lines continue beyond the edge of the window, but matplotlib cannot draw points far outside of it.
             wide_window = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
-            # Dashed, since colors are hard to distinguish in a gray copy.
+            # The lines are dashed, since colors are hard to distinguish in a gray copy.
             dash_style: dict[str, Any] = {
                 "linewidth": 0.6,
                 "linestyle": (0, (5, 2)),
@@ -257,12 +257,12 @@ def plot_portrait(
                     draw_points(axes, *orbit.T, color=_EULER_COLOR, zorder=1.5, total=count)
             dot_style: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
             handles["explicit Euler"] = Line2D([], [], color=_EULER_COLOR, **(dash_style if lines else dot_style))
-        # Axes in space do not clip points outside of them.
+        # matplotlib does not clip points outside of axes in space.
         points = _hide_outside(portrait.points, portrait.window) if in_space else portrait.points
         if portrait.values is None and points.shape[1] <= len(COLORS):
             _draw_few_orbits(axes, points, lines, portrait)
         elif portrait.values is None:
-            # Orbits are colored by the color map; the widest is drawn first, so that the orbits inside stay visible.
+            # Each orbit has a color of the color map; the widest orbit is drawn first, so that it covers no other.
             with np.errstate(all="ignore"):
                 extent = np.nanmax(points, axis=0, initial=-np.inf) - np.nanmin(points, axis=0, initial=np.inf)
                 extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
@@ -298,14 +298,14 @@ def plot_portrait(
 
 
 def _draw_few_orbits(axes: Any, points: FloatArray, lines: bool, portrait: Portrait) -> None:
-    """Draw each orbit in its own color, and with its own mark if it has few points."""
+    """Draw each orbit in a color of its own, and with a mark of its own if it has few points."""
     count = points.shape[0] * points.shape[1]
     for k, orbit in enumerate(points.swapaxes(0, 1)):
         options: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
         if lines:
             pairs = portrait.pairs(k)
             path = orbit
-            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between lines, to draw all lines at once
+            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between lines, so that one call draws all of them
                 ends = orbit[pairs]
                 path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
             axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **options)
@@ -323,15 +323,15 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Draw the orbits in this order as dots or, if `lines`, as segments, colored by the values.
+    """Draw the orbits in the order `order`, colored by `values`, as dots or, if `lines`, as segments.
 
-    A segment has the color of its first point; `limits` are the least and the largest value of the color bar.
+    A segment has the color of its first point; `limits` are the smallest and the largest value of the color bar.
     """
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
 
-    # Without the lightest part of the color map: small dots would be invisible on white paper.
+    # The lightest part of the color map is omitted: small dots would be invisible on white paper.
     color_map = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
     is_image = points.shape[0] * points.shape[1] > MAX_VECTOR_POINTS
     options: dict[str, Any] = {"norm": Normalize(*limits), "cmap": color_map, "rasterized": is_image, "zorder": 2}
@@ -364,9 +364,9 @@ def _hide_outside(points: FloatArray, window: Window) -> FloatArray:
 
 
 def _format_axes_in_space(axes: Any, window: Window | None) -> None:
-    """Format axes in space: light planes, few ticks, and labels inside the picture (layouts would cut them off).
+    """Format axes in space: light planes, few ticks, labels inside the picture, where the layout cannot cut them.
 
-    With a window the box has the proportions of the window. matplotlib draws the edges of three planes only.
+    With a window the box has the proportions of the window. matplotlib draws the edges of only three planes.
     """
     from matplotlib.ticker import MaxNLocator
 

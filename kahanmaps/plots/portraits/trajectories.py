@@ -1,4 +1,4 @@
-"""Float orbits for pictures, of a map and of the explicit Euler method."""
+"""Float orbits for pictures: of a map, or of the explicit Euler method."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-MAX_POINTS = 4_000_000  # number of points of all orbits together: more would not be visible in a picture
-_MAX_COORDINATES = 40_000_000  # number of coordinates of all points together
-# Up to this work and this number of steps, numpy is faster than loading compiled code.
+MAX_POINTS = 4_000_000  # maximal number of points of all orbits together: more would be indistinguishable in a picture
+_MAX_COORDINATES = 40_000_000  # maximal number of coordinates of all points together
+# Maximal work and maximal number of steps for which numpy is faster than loading compiled code.
 _MAX_NUMPY_WORK, _MAX_NUMPY_STEPS = 10_000_000, 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,) of the rows.
+    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit, at `steps` (records,).
 
-    `ended` maps the reason why orbits ended early, as a phrase after "an orbit", to the number of these orbits.
+    `ended` maps each reason why orbits ended early, a phrase to follow "an orbit", to the number of these orbits.
     """
 
     variables: tuple[str, ...]
@@ -55,14 +55,14 @@ def ensemble_for(
     form: NormalForm | None = None,
     radius: float | None = None,
 ) -> FloatEnsemble:
-    """Return the ensemble of these initial points (n, dim) with the faster kernel; eps is half the time step."""
+    """Return an ensemble of orbits from `starts` (n, dim), with the faster kernel; eps is half the time step."""
     work = len(starts) * steps * (1 + system_or_map.dim**3 // 8)
     kernel = "numpy" if work < _MAX_NUMPY_WORK and steps < _MAX_NUMPY_STEPS else None
     return FloatEnsemble(system_or_map, eps, starts, backward=backward, form=form, kernel=kernel, radius=radius)
 
 
 def field_of(file: SystemFile) -> QuadraticSystem | None:
-    """Return the vector field of a file with real approximations of algebraic parameters; None if it has no field."""
+    """Return the vector field of a file, with rational approximations of algebraic parameters; None if it has none."""
     map_ = file.map.real_approximation
     return map_.system if isinstance(map_, KahanFamily) and not map_.system.symbols else None
 
@@ -77,7 +77,7 @@ def ensemble_of_file(
 
 
 def follow_orbits(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:
-    """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
+    """Take `steps` steps, and return all points of the orbits. Raises InputError for more than MAX_POINTS points.
 
     >>> system = QuadraticSystem.from_text(["x"], ["x"])
     >>> result = follow_orbits(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)

@@ -1,4 +1,4 @@
-"""The default window and projection of a picture."""
+"""The default window and the default projection of a picture."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.float_conversion import FloatArray
 
-Window = tuple[tuple[float, float], ...]  # low and high along each axis
+Window = tuple[tuple[float, float], ...]  # (low, high) along each axis
 
-_OUTER_PERCENT = 10.0  # percent of the points at either end that are ignored if they are far away
-_FAR_RATIO = 3.0  # a point is far away if its distance exceeds this multiple of the range of all other points
-_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # a window above 1e12 times the initial coordinates is cut to 10 times these
-_MARGIN_RATIO = 0.04  # margin at either end, relative to the range
-_MAX_NUMBER = 1e307  # largest number that matplotlib can subtract
-_MAX_POINTS = 4000  # maximal number of points used in the choice of axes
+_OUTER_PERCENT = 10.0  # percent of the points at each end that are ignored if some point is far away
+_FAR_RATIO = 3.0  # a point is far away if its distance exceeds this multiple of the inner range
+_MAX_RATIO, _SHOWN_RATIO = 1e12, 10  # a window beyond 1e12 times the initial coordinates is cut at 10 times these
+_MARGIN_RATIO = 0.04  # margin at each end, relative to the length of the range
+_MAX_NUMBER = 1e307  # maximal number that matplotlib can subtract
+_MAX_POINTS = 4000  # maximal number of points from which axes are chosen
 _MAX_VARIABLES = 16  # maximal number of variables from which two or three are chosen as axes
 _CELLS_PER_AXIS = {1: 400, 2: 24, 3: 10}  # dimension of the picture -> grid cells along each axis
 
 
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
-    """Return a window for points (n, d) that ignores a few points far away.
+    """Return a window for points (n, d) in which a few points far away are ignored.
 
-    Along each axis the window is the range of all points. The inner range omits the outer tenth of the points and of
-    `starts` at either end. If a point is farther from it than three times its length, the window is the inner range,
-    extended by up to half its length at either end. If the window exceeds 10^12 times the largest coordinate of
-    `starts`, points beyond ten times this coordinate are omitted. NaN is ignored; a range of length 0 is widened.
+    Along each axis the window is the range of all points, widened if its length is 0. The inner range omits a tenth of
+    the points, and of `starts`, at each end. If a point is farther from the inner range than three times its length,
+    the window is the inner range, extended by at most half its length at each end. If the window exceeds 10^12 times
+    the largest coordinate of `starts`, points beyond ten times this coordinate are omitted. NaN is ignored.
 
     >>> window_of(np.array([[0.0], [1.0]]))
     ((-0.04, 1.04),)
@@ -53,7 +53,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """Return the interval that `window_of` finds for these values, without a margin; `required` are initial values.
+    """Return the interval of `window_of` for values of one coordinate, without margin; `required` are initial values.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
@@ -65,7 +65,7 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
     samples = [values]
     if required is not None and len(required := np.clip(required[np.isfinite(required)], -_MAX_NUMBER, _MAX_NUMBER)):
         samples.append(required)
-    # The inner range, without a tenth of the points at either end, in a unit in which nothing overflows.
+    # The ends of the inner range, in a unit in which nothing overflows.
     percents = [_OUTER_PERCENT, 100 - _OUTER_PERCENT]
     ranges = [np.percentile(sample, percents, method="nearest") / unit for sample in samples]
     left, right = float(min(first for first, _ in ranges)), float(max(last for _, last in ranges))
@@ -73,13 +73,13 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
     if low < left - _FAR_RATIO * (right - left) or high > right + _FAR_RATIO * (right - left):
         low = max(low, left - (right - left) / 2)
         high = min(high, right + (right - left) / 2)
-    if high - low < 1e-9 * max(abs(low), abs(high)):  # equal values up to rounding: center them
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # values equal up to rounding lie in the middle
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
-    """Return a list low, high, low, high, ... as a window. Raises InputError unless each axis has two, low < high."""
+    """Return numbers low, high, low, high, ... as a window. Raises InputError unless low < high for each axis."""
     if len(numbers) != 2 * axes:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
@@ -91,21 +91,21 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
 
 
 def is_inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
-    """Return an array (...): True for points (..., d) in the window, False for others and for NaN."""
+    """Return an array (...) of booleans: whether each of the points (..., d) lies in the window; False for NaN."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
 def count_outside(points: FloatArray, window: Window) -> int:
-    """Return the number of points (n, d) outside the window, without counting NaN."""
+    """Return the number of points (n, d) outside of the window; points with NaN are not counted."""
     return int((~np.isnan(points).any(axis=1) & ~is_inside(points, window)).sum())
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
-    """Return the indices of the `count` variables along which the points (n, dim) spread most, in increasing order.
+    """Return the increasing indices of `count` variables, those along which the points (n, dim) are spread most.
 
-    Each variable is scaled to its own window. The choice maximizes the number of grid boxes that contain a point; in a
-    tie the first choice is taken. Of more than 16 variables only the first 16 non-constant ones are compared.
+    Each variable is scaled to its own window. The choice maximizes the number of grid boxes that contain a point; of
+    equal choices the first is taken. If there are more than 16 variables, only the first 16 that vary are compared.
 
     >>> t = np.linspace(0, 6, 200)
     >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)
