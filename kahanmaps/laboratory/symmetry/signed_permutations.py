@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from itertools import product
+from operator import itemgetter
 
 from flint import fmpq, fmpq_mat, fmpz
 
@@ -112,33 +113,41 @@ def _search_signed_permutations(
 ) -> Iterator[list[tuple[int, int]] | None]:
     """Yield lists of (image, sign) that map the table of `numbers` to `sign` times itself; None at the work limit."""
     size = len(next(iter(numbers), (0, 0)))
-    # For each variable the equations with it and no later variable, as indices; those with a coefficient come first.
+    # The image k of a variable with the sign -1 is encoded as ~k. The table has the coefficients for all signs.
+    signed_numbers = {
+        tuple(~k if s < 0 else k for k, s in zip(index, signs, strict=True)): number * math.prod(signs)
+        for index, number in numbers.items()
+        for signs in product((1, -1), repeat=size)
+    }
+    # For each variable the equations with it and no later variable, as a function that takes the entries of an index
+    # out of a list, with the number that must result; those with a coefficient come first.
     equations = [
-        sorted(
-            (index for index in product(range(last + 1), repeat=size) if max(index) == last and index[1] <= index[-1]),
-            key=lambda index: index not in numbers,
-        )
+        [
+            (itemgetter(*index), numbers.get(index, 0) * sign)
+            for index in sorted(product(range(last + 1), repeat=size), key=lambda index: index not in numbers)
+            if max(index) == last and index[1] <= index[-1]
+        ]
         for last in range(n)
     ]
 
-    def is_consistent(p: list[int], s: list[int]) -> bool:
-        for checked_count, index in enumerate(equations[len(p) - 1], 1):
-            image = numbers.get(tuple(p[k] for k in index), 0) * math.prod(s[k] for k in index)
-            if image != numbers.get(index, 0) * sign:
+    def is_consistent(images: list[int]) -> bool:
+        for checked_count, (entries_of, number) in enumerate(equations[len(images) - 1], 1):
+            if signed_numbers.get(entries_of(images), 0) != number:
                 count_work(2 + 1.5 * checked_count)
                 return False
-        count_work(2 + 1.5 * len(equations[len(p) - 1]))
+        count_work(2 + 1.5 * len(equations[len(images) - 1]))
         return True
 
-    def extend(p: list[int], s: list[int]) -> Iterator[list[tuple[int, int]] | None]:
+    def extend(images: list[int]) -> Iterator[list[tuple[int, int]] | None]:
         if budget.is_spent:
             yield None
-        elif len(p) == n:
-            yield list(zip(p, s, strict=True))
+        elif len(images) == n:
+            yield [(~k, -1) if k < 0 else (k, 1) for k in images]
         else:
-            extensions = (([*p, image], [*s, t]) for image in range(n) if image not in p for t in (1, -1))
-            for images, signs in extensions:
-                if is_consistent(images, signs):
-                    yield from extend(images, signs)
+            for k in range(n):
+                if k not in images and ~k not in images:
+                    for extension in ([*images, k], [*images, ~k]):
+                        if is_consistent(extension):
+                            yield from extend(extension)
 
-    return extend([], [])
+    return extend([])
