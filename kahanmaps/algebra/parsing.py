@@ -512,7 +512,7 @@ class _Arithmetic:
     def number(self, token: Token) -> _Quotient:
         start = token.start_pos
         value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
-        self.spend_words(1, value.height_bits(), start)
+        self.count_machine_words(1, value.height_bits(), start)
         return self.constant(value)
 
     def name(self, token: Token) -> _Quotient:
@@ -613,7 +613,7 @@ class _Arithmetic:
         if leading_coefficient == 1:
             return _Quotient(denominator, numerator)
         # Make the leading coefficient 1, so that denominators that differ by a constant factor become equal.
-        self.spend_words(numerator.terms, numerator.bits, column)
+        self.count_machine_words(numerator.terms, numerator.bits, column)
         monic_numerator = numerator._replace(
             element=numerator.element / leading_coefficient,
             common_denominator=abs((leading_coefficient * numerator.common_denominator).p),
@@ -636,7 +636,7 @@ class _Arithmetic:
             )
             self.check_bits(denominator_bits, column)
         self.check_bits(bits, column)
-        self.spend_words(left.terms + right.terms, bits, column)
+        self.count_machine_words(left.terms + right.terms, bits, column)
         return self.limited_polynomial(left.element + right.element, common_denominator, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
@@ -650,7 +650,7 @@ class _Arithmetic:
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             found_text = f"found a product of polynomials with {left.terms} and {right.terms} terms"
             raise self.error_at(f"{found_text}, which is too large to expand", column)
-        self.spend_words(pairs, bits_of_pair, column)
+        self.count_machine_words(pairs, bits_of_pair, column)
         return self.limited_polynomial(
             left.element * right.element, left.common_denominator * right.common_denominator, bits, column
         )
@@ -660,7 +660,7 @@ class _Arithmetic:
             return value
         bits = value.bits + _bits(number.p)
         self.check_bits(max(bits, _bits(value.common_denominator) + _bits(number.q)), column)
-        self.spend_words(value.terms, bits, column)
+        self.count_machine_words(value.terms, bits, column)
         return value._replace(
             element=value.element * number, common_denominator=value.common_denominator * number.q, bits=bits
         )
@@ -671,7 +671,7 @@ class _Arithmetic:
         if value.terms == 1:
             bits = value.bits * n
             self.check_bits(max(bits, _bits(value.common_denominator) * n), column)
-            self.spend_words(1, bits, column)
+            self.count_machine_words(1, bits, column)
             return _Polynomial(value.element**n, value.common_denominator**n, bits, 1, value.degree * n)
         result = value
         for digit in f"{n:b}"[1:]:
@@ -703,7 +703,7 @@ class _Arithmetic:
         if degree > self.limits.degree:
             raise self.error_at(f"found {operation} of degree {degree}, expected at most {self.limits.degree}", column)
 
-    def spend_words(self, terms: int, bits: int, column: int) -> None:
+    def count_machine_words(self, terms: int, bits: int, column: int) -> None:
         """Count the machine words of `terms` terms whose coefficients have `bits` bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:

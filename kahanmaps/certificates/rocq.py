@@ -418,11 +418,13 @@ class _Script:
         ]
 
     def derivative(self) -> tuple[list[str], str]:
-        """Return the lines that define l11, l12, ..., the entries of L, and the text "l11 l12 ..."."""
+        """Return the lines that define l11, l12, ..., the entries of L in dPhi = M^-1 L, and the text "l11 l12 ..."."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
         entries_of_L = [entry for row in self.data.derivative for entry in row]
-        lines += [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, entries_of_L, strict=True)]
+        lines += [
+            f"Definition {name} : R := {self.text(entry)}." for name, entry in zip(names, entries_of_L, strict=True)
+        ]
         for i, difference in enumerate(self.data.residuals, 1):
             terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.ys))
             definitions = " ".join(f"m{i}{k + 1}" for k in range(self.data.dim))
@@ -462,13 +464,13 @@ class _Script:
         names = " ".join(functions)
 
         def entry_text(
-            letter: str, i: int, j: int, point: str, entry_format: str = "{}", point_format: str = "{}"
+            letter: str, i: int, j: int, point: str, entry_format: str = "{}", tensor_format: str = "{}"
         ) -> str:
-            """Return entry i, j of A (den T) A^T; the formats apply to entries of A (`letter`11, ...) and of den T."""
+            """Return entry (i, j) of A (den T) A^T, with A_11 = `letter`11, ... and formats for entries of both."""
             a = [[entry_format.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
             minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in name_of_pair.items())
             return " + ".join(
-                f"({b} * {c} - {d} * {e}) * {point_format.format(f'{name} {point}')}" for b, c, d, e, name in minors
+                f"({b} * {c} - {d} * {e}) * {tensor_format.format(f'{name} {point}')}" for b, c, d, e, name in minors
             )
 
         if not claim.is_free:
@@ -496,7 +498,7 @@ class _Script:
                 continue
             scaled_sides = (
                 entry_text("l", i, j, x, "({} * det)"),
-                entry_text("m", i, j, y, point_format=f"({{}} * det ^ {k})"),
+                entry_text("m", i, j, y, tensor_format=f"({{}} * det ^ {k})"),
             )
             images = [f"?l{row + 1}{column + 1}_image" for row in (i, j) for column in range(n)]
             images += [f"?{name}_image" for name in names.split()]
@@ -512,7 +514,10 @@ class _Script:
     def jacobi(
         self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
     ) -> list[str]:
-        """State the Jacobi identities for i < j < k: the cyclic sum over T_is d/dx_s T_jk, times den^3, is 0."""
+        """State the Jacobi identities for i < j < k: the cyclic sum over T_is d/dx_s T_jk, times den^3, is 0.
+
+        `names` has the name of the numerator of T_ij at (i, j), i < j; `functions` has the numerators and den by name.
+        """
         x, lines = self.x, list[str]()
         for name, P in functions.items():
             for s in range(claim.dim):
@@ -713,7 +718,7 @@ def determinant_text(entries: Sequence[Sequence[str]]) -> str:
 def _homogeneous_text(
     polynomial: fmpq_mpoly, letters: Sequence[str], degree: int, image: slice, det: str = "det ^ {}"
 ) -> str:
-    """Return det^degree P with (det x~)/det for x~; `letters` contains det x~, or N, in the slice `image`.
+    """Return the text of det^degree P with (det x~)/det put for x~; `letters` has det x~, or N, in the slice `image`.
 
     Terms with the same powers of x~ are collected, so that `ring` computes each product of powers of N once.
     """

@@ -136,10 +136,10 @@ def diagnosis(A: fmpq_mat) -> str:
         )
     is_diagonalisable = degree == sum(factor.degree for factor in factors)
     return (
-        f"{beginning_text}; A is {'still' if is_diagonalisable else 'not'} diagonalisable and derogatory: its minimal "
-        f"polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the "
-        "theorems on the invariant Poisson structure and m independent integrals do not apply; commutativity of "
-        "associated maps does"
+        f"{beginning_text}; A is derogatory: its minimal polynomial has degree {degree}, less than m = {m}; A is "
+        f"{'diagonalisable' if is_diagonalisable else 'not diagonalisable'}. The space of cubics is larger than 4m, "
+        "and the theorems on the invariant Poisson structure and m independent integrals do not apply; commutativity "
+        "of associated maps does"
     )
 
 

@@ -43,7 +43,7 @@ def as_point(value: Any, variables: Sequence[str]) -> Any:
     if isinstance(value, _MATRIX_TYPES):
         return value.entries()
     if not hasattr(value, "__len__") or isinstance(value, set | frozenset):  # the order of a set is arbitrary
-        raise InputError(f"found the point {value!r}, expected a sequence of {len(variables) or 'its'} numbers")
+        raise InputError(f"found the point {value!r}, expected a sequence of {len(variables) or 'its'} coordinates")
     if is_several(value):
         raise InputError(
             f"found {counted(len(value), 'point')}, expected one: type [f(x) for x in points]; "

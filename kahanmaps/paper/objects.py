@@ -440,7 +440,7 @@ class PaperObjects:
 
     @cache_by_id
     def integral(self, g: SystemOver, x: Any) -> Any:
-        """Return eps^{-1} x^T J x^, where x^ = Phi_g(x): H~ for g = f, K~ for an associated g."""
+        """Return x^T J y/eps with y = Phi_g(x): H~ for g = f, K~ for an associated g."""
         return self.dot(x, self.J * self.step(g, x)) / self.eps
 
     @cache_by_id

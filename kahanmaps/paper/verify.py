@@ -204,7 +204,7 @@ class Verifier:
         self.file, self.member, self.m, self.settings, self.options = file, member, m, settings, options
         self.roots = None if member is None else specialize.rational_roots(member)
         self._seed = settings.seed if member is None else derive_seed(settings.seed, member.A, member.H, settings.eps)
-        self._points: dict[tuple[bool, int], PaperObjects | None] = {}
+        self._points: dict[tuple[bool, int], PaperObjects | None] = {}  # by (must split, number of the random point)
 
     def findings(self) -> list[Finding]:
         """Return a finding for each claim; with controls, a finding for each control of a claim, and one for all."""

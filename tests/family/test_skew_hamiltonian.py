@@ -63,7 +63,10 @@ DIAGNOSES = [
     (random_member_with_eigenvalues([1, "1/2"], 1).A, "A is generic: chi = (t - 1/2) (t - 1), .* all roots rational"),
     (random_member_with_chi(t**3 - 2, 1).A, "A is generic: chi = (t^3 - 2), .* irreducible over Q"),
     (random_member_with_chi((t - 1) * (t**2 - 2), 1).A, "A is generic: .* 2 irreducible factors over Q"),
-    (random_member_with_eigenvalues([1, 1, 2], 1).A, "A is not generic: .*(t - 1) 2 times; A is still diagonalisable"),
+    (
+        random_member_with_eigenvalues([1, 1, 2], 1).A,
+        "A is not generic: .*2 times; A is derogatory.* A is diagonalisable",
+    ),
     (
         random_member_with_chi((t - 1) ** 2, 1).A,
         "A is not generic: .*(t - 1) 2 times; A is not diagonalisable, but chi is its minimal polynomial.*dimension 4m",

@@ -73,7 +73,7 @@ def command() -> None:
     """
 
 
-@command.command("run", short_help="Run the tasks of a spec; store the results in a database.")
+@command.command("run", short_help="Run the tasks that a file describes; store the results in a database.")
 @click.argument("spec", required=False, type=click.Path(dir_okay=False), shell_complete=complete_toml)
 @_database_option(required=False)
 @click.option(

@@ -124,7 +124,7 @@ def random_member_from(
 @click.option("--normal-form", is_flag=True, help="Also print the normal form, of a cubic h(X, Y) over K = Q[t]/chi.")
 @opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
-    """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
+    """Show a member: A, the factors of chi (chi^2 = det(t - A)), and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
 
     \b
       kahanmaps family show paper_m3

@@ -27,7 +27,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @certificate_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Find all g over Q, of degree at most 2, whose Kahan map commutes with that of SYSTEM, x' = f(x), for every eps.
+    """Find quadratic g over Q whose Kahan map commutes with that of SYSTEM, x' = f(x), for every eps.
 
     \b
       kahanmaps find-commuting paper_m3
@@ -35,6 +35,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting --vars x,y --rhs 'x^2' --rhs 'y^2 + x*y'
       kahanmaps find-commuting pair.toml --json | jq '.solutions[].B'
       kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
+
+    --shape quadratic, the default in dimension 1 to 3, finds all g of degree at most 2; --shape linear finds all
+    g = B f with a constant matrix B.
 
     Linear algebra gives all g with [f, g] = 0; higher powers of eps in Phi_f Phi_g = Phi_g Phi_f give polynomial
     equations, which are solved over Q; then it is proved for each solution that the maps commute, or tested at random

@@ -31,10 +31,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     only if f(T(x)) = S f(x), and a reversing symmetry if and only if f(T(x)) = -S f(x). Hence every symmetry reported
     is proved.
 
-    Three searches are made: for one-parameter groups and a scaling; in dimension at most 12 for signed permutations of
-    the variables, or of scaled variables, with a translation; in dimension at most 3 for all rational matrices S,
-    unless there are one-parameter groups of linear maps. x -> -x reverses every homogeneous quadratic system; it is
-    reported as trivial. A finite group is given by generators; --json lists its elements.
+    Three searches are made: for one-parameter groups of symmetries, and of scalings that also change eps; in dimension
+    at most 12 for signed permutations of the variables, or of scaled variables, with a translation; in dimension at
+    most 3 for all rational matrices S, unless there are one-parameter groups of linear maps. x -> -x reverses every
+    homogeneous quadratic system; it is reported as trivial. A finite group is given by generators; --json lists its
+    elements.
 
     Exit status: 0 all searches completed, 2 usage error, 3 a search was too large or the work limit was reached.
     """

@@ -24,7 +24,7 @@ from kahanmaps_cli.screen.terminal import print_stdout
     "analysis",
     type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
     metavar="E",
-    help="Also analyze one member of each class of special members (equal degrees), with this effort.",
+    help="Also analyze a member of each component without exponential growth, of points with equal degrees only one.",
 )
 @click.option("--toml", "as_toml", is_flag=True, help="Print a member of each component as a system file.")
 @click.option(
@@ -48,12 +48,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     The degrees of the first iterates are measured for all members with parameters in GF(p), for several small primes p.
     Members with smaller degrees than a generic member are special. They form points, lines, curves and surfaces; those
     that appear modulo all primes are lifted to conditions over Q. A condition is confirmed if random members that
-    satisfy it have these degrees, computed as in `degrees`; the growth is that of a rational member. All this is
-    evidence, and no proof.
+    satisfy it have these degrees, computed as in `degrees`; the growth beside a condition is that of one rational
+    member that satisfies it. All this is evidence, and no proof.
 
     With two or three parameters, members on random lines of parameter space are tried as well, modulo primes at which
-    quadratic fields split, so that a^2 - 2 = 0 is found as one condition. The effort limits the whole scan; the output
-    lists what was not done.
+    many quadratic fields split: there a^2 - 2 = 0 has two solutions, and is found as one condition. The effort limits
+    the whole scan; the output lists what was not done.
 
     Without --eps the conditions hold for every eps; with eps among the parameters they may contain it. With more than
     three parameters, only members on random lines and planes of parameter space are tried. This finds conditions of

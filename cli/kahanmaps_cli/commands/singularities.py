@@ -47,8 +47,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     A composition too long to be multiplied out is followed map by map: steps are then single maps, and each
     hypersurface is listed with the map that contracts it.
 
-    Where polynomials are too large, ? stands for all hypersurfaces with the same multiplicity and the same outcome,
-    which are represented by random points.
+    If the polynomials are too long, random points of the hypersurfaces are followed instead. All hypersurfaces with
+    the same multiplicity and the same outcome then share a line, with ? in place of a polynomial.
 
     Exit status: 0 done, 2 usage error, 3 undecided (work limit reached, or two random points or eps disagree).
     """

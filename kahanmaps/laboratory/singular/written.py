@@ -51,10 +51,8 @@ class Word:
 
     @property
     def text(self) -> str:
-        """A note that steps are steps of single factors."""
-        return (
-            f"{counted(self.length, 'map')} make one iterate and are followed one by one: these steps are single maps"
-        )
+        """A note that each step applies one factor of the composition."""
+        return f"one iterate consists of {counted(self.length, 'map')}: each of these steps applies one of them"
 
 
 def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:

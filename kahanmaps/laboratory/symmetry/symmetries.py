@@ -320,7 +320,7 @@ def _generate_group(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]
 
 
 def _add_matrices(symmetries: Symmetries, budget: Budget) -> None:
-    """Add all invertible rational S with f(S x) = S f(x) or f(S x) = -S f(x), solutions of polynomial equations."""
+    """Add all invertible rational S with f(S x) = S f(x) or f(S x) = -S f(x), by solving for the entries."""
     f = symmetries.system
     n = f.dim
     if any(x.is_linear for x in symmetries.infinitesimal):

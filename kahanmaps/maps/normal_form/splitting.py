@@ -83,7 +83,7 @@ class Splitting:
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
-        """Return the rows of R: x is the sum of R w over the planes, w the coefficients of u and v in x's field."""
+        """Return the rows of M for a plane: x is the sum of M w over all planes, w the coefficients of u, then of v."""
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:

@@ -21,9 +21,9 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
     up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
     length of W instead of up to n times this length: exact divisions by the previous pivot remove the higher powers. If
-    the minors have no common factor with `candidate_divisor`, this is Bareiss' algorithm. If they have one by chance (a
-    pivot W^2 in a matrix with a block that is W times the identity), the previous pivot need not divide later entries;
-    the part of it that divides them is then found by gcds. The divisions are not checked one by one: the solution is
+    the minors have no common factor with `candidate_divisor`, this is Bareiss' algorithm. In other matrices the pivot
+    before a division by W need not divide the later entries: a block that is W times the identity gives the pivot W^2.
+    Then gcds find the part of the pivot that divides them. The divisions are not checked one by one: the solution is
     verified in the equation.
     """
     n = matrix.nrows()

@@ -159,9 +159,9 @@ def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
 
 
 @claim("Theorem 9, proof", "", "B H", blockwise=True)
-def last_displays(o: PaperObjects) -> Pairs:
-    """The matrices on both sides of (58) are those that Lemma 10 gives
-    f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more"""
+def terms_of_equation_58(o: PaperObjects) -> Pairs:
+    """By Lemma 10 the four terms of (58) are f''(I - eps^2 f'^2)^{-1} times a vector
+    f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and five more"""
     square = o.one_minus_square(o.f, o.x)
     f, fx, df = o.f, o.fx, o.df
     for B in o.associates():

@@ -403,14 +403,14 @@ class _Line:
             factor = self.restricted(P)
             while (common_factor := extactic.gcd(factor)).degree() > 0:
                 extactic = extactic // common_factor
-        points = self.special(extactic)
+        special_factors = self.special(extactic)
         spaces: list[Vectors] = []
         partial_choices: list[tuple[int, int, Vectors]] = [(0, 0, [])]
         choice_count = 0
         while partial_choices:
             first_index, total_degree, space_so_far = partial_choices.pop()
-            for k in range(first_index, len(points)):
-                degree, space = points[k]
+            for k in range(first_index, len(special_factors)):
+                degree, space = special_factors[k]
                 if total_degree + degree > self.degree:
                     continue
                 choice_count += 1

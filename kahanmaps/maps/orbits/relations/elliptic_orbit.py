@@ -44,13 +44,13 @@ class TooLongRelation(Exception):
 
 
 def elliptic_steps(
-    map_over: Map, start: IntegerPoint, bits: int, most_primes: int = _MAX_PRIMES
+    map_over: Map, start: IntegerPoint, bits: int, prime_limit: int = _MAX_PRIMES
 ) -> EllipticSteps | None:
     """Search for elliptic curves that contain the orbit of `start`; return the steps of the orbit, or None.
 
     `bits` is the bit length of the current points; only much shorter coefficients are useful. Raises TooLongRelation if
     the coefficients of a curve are too long now, but may be useful once the points have grown; it is not raised if
-    `most_primes` primes do not suffice to decide this.
+    `prime_limit` primes do not suffice to decide this.
     """
     factors = map_over.factors
     period = next(  # the shortest initial sequence of factors whose repetition gives all factors
@@ -58,7 +58,7 @@ def elliptic_steps(
         for k in range(1, len(factors) + 1)
         if len(factors) % k == 0 and all(factor is factors[i % k] for i, factor in enumerate(factors))
     )
-    max_primes = min(most_primes, bits // _BITS_PER_PRIME)
+    max_primes = min(prime_limit, bits // _BITS_PER_PRIME)
     start_point: IntegerPoint | None = start
     for skipped in (0, _SKIPPED_STEPS) if len(period) <= _MAX_FACTORS else ():
         for _ in range(skipped):
@@ -69,15 +69,15 @@ def elliptic_steps(
         for stride in (len(period), 2 * len(period)):
             search = _Search(period, start_point, stride)
             try:
-                numbers = search.numbers(max_primes)
-                exact_curves = None if numbers is None else _ExactCurves(search, numbers)
+                coefficients = search.numbers(max_primes)
+                exact_curves = None if coefficients is None else _ExactCurves(search, coefficients)
             except ArithmeticError:
                 is_special = True
                 continue
             if exact_curves is not None and _is_proved(start_point, search, exact_curves.steps(map_over)):
                 return exact_curves.steps(map_over, skipped)
             if search.sections:  # curves exist, but their coefficients are too long
-                if max_primes < most_primes:
+                if max_primes < prime_limit:
                     raise TooLongRelation
                 return None
         if not is_special:

@@ -88,7 +88,7 @@ class OrbitCurve(PrintableResult):
         return self.degree * float(self.height.mid()) / (self.iterate**2 * math.log(2))
 
     @cached_property
-    def _rotation(self) -> tuple[arb | None, int]:
+    def _rotation_and_steps(self) -> tuple[arb | None, int]:
         if self.curve is not None and self.point is not None:
             return _rotation(self.curve, self.point)
         if self.trace is None or abs(self.trace) >= 2:
@@ -99,12 +99,12 @@ class OrbitCurve(PrintableResult):
     @property
     def rotation(self) -> arb | None:
         """The rotation number in (0, 1/2] up to sign; None if kappa is real."""
-        return self._rotation[0]
+        return self._rotation_and_steps[0]
 
     @property
     def steps(self) -> int:
         """1, or 2 if the iterate exchanges two real components; then `rotation` belongs to the iterate's square."""
-        return self._rotation[1]
+        return self._rotation_and_steps[1]
 
     @cached_property
     def bad_primes(self) -> BadPrimes | None:
@@ -268,7 +268,7 @@ def require_rational(map_over: Map) -> None:
 def _on_elliptic_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
     """Search for an elliptic curve, and return the geometry from the terms of W and the degrees of the coordinates."""
     try:
-        steps = elliptic_steps(map_over, start, _MAX_BITS, most_primes=_MAX_BITS)
+        steps = elliptic_steps(map_over, start, _MAX_BITS, prime_limit=_MAX_BITS)
     except TooLongRelation:
         raise UnknownCurve(
             f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_MAX_BITS} "
