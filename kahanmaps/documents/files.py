@@ -268,7 +268,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
             return NotImplemented
         return (
             (self.name, self.kind, self.parameters) == (other.name, other.kind, other.parameters)
-            and self.map.subject == other.map.subject
+            and self.map.seed_data == other.map.seed_data
             and self.hamiltonian == other.hamiltonian
             and self.member == other.member
             and self.integrals == other.integrals

@@ -238,7 +238,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """Return a random initial point that depends on `seed` and on the system: one point for all might be special."""
-    return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
+    return next(random_starts(system.dim, derive_seed(seed, system.map.seed_data)))
 
 
 def _full_result(report: Report) -> FullResult:

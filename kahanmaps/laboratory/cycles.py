@@ -127,14 +127,14 @@ def cycle_census(
     import numpy as np
 
     map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
-    exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
+    eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES} and 1 or more")
-    space = _ProjectiveMap(map_, exact_eps, prime)
-    census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
+    space = _ProjectiveMap(map_, eps, prime)
+    census = Census(prime, eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
         return _count_all_points(space, census, progress)
-    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.subject, exact_eps, prime))
+    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.seed_data, eps, prime))
     vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # surplus, since zero vectors are no points
     initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
     census = replace(census, examined=initial_points.shape[1])

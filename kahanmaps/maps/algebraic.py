@@ -40,8 +40,8 @@ class AlgebraicMap(MapFamily):
         return self.given.has_eps
 
     @property
-    def subject(self) -> tuple[Any, ...]:
-        return (*self.given.subject, str(self.root))
+    def seed_data(self) -> tuple[Any, ...]:
+        return (*self.given.seed_data, str(self.root))
 
     @property
     def digits(self) -> int:

@@ -412,7 +412,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     @abstractmethod
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         """The data that determine the map, for `derive_seed`."""
 
     @property
@@ -504,7 +504,7 @@ class ImplicitMap(MapFamily):
         return any("eps" not in entry.unused_gens() for row in self.rows for entry in row)
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return (self.variables, *(entry for row in self.rows for entry in row))
 
     @cached_property
@@ -590,7 +590,7 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     each of the three points with probability below 2^-40. `root`, if given, is the value of the only symbol; then only
     primes are used modulo which the root exists.
     """
-    rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
+    rng = random.Random(f"map {derive_seed(0, *map_.seed_data, *(e for row in map_.backward or () for e in row))}")
     passed_count = 0
     while passed_count < 3:
         field = random_prime_field(rng)

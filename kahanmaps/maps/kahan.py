@@ -187,7 +187,7 @@ class KahanFamily(MapFamily):
         return self.system.is_homogeneous and "eps" not in self.system.symbols
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return self.system.rhs
 
     @property

@@ -408,7 +408,7 @@ class _Search:
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
             return self.result(ending, message, proof=period_proof or proof)
 
-        rng = random.Random(f"degrees {derive_seed(self.seed, self.map.subject, self.eps)}")
+        rng = random.Random(f"degrees {derive_seed(self.seed, self.map.seed_data, self.eps)}")
 
         def new_line() -> Line:
             while True:

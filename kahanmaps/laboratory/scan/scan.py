@@ -152,7 +152,7 @@ def scan(
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         primes_text = ", ".join(map(str, primes))
         raise InputError(f"found the primes {primes_text}, expected at least three different ones, from 5 on")
-    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact_eps)}")
+    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.seed_data, exact_eps)}")
     terms, max_polynomial_length, cost = _choose_terms(map_, len(names), exact_eps, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
     max_members = _SWEEP_SHARE * budget.units / cost

@@ -227,7 +227,7 @@ def singularities(
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _step_limits(map_.dim, steps, budget)
-    map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
+    map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.seed_data, exact_eps)}")
     try:
         if is_long(map_at_eps):
             raise TooLarge("forms that would take long to expand, too long for their determinant")
@@ -298,7 +298,7 @@ def _follow_map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: StepLimits, progress: Callable[[str], None]
 ) -> SingularityRun | None:
     """Return the run for a composition whose factors are followed one by one; None if a factor is too large."""
-    rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
+    rng = random.Random(f"map by map {derive_seed(seed, map_.seed_data, run.eps)}")
     result = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
 
@@ -446,7 +446,7 @@ def patterns(
             results = set()
             for value, share in zip(values, budgets, strict=True):
                 limits, equations = _step_limits(map_.dim, steps, share), map_.at(value).equations
-                rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
+                rng = random.Random(f"patterns {derive_seed(seed, map_.seed_data, value)}")
                 if not _is_dominant(map_, value):
                     result_at_eps = _patterns_if_not_dominant(value)
                 elif period_of(equations) > 1:
@@ -563,7 +563,7 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
         raise InputError(unsupported_reason)
     if not as_map(system).has_eps:
         return (fmpq(1),)
-    rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).subject)}")
+    rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).seed_data)}")
     first_eps = fmpq(rng.randint(2, 9), 11)
     return first_eps, fmpq(rng.randint(2, 11), 13)
 
@@ -573,7 +573,7 @@ def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
 
     The answer True is proved. False is wrong if the determinant vanishes at all these points, but not identically.
     """
-    rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
+    rng = random.Random(f"dominant {derive_seed(0, map_.seed_data, eps)}")
     for _ in range(_POINTS):
         field = GF(random_prime(rng))  # if det dPhi is not 0 modulo p, it is not 0 over Q
         try:
