@@ -124,7 +124,7 @@ class Laboratory:
         if flow and file.map.root is not None:
             raise InputError(f"found a {file.map.root}, expected rational parameters for an analysis of the flow")
         if algebraic and isinstance(file.map, AlgebraicMap):
-            self.root, self.map = file.map.root, file.map.given
+            self.root, self.map = file.map.root, file.map.family
             if symbols or self.root.degree > MAX_DEGREE:
                 found_text = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
                 raise InputError(f"found {found_text}, expected no other symbols and a degree of at most {MAX_DEGREE}")
