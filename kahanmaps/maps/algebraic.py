@@ -68,8 +68,8 @@ class AlgebraicMap(MapFamily):
         """The name under which the root is printed: the symbol of the map, or t if the map has no symbol."""
         return self.family.symbols[0] if self.family.symbols else "t"
 
-    def written(self) -> dict[str, Any]:
-        return {**self.family.written(), "algebraic": {self._root_name: str(self.root)}}
+    def to_record(self) -> dict[str, Any]:
+        return {**self.family.to_record(), "algebraic": {self._root_name: str(self.root)}}
 
     def __str__(self) -> str:
         return f"{self.family}\nwhere {self._root_name} is a {self.root}"

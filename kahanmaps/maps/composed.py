@@ -148,12 +148,12 @@ class ComposedMap(MapFamily):
         """The equations of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.equations
 
-    def written(self) -> dict[str, Any]:
+    def to_record(self) -> dict[str, Any]:
         if self.is_small:
-            return self.multiplied_out.written()
+            return self.multiplied_out.to_record()
         return {
             "composition": [
-                {"variables": list(part.map.variables), **part.map.written(), "inverse": part.is_inverse}
+                {"variables": list(part.map.variables), **part.map.to_record(), "inverse": part.is_inverse}
                 for part in self.parts
             ]
         }

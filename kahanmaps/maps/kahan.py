@@ -219,7 +219,7 @@ class KahanFamily(MapFamily):
             rows.append((*row, -product - 2 * eps * f.compose(*variables, ctx=context)))
         return tuple(rows)
 
-    def written(self) -> dict[str, list[str]]:
+    def to_record(self) -> dict[str, list[str]]:
         return {"rhs": [format_polynomial(polynomial) for polynomial in self.system.rhs]}
 
     def __str__(self) -> str:
