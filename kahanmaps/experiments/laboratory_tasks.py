@@ -316,7 +316,7 @@ def lyapunov(
     mean, volume = result.mean, result.log_volume
     return {
         "status": "completed" if len(result.exponents) else "no orbit left",
-        "ended": result.ended,
+        "ended": result.ended_count,
         "counted": result.steps,
         "largest": _json_number(mean[0]),
         "smallest": _json_number(mean[-1]),
