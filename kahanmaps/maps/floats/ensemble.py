@@ -231,12 +231,12 @@ class FloatEnsemble(AttributeHints):
     @property
     def near_singular(self) -> NDArray[np.int64]:
         """The number of near-singular steps of each orbit (see steps.py)."""
-        return self._batch.near.copy()
+        return self._batch.near_singular.copy()
 
     @property
     def near_singular_at(self) -> NDArray[np.int64]:
         """The index of the point before the first near-singular step of each orbit; -1 if there was no such step."""
-        return self._batch.near_at.copy()
+        return self._batch.near_singular_at.copy()
 
     @property
     def escaped_at(self) -> NDArray[np.int64]:
