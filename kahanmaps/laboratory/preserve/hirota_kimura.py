@@ -95,7 +95,7 @@ class Profile:
 
     `codimensions` are the codimensions of the varieties that these polynomials define, and `with_known` is the largest
     codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. `agree`
-    says whether all maps gave the same numbers. Unless `complete`, `cut` says why not all requested degrees were tried.
+    says whether all maps gave the same numbers. Unless `complete`, `stop_reason` says why some degrees were not tried.
     """
 
     dim: int
@@ -105,7 +105,7 @@ class Profile:
     agree: bool
     complete: bool
     with_known: int = 0
-    cut: str = ""
+    stop_reason: str = ""
 
     @property
     def codimension(self) -> int:

@@ -160,7 +160,7 @@ class FlowAndMap:
             other_text = "other " * bool(self.limits or self.other_integrals)
             scope = f"relations along solutions up to degree {self.search.profile.degree}"
             statements.append(("measured", f"no {other_text}rational integral of the flow shows in {scope}"))
-        if self.search is not None and self.search.profile.cut == SPENT:
+        if self.search is not None and self.search.profile.stop_reason == SPENT:
             scope = f"relations of degree {self.search.profile.degree + 1} and more along solutions were not tried"
             statements.append(("undecided", f"of the flow: {scope}: {SPENT}"))
         if self.density is not None:
