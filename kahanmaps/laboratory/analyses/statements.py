@@ -94,7 +94,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
             relation_texts += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
             yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relation_texts)}")
-            if not profile.agree:
+            if not profile.maps_agree:
                 yield Statement(NOTE, "the orbits that were compared disagree")
         yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in result.relations)
         if integrals := list(dict.fromkeys(name for relation in result.relations for name in relation.integrals)):

@@ -424,7 +424,7 @@ def integrals_of(
             reasons.append(f"at {values_text} {count_text}: without --symbolic others may be found")
     if profile.stop_reason and (profile.stop_reason == SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.stop_reason}")
-    elif not profile.agree:
+    elif not profile.maps_agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
     return replace(result_so_far, reason="; ".join(filter(None, reasons)))
 

@@ -124,7 +124,7 @@ class FlowAndMap:
     def lost(self) -> int:
         """A lower bound (measured) of the number of `other_integrals` that are not limits of integrals of the map."""
         profile = self.map_search.profile
-        return max(0, len(self.other_integrals) - self.without_limit) if profile.nullities and profile.agree else 0
+        return max(0, len(self.other_integrals) - self.without_limit) if profile.nullities and profile.maps_agree else 0
 
     def __str__(self) -> str:
         return "\n".join("\t".join(line) for line in self.lines())
