@@ -176,8 +176,8 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
             yield Statement(certainty, f"recurrence: {degrees.recurrence.text}")
             if degrees.recurrence.closed_form_text:
                 yield Statement(certainty, f"d_n = {degrees.recurrence.closed_form_text}")
-        if degrees.enclosure is not None:
-            yield Statement(PROVED, degrees.enclosure.text)
+        if degrees.dynamical_degree_bounds is not None:
+            yield Statement(PROVED, degrees.dynamical_degree_bounds.text)
     if heights is not None:
         doubt = doubt_of_heights(result)
         status = UNDECIDED if doubt or heights.kind is Growth.UNDECIDED else MEASURED
