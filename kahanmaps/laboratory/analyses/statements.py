@@ -33,19 +33,19 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
         return
     divergence = format_polynomial(result.file.system.divergence)
     yield Statement(PROVED, f"div f = {divergence}{': the flow preserves volume' if divergence == '0' else ''}")
-    yield from (Statement(PROVED, points.text) for points in search.found[:MAX_POINTS])
-    if len(search.found) > MAX_POINTS:
-        count_text = counted(len(search.found) - MAX_POINTS, "more set")
+    yield from (Statement(PROVED, points.text) for points in search.fixed_points[:MAX_POINTS])
+    if len(search.fixed_points) > MAX_POINTS:
+        count_text = counted(len(search.fixed_points) - MAX_POINTS, "more set")
         yield Statement(NOTE, f"and {count_text} of fixed points, which --json lists")
     if search.undecided:
         yield Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}")
-    elif not search.found:
+    elif not search.fixed_points:
         yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
         # A fixed point x of the flow is a fixed point of the map if det(I - eps f'(x)) is not 0.
-        are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
+        are_fixed = [points.are_fixed_by_map(result.eps) for points in search.fixed_points]
         undefined = [
-            points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False
+            points.where for points, is_fixed in zip(search.fixed_points, are_fixed, strict=True) if is_fixed is False
         ]
         where = "" if all(are_fixed) else " where det(I - eps f'(x)) is not 0"
         if undefined:
