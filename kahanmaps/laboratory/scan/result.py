@@ -245,12 +245,10 @@ class Scan(PrintableResult):
             count_texts = [f"{n} modulo {sweep.prime}" for n, sweep in pairs if n or len(pairs) <= _MAX_LISTED]
             missed_dimension = 0  # the largest dimension of a variety that has about n points or fewer
             for n, sweep in pairs:
-                dimension = len(self.over) - 1
-                while dimension > missed_dimension and n < 0.5 * sweep.member_count / sweep.prime ** (
-                    len(self.over) - dimension
-                ):
-                    dimension -= 1
-                missed_dimension = dimension
+                codimension, dim = 1, len(self.over)
+                while codimension < dim - missed_dimension and n < 0.5 * sweep.member_count / sweep.prime**codimension:
+                    codimension += 1
+                missed_dimension = dim - codimension
             variety_text = "a curve" if missed_dimension == 1 else f"a variety of dimension {missed_dimension}"
             warning = f"; as many as {variety_text} has, so one may have been missed" if missed_dimension else ""
             lines.append(("unassigned", f"special members on no component: {_abbreviate(count_texts)}{warning}"))

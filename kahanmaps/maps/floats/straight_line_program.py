@@ -285,11 +285,10 @@ class StepChecks:
 
     def number(self, x: Any) -> None:
         """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each number."""
-        if isinstance(x, Value):
-            if self.careful:
-                self.is_finite = self.is_finite & (abs(x) <= LARGEST_DOUBLE)
-            else:
-                self._sum = x + self._sum
+        if isinstance(x, Value) and self.careful:
+            self.is_finite = self.is_finite & (abs(x) <= LARGEST_DOUBLE)
+        elif isinstance(x, Value):
+            self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
         """Return [valid] for a fast step, and [near-singular, singular, overflow] for a careful step."""
