@@ -104,7 +104,7 @@ class SingularityRun(PrintableResult):
     map_degree: int
     critical_degree: int | None = None
     hypersurfaces: tuple[Hypersurface, ...] = ()
-    stopped: bool = False
+    is_stopped: bool = False
     is_undefined: bool = False
     is_dominant: bool = True
     word: Word | None = None
@@ -116,7 +116,7 @@ class SingularityRun(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return all_fields(self)
+        return all_fields(self, stopped="is_stopped")
 
     @property
     def verdict(self) -> str:
@@ -130,7 +130,7 @@ class SingularityRun(PrintableResult):
         if not self.is_dominant:
             return "not dominant"
         states = {h.status for h in self.hypersurfaces if h.status != NOT_CONTRACTED}
-        if self.stopped or UNDECIDED in states:
+        if self.is_stopped or UNDECIDED in states:
             return UNDECIDED
         if not self.hypersurfaces:
             return "no singularities"
@@ -250,7 +250,7 @@ def singularities(
                 "maps whose equations are linear in both points, which are treated at random points"
             ) from None
         random_hypersurfaces = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
-        return replace(run, hypersurfaces=random_hypersurfaces, stopped=limits.budget.is_spent)
+        return replace(run, hypersurfaces=random_hypersurfaces, is_stopped=limits.budget.is_spent)
     denominator = map_form.denominator
     # The minors have signs: the last minor of each factor is (-1)^n det(I - eps f'(x)) at Z = 1.
     run = SingularityRun(
@@ -291,7 +291,7 @@ def singularities(
     is_stopped |= limits.budget.is_spent and (
         critical_degree is None or any(h.settled_at is None for h in hypersurfaces)
     )
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_stopped)
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), is_stopped=is_stopped)
 
 
 def _follow_map_by_map(
@@ -300,7 +300,7 @@ def _follow_map_by_map(
     """Return the run for a composition whose factors are followed one by one; None if a factor is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.seed_data, run.eps)}")
     result = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
+    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), is_stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -402,7 +402,7 @@ def patterns_of(runs: Sequence[SingularityRun], has_eps: bool = True) -> Pattern
     for run in runs:
         if not run.is_dominant:
             result = _patterns_if_not_dominant(run.eps)
-        elif run.stopped:
+        elif run.is_stopped:
             result = _no_patterns(_STOPPED)
         else:
             result = _merge_patterns(

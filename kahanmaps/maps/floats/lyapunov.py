@@ -65,8 +65,7 @@ class Lyapunov(ResultPart):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        keys = {"ended_count": "ended", "first_half_exponents": "half", "is_stopped": "stopped"}
-        return {keys.get(name, name): value for name, value in all_fields(self).items()}
+        return all_fields(self, ended="ended_count", half="first_half_exponents", stopped="is_stopped")
 
     @property
     def text(self) -> str:
