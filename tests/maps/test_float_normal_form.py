@@ -73,7 +73,7 @@ def ensemble(name: str, starts: np.ndarray, **options: object) -> FloatEnsemble:
 
 @over_members
 def test_block_integrals_do_not_drift(name):
-    orbits = ensemble(name, starts_of(MEMBERS[name].chosen.system.dim, 20) / 40, kernel="numpy", sampled=20)
+    orbits = ensemble(name, starts_of(MEMBERS[name].chosen.system.dim, 20) / 40, kernel="numpy", sample_interval=20)
     orbits.advance(400)
     assert len(orbits.drift) == len(planar_blocks(FORMS[name], EPS).kappa)
     for drift in orbits.drift:

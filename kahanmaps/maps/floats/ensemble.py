@@ -103,7 +103,7 @@ class FloatEnsemble(AttributeHints):
         threads: the number of cores that numba may use (default: all).
         integrals: a dict {name: function}, such as `load(name).integrals`; each function has one point as argument, or
             is a rational function of the variables and eps. Its drift is measured at recorded points.
-        sampled: the number of steps from one sample to the next, for the integrals of the normal form, and for
+        sample_interval: the number of steps from one sample to the next, for the integrals of the normal form, and for
             `integrals` if no points are recorded.
         radius: if given, every step is examined, and for each orbit the first point with max |x_i| > radius is stored.
 
@@ -126,12 +126,12 @@ class FloatEnsemble(AttributeHints):
         kernel: str | None = None,
         threads: int | None = None,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLE_INTERVAL,
+        sample_interval: int = SAMPLE_INTERVAL,
         radius: float | None = None,
     ) -> None:
         epsilon = rational(eps)
-        if sampled < 1:
-            raise InputError(f"found a sample every {sampled} steps, expected at least 1")
+        if sample_interval < 1:
+            raise InputError(f"found a sample every {sample_interval} steps, expected at least 1")
         self.system = as_map(system)
         if isinstance(starts, np.ndarray) and starts.dtype.kind in "fiu":
             self._starts = np.array(starts, dtype=np.float64, order="C")
@@ -178,7 +178,7 @@ class FloatEnsemble(AttributeHints):
             if isinstance(integral, RationalFunction):
                 function = _float_integral(integral, to_float(epsilon))
             self._watched_functions.append(WatchedFunction(name, function, self._starts))
-        self._sample_interval = sampled
+        self._sample_interval = sample_interval
         self._interrupted = False
         self._radius = radius
         self._escaped_at = np.full(self.n, -1)
@@ -458,7 +458,7 @@ def ensemble(
     kernel: str | None = None,
     threads: int | None = None,
     integrals: Mapping[str, Function] | None = None,
-    sampled: int = SAMPLE_INTERVAL,
+    sample_interval: int = SAMPLE_INTERVAL,
     radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.
@@ -487,7 +487,7 @@ def ensemble(
         start_rows(starts, map_.variables),
         **options,
         integrals=integrals,
-        sampled=sampled,
+        sample_interval=sample_interval,
         radius=radius,
     )
     if steps:
