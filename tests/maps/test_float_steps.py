@@ -167,7 +167,7 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     lines = [row == [0, 1, 1, 0] for row in blocks.coefficients.tolist()]
     for r, has_pole in enumerate(lines):
         if has_pole:
-            at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
+            at, size = (2 * r, 2) if r < blocks.real_count else (4 * r - 2 * blocks.real_count, 4)
             rows = blocks.x_to_state @ starts[20 + r]
             rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
             starts[20 + r] = blocks.state_to_x @ rows

@@ -270,7 +270,9 @@ class FloatEnsemble(AttributeHints):
             largest = np.fmax(self._largest_drift, current_drift)
             for r, label in enumerate(self._blocks.labels):
                 initial: NDArray[Any] = (
-                    self._initial_values[r].copy() if r >= self._blocks.reals else self._initial_values[r].real.copy()
+                    self._initial_values[r].copy()
+                    if r >= self._blocks.real_count
+                    else self._initial_values[r].real.copy()
                 )
                 drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current_drift[r]))
         return (*drifts, *(function.drift for function in self._watched_functions))

@@ -101,7 +101,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
     def write(z: Sequence[Any], checks: StepChecks) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
-            row, is_real = len(image), r < blocks.reals
+            row, is_real = len(image), r < blocks.real_count
             if is_real:
                 U, V = z[row : row + 2]
                 a, b, c, d = coefficients.real.tolist()
