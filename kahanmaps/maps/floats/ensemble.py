@@ -269,11 +269,8 @@ class FloatEnsemble(AttributeHints):
             current_drift[:, self._batch.status != RUNNING] = np.nan
             largest = np.fmax(self._largest_drift, current_drift)
             for r, label in enumerate(self._blocks.labels):
-                initial: NDArray[Any] = (
-                    self._initial_values[r].copy()
-                    if r >= self._blocks.real_count
-                    else self._initial_values[r].real.copy()
-                )
+                values = self._initial_values[r]
+                initial: NDArray[Any] = (values.real if r < self._blocks.real_count else values).copy()
                 drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current_drift[r]))
         return (*drifts, *(function.drift for function in self._watched_functions))
 
@@ -483,15 +480,8 @@ def ensemble(
     options: dict[str, Any] = {"backward": backward, "form": form, "kernel": kernel, "threads": threads}
     epsilon = resolve_eps(eps, time_step, h, floats=True)
     map_ = as_map(system)
-    result = FloatEnsemble(
-        map_,
-        epsilon,
-        start_rows(starts, map_.variables),
-        **options,
-        integrals=integrals,
-        sample_interval=sample_interval,
-        radius=radius,
-    )
+    options |= {"integrals": integrals, "sample_interval": sample_interval, "radius": radius}
+    result = FloatEnsemble(map_, epsilon, start_rows(starts, map_.variables), **options)
     if steps:
         result.advance(steps)
     return result
