@@ -50,8 +50,8 @@ def normal_reduced(work: Work, steps: int) -> tuple[float, Pairs]:
 
 def normal_common(work: Work, steps: int) -> tuple[float, Pairs]:
     """Normal form; every iterate in x over one common denominator, not reduced to the last bit."""
-    seconds, last = timed(lambda: _normal(work, steps, PlanesPoint.common))
-    above, below = last.common()
+    seconds, last = timed(lambda: _normal(work, steps, PlanesPoint.over_common_denominator))
+    above, below = last.over_common_denominator()
     return seconds, _pairs(fmpq(entry, below) for entry in above)
 
 

@@ -220,7 +220,7 @@ def alone(n: int) -> None:
     """What `whole_process` starts: prints seconds, megabytes and digits."""
     value = NthIterate(work().normal_form, work().eps, QQ).value(work().start, n)
     assert isinstance(value, PlanesPoint)
-    _, below = value.common()
+    _, below = value.over_common_denominator()
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, below.bit_length() * 0.30103)
 

@@ -125,7 +125,7 @@ def ours(name: str) -> dict[str, tuple[Any, float]]:
     eps, terms = str(EPS), TERMS[file.dim]
 
     def fixed() -> list[list[str]]:
-        found = km.fixed_points(file).found
+        found = km.fixed_points(file).fixed_points
         return [list(map(str, part.coordinates)) for part in found if part.dimension == 0 and not part.equations]
 
     def orbit() -> list[list[str]]:

@@ -344,9 +344,10 @@ def json_float(value: Any) -> float | str:
     return number if isfinite(number) else repr(number)
 
 
-def all_fields(value: Any) -> dict[str, Any]:
-    """Return all fields of a dataclass as plain data, nested dataclasses included."""
-    return {f.name: _field_data(getattr(value, f.name)) for f in fields(value) if f.name[0] != "_"}
+def all_fields(value: Any, /, **others: str) -> dict[str, Any]:
+    """Return all fields of a dataclass as plain data, nested ones included; `key="field"` stores it under `key`."""
+    keys = {field: key for key, field in others.items()}
+    return {keys.get(f.name, f.name): _field_data(getattr(value, f.name)) for f in fields(value) if f.name[0] != "_"}
 
 
 def _field_data(value: Any) -> Any:

@@ -51,11 +51,11 @@ def commutativity(
 
     f_name, g_name = names
     labels = (f"Phi_{g_name}(Phi_{f_name}(x))", f"Phi_{f_name}(Phi_{g_name}(x))")
-    subject = (f_map.subject, g_map.subject, *([] if ratio == 1 else [ratio]))
+    data = (f_map.seed_data, g_map.seed_data, *([] if ratio == 1 else [ratio]))
     has_eps = f_map.has_eps or g_map.has_eps
     is_scaled = f_map.scales_with_eps and g_map.scales_with_eps
     root = f_map.root or g_map.root
-    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, scales_with_eps=is_scaled, root=root, subject=subject)
+    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, scales_with_eps=is_scaled, root=root, seed_data=data)
 
 
 def _require_not_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
@@ -67,7 +67,7 @@ def _require_not_identity(file: SystemFile, letter: str, map_: MapFamily, eps: A
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
         return map_.at(eps_value, field).step(point), point
 
-    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
+    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "seed_data": (map_.seed_data, "identity")}
     if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **properties), seed).verdict is Certainty.SUPPORTED:
         eps_text = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
@@ -140,7 +140,7 @@ def check_commute(
     if proof is None and file.is_quadratic and other_file.is_quadratic and isinstance(g, KahanFamily):
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
-    orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
+    orbit = run_orbit(f, settings, g.seed_data, proof is not None and file.member is not None)
     certified = settings.certified(file, commute=other_file)
     maps_text = "Kahan maps" if file.is_quadratic and other_file.is_quadratic else "maps"
     finding = certify(

@@ -63,10 +63,10 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
         last_value[:] = [field, eps_value, image, image_value]
         return None if image_value is None or value is None else ([image_value], [value])
 
-    subject = (map_.subject, integral.subject)
+    data = (map_.seed_data, integral.seed_data)
     is_scaled = map_.scales_with_eps and integral.scales_with_eps
     return Identity(
-        map_.dim, sides, eps, *labels, has_eps=map_.has_eps, scales_with_eps=is_scaled, root=map_.root, subject=subject
+        map_.dim, sides, eps, *labels, has_eps=map_.has_eps, scales_with_eps=is_scaled, root=map_.root, seed_data=data
     )
 
 
@@ -202,7 +202,7 @@ def check_integrals(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
             "or give --integral 'NAME=EXPRESSION', in Python extra=\"EXPRESSION\""
         )
-    claim_data = [integral.subject for integral, _, _ in candidates]
+    claim_data = [integral.seed_data for integral, _, _ in candidates]
     orbit = run_orbit(file.map, settings, claim_data, file.member is not None)
     findings = []
     max_tried = _MAX_TRIED_INTEGRALS if file.dim <= 16 else _MAX_TRIED_INTEGRALS_IN_HIGH_DIMENSION
@@ -266,7 +266,7 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     if H.is_homogeneous or H.dim > MAX_DIMENSION:
         return H.H.is_zero()  # the term of lowest degree of the integral is a multiple of H
     # Different values at two points refute constancy; equal values are weak evidence, so the integral is then expanded.
-    rng = random.Random(f"constant {derive_seed(settings.seed, integral.subject, settings.eps)}")
+    rng = random.Random(f"constant {derive_seed(settings.seed, integral.seed_data, settings.eps)}")
     field = random_prime_field(rng)
     try:
         eps = field.random(rng) if settings.eps is None else field.convert(settings.eps)

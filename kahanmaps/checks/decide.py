@@ -50,7 +50,7 @@ class Identity:
     """An identity: two lists of rational functions of a point of dimension `dim` are equal.
 
     `sides(field, x, eps)` returns both lists of field elements; at a point where they are not defined, it returns None
-    or raises SingularStep. `eps` is the value for which the identity is stated; None means every eps. `subject`
+    or raises SingularStep. `eps` is the value for which the identity is stated; None means every eps. `seed_data`
     contains the data that determine the two sides; random points are drawn by a hash of these data (`derive_seed`).
     """
 
@@ -66,11 +66,11 @@ class Identity:
     scales_with_eps: bool = False
     undefined_reason: str = "a denominator seems to vanish identically"  # if the sides are undefined at all points
     root: Root | None = None  # the algebraic number in the coefficients; None if they are rational
-    subject: tuple[Any, ...] = dataclass_field(kw_only=True)
+    seed_data: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
         """Return the random seed for this identity."""
-        return derive_seed(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
+        return derive_seed(seed, self.dim, self.eps, self.left_label, self.right_label, self.seed_data)
 
     @cached_property
     def bound(self) -> tuple[CoefficientSize, int]:

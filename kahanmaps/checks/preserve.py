@@ -57,9 +57,9 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     if not isinstance(map_, KahanFamily):
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
-    subject = (map_.subject, density.subject)
+    data = (map_.seed_data, density.seed_data)
     undefined_reason = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
-    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": subject}
+    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "seed_data": data}
     properties["scales_with_eps"] = map_.scales_with_eps and density.scales_with_eps
     return Identity(map_.dim, sides, eps, *labels, undefined_reason=undefined_reason, **properties)
 
@@ -138,7 +138,7 @@ def check_measure(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
             'or give --density EXPRESSION, in Python extra="EXPRESSION" (the measure is dx/phi)'
         )
-    claim_data = [density.subject for density, *_ in candidates]
+    claim_data = [density.seed_data for density, *_ in candidates]
     orbit = run_orbit(file.map, settings, claim_data, file.member is not None)
     findings = tuple(
         certify(
@@ -174,10 +174,10 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
     if isinstance(map_, KahanFamily):
         labels = ("(I + eps f'(x~)) P(x) (I + eps f'(x~))^T", "(I - eps f'(x)) P(x~) (I - eps f'(x))^T")
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
-    subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
+    data, dim = (map_.seed_data, tensor.seed_data), n + len(map_.symbols)
     has_eps = map_.has_eps or tensor.has_eps
     return Identity(
-        dim, sides, eps, *labels, entries, has_eps=has_eps, undefined_reason=_UNDEFINED_TENSOR, subject=subject
+        dim, sides, eps, *labels, entries, has_eps=has_eps, undefined_reason=_UNDEFINED_TENSOR, seed_data=data
     )
 
 
@@ -193,9 +193,9 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
         f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
     )
     labels, dim = ("the cyclic sum", "what it should be"), n + len(tensor.symbols)
-    subject = tensor.subject
+    data = tensor.seed_data
     return Identity(
-        dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, undefined_reason=_UNDEFINED_TENSOR, subject=subject
+        dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, undefined_reason=_UNDEFINED_TENSOR, seed_data=data
     )
 
 
@@ -246,7 +246,7 @@ def check_poisson(
             f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
             "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE, in Python its rows"
         )
-    orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
+    orbit = run_orbit(file.map, settings, tensor.seed_data, file.member is not None)
     name, scope = tensor.name, f", {condition}" if condition else ""
     certified = settings.certified(file, **({"known": "poisson"} if extra is None else {"tensor": extra}))
     law = certify(

@@ -142,7 +142,7 @@ def run_orbit(
     A claim for every eps is tested at a random eps. Random choices depend on the system and on `claim_data`, so that no
     claim can be constructed for an orbit known in advance. At most 20 random points are drawn.
     """
-    seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, claim_data)
+    seed = derive_seed(settings.seed, as_map(system).seed_data, settings.eps, claim_data)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]

@@ -259,7 +259,8 @@ def _census(census: Census) -> Iterator[Line]:
     if census.complete:
         yield "preperiodic", census.preperiodic
     else:
-        yield "open", f"{census.open} after {census.steps} steps" + (", stopped: time limit" if census.stopped else "")
+        limit_text = ", stopped: time limit" if census.is_stopped else ""
+        yield "open", f"{census.open} after {census.steps} steps{limit_text}"
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"

@@ -131,7 +131,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     @property
     def claim_names(self) -> tuple[str, ...]:
         """The arguments of claimed functions: the variables, the name of the algebraic parameter (if any), and eps."""
-        return (*self.variables, *(self.map.given.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
+        return (*self.variables, *(self.map.family.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
 
     @property
     def is_quadratic(self) -> bool:
@@ -182,7 +182,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         """
         if not isinstance(self.map, AlgebraicMap):
             return self
-        overrides = {self.map.given.symbols[0]: self.map.root.real_approximation()}
+        overrides = {self.map.family.symbols[0]: self.map.root.real_approximation()}
         return SystemFile(**DocumentReader(dict(self.document), self.name, overrides).read())
 
     @property
@@ -268,7 +268,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
             return NotImplemented
         return (
             (self.name, self.kind, self.parameters) == (other.name, other.kind, other.parameters)
-            and self.map.subject == other.map.subject
+            and self.map.seed_data == other.map.seed_data
             and self.hamiltonian == other.hamiltonian
             and self.member == other.member
             and self.integrals == other.integrals

@@ -34,16 +34,16 @@ def map_file(map_: Map | MapFamily, name: str = "map") -> SystemFile:
     x~ = y
     y~ = (y + 2)/x
     """
-    family = without_eps(map_) if isinstance(map_, Map) else map_
-    if isinstance(family, AlgebraicMap):
-        numbers = {family.given.symbols[0]: str(family.root)}
-        document = {"name": name, **_document(family.given), "parameters": numbers}
-    elif family.symbols:
-        raise InputError(f"found a map with the symbols {', '.join(family.symbols)}, expected numbers in their place")
+    map_ = without_eps(map_) if isinstance(map_, Map) else map_
+    if isinstance(map_, AlgebraicMap):
+        numbers = {map_.family.symbols[0]: str(map_.root)}
+        document = {"name": name, **_document(map_.family), "parameters": numbers}
+    elif map_.symbols:
+        raise InputError(f"found a map with the symbols {', '.join(map_.symbols)}, expected numbers in their place")
     else:
-        document = {"name": name, **_document(family)}
+        document = {"name": name, **_document(map_)}
     file = parse_system(to_toml(document, ("name", "variables"), ("parameters", *KINDS)), name)
-    return replace(file, map=family) if family.time_steps else file  # formulas do not contain the flow of the map
+    return replace(file, map=map_) if map_.time_steps else file  # formulas do not contain the flow of the map
 
 
 def without_eps(map_: Map) -> MapFamily:

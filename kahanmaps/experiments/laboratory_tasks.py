@@ -201,7 +201,7 @@ def all_analyses(result: Analysis) -> Result:
         "densities": result.densities is None or _state_of_densities(result.densities) != "open",
         "symmetries": result.symmetries is None or result.symmetries.complete,
         "commuting systems": result.commuting is None or result.commuting.complete,
-        "singularities": not any(run.stopped or run.verdict == "undecided" for run in result.singularities),
+        "singularities": not any(run.is_stopped or run.verdict == "undecided" for run in result.singularities),
     }
     unfinished = [name for name, is_done in is_finished.items() if not is_done]
     return {
@@ -240,7 +240,7 @@ def confinement(
     first = runs[0]
     result: Result = {
         "confinement": first.verdict if is_consistent else UNDECIDED,
-        "status": "budget" if any(run.stopped for run in runs) else "complete" if is_consistent else "eps differ",
+        "status": "budget" if any(run.is_stopped for run in runs) else "complete" if is_consistent else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
         "followed": first.followed,  # number of steps over which unconfined singularities were followed
         **fields(first, "map_degree", "critical_degree"),
@@ -316,7 +316,7 @@ def lyapunov(
     mean, volume = result.mean, result.log_volume
     return {
         "status": "completed" if len(result.exponents) else "no orbit left",
-        "ended": result.ended,
+        "ended": result.ended_count,
         "counted": result.steps,
         "largest": _json_number(mean[0]),
         "smallest": _json_number(mean[-1]),

@@ -13,14 +13,14 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import derive_seed
-from kahanmaps.algebra.printing import format_point
+from kahanmaps.algebra.printing import attributes, format_point
 from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
 from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, FullResult, Result, fields, task
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, FullResult, Result, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.heights import height_growth
@@ -98,7 +98,7 @@ def family_space(system: SystemFile) -> Result:
     space = cubic_space(member.A, member.variables)
     return {
         "m": member.m,
-        **fields(space, "dimension", "expected", "rank", "unknowns"),
+        **attributes(space, "dimension", expected="expected_dimension", rank="rank", unknowns="unknown_count"),
         "factors": [str(factor) for factor in member.factors],
         "generic": member.is_generic,
         "associated": 2 ** (len(member.factors) - 1),
@@ -238,7 +238,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """Return a random initial point that depends on `seed` and on the system: one point for all might be special."""
-    return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
+    return next(random_starts(system.dim, derive_seed(seed, system.map.seed_data)))
 
 
 def _full_result(report: Report) -> FullResult:

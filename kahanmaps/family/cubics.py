@@ -23,13 +23,13 @@ from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 class CubicSpace:
     """The space of homogeneous cubics H with A (Hess H) = (Hess H) A^T, the solutions of a linear system.
 
-    `basis` has primitive integer cubics, `unknowns` and `rank` belong to the linear system, `expected` is 4m.
+    `basis` has primitive integer cubics, `unknown_count` and `rank` belong to the system, `expected_dimension` is 4m.
     """
 
     basis: tuple[fmpq_mpoly, ...]
-    unknowns: int
+    unknown_count: int
     rank: int
-    expected: int
+    expected_dimension: int
 
     @property
     def dimension(self) -> int:
@@ -45,7 +45,7 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     """Compute the space of homogeneous cubics H with A Hess(H) = Hess(H) A^T for a skew-Hamiltonian A; exact.
 
     >>> space = cubic_space(fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2]))
-    >>> space.dimension, space.rank, space.unknowns
+    >>> space.dimension, space.rank, space.unknown_count
     (8, 12, 20)
     """
     require_skew_hamiltonian(A)

@@ -65,7 +65,7 @@ class PhaseFunction(ABC):
 
     @property
     @abstractmethod
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         """Data that determine the function; `derive_seed` derives random seeds from them."""
 
 
@@ -95,7 +95,7 @@ class ClaimedFunction(PhaseFunction):
         return all(is_weighted_homogeneous(p, weights) for p in (self.function.numerator, self.function.denominator))
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return ("claimed", self.function)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -205,7 +205,7 @@ class ModifiedHamiltonian(ImageFunction):
         self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f, f = J grad {letter}"
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return ("modified", self.hamiltonian.H, self.hamiltonian.J)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -227,7 +227,7 @@ class PaperIntegral(ImageFunction):
         )
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return ("paper", self.hamiltonian.H)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -255,7 +255,7 @@ class CommutantIntegral(ImageFunction):
         self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return ("commutant", self.hamiltonian.H, self.hamiltonian.J, self.matrix)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -331,7 +331,7 @@ class DeterminantDensity(PhaseFunction):
         self.map = KahanFamily(system)
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return (self.formula, self.map.system.rhs)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:

@@ -52,7 +52,7 @@ class PoissonTensor(ABC):
 
     @property
     @abstractmethod
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         """Data that determine the tensor; `derive_seed` derives random seeds from them."""
 
     @abstractmethod
@@ -75,7 +75,7 @@ class HamiltonianTensor(PoissonTensor):
         self.dim = hamiltonian.dim
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return (self.hamiltonian.H, self.hamiltonian.J)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -169,7 +169,7 @@ class MatrixPoissonTensor(PoissonTensor):
         return ", ".join(equations) or "P = 0"
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return ("given tensor", self.rows)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:

@@ -164,9 +164,9 @@ def _if_linearisable(facts: _Facts) -> _Verdict | None:
 def _if_entropy_positive(facts: _Facts) -> _Verdict | None:
     """Return the verdict on a map whose dynamical degree is proved to exceed 1."""
     result = facts.result
-    if facts.degrees is None or facts.degrees.enclosure is None:
+    if facts.degrees is None or facts.degrees.dynamical_degree_bounds is None:
         return None
-    bound_text = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
+    bound_text = f"the dynamical degree is at least {facts.degrees.dynamical_degree_bounds.lower}"
     eps_text = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
         f"Not integrable (proved): {bound_text}{eps_text}, so that the algebraic entropy is positive and no rational "
@@ -261,7 +261,8 @@ def contradictions(result: AnalysisResult) -> list[str]:
         sentences.append(
             "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
         )
-    if result.degrees is not None and result.degrees.enclosure is not None and orbits_lie_on_curves(result):
+    bounds = None if result.degrees is None else result.degrees.dynamical_degree_bounds
+    if bounds is not None and orbits_lie_on_curves(result):
         sentences.append("positive algebraic entropy is proved, which excludes an integral")
     if result.pencil is not None and (contradiction := result.pencil.contradiction(growth)):
         sentences.append(contradiction)

@@ -44,7 +44,7 @@ class Census(PrintableResult):
     random points were examined, and `lengths` maps each period to the number of these points with this period.
     `indeterminate` counts points at which the map is not defined, `pre_indeterminate` other points whose orbit reaches
     such a point, `preperiodic` points outside cycles whose orbit reaches a cycle, and `open` random points undecided
-    after `steps` steps. `stopped` is True if a time limit ended the work; for all points `examined` is then 0.
+    after `steps` steps. `is_stopped` says whether a time limit ended the work; for all points `examined` is then 0.
     """
 
     prime: int
@@ -52,7 +52,7 @@ class Census(PrintableResult):
     dim: int
     points: int
     complete: bool = False
-    stopped: bool = False
+    is_stopped: bool = False
     examined: int = 0
     indeterminate: int = 0
     pre_indeterminate: int = 0
@@ -78,7 +78,7 @@ class Census(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain data."""
-        return all_fields(self)
+        return all_fields(self, stopped="is_stopped")
 
     def rows(self) -> list[dict[str, int]]:
         """Return a row for each entry of `lengths`, for example for pandas.DataFrame."""
@@ -114,7 +114,7 @@ def cycle_census(
         progress: called with messages.
 
     Returns:
-        A `Census` with exact counts. If a `time_limit` ends the count early, `stopped` of the result is True.
+        A `Census` with exact counts. If a `time_limit` ends the count early, `is_stopped` of the result is True.
 
     Raises:
         InputError: for arguments out of range. BadPrime: if eps or the map has no reduction modulo p.
@@ -127,14 +127,14 @@ def cycle_census(
     import numpy as np
 
     map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
-    exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
+    eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES} and 1 or more")
-    space = _ProjectiveMap(map_, exact_eps, prime)
-    census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
+    space = _ProjectiveMap(map_, eps, prime)
+    census = Census(prime, eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
         return _count_all_points(space, census, progress)
-    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.subject, exact_eps, prime))
+    samples, rng = samples or DEFAULT_SAMPLES, np.random.default_rng(derive_seed(seed, map_.seed_data, eps, prime))
     vectors = rng.integers(0, prime, (map_.dim + 1, 2 * samples + 20))  # surplus, since zero vectors are no points
     initial_points = points = space.normalized(vectors[:, vectors.any(axis=0)][:, :samples])
     census = replace(census, examined=initial_points.shape[1])
@@ -154,7 +154,7 @@ def cycle_census(
             points, initial_points = points[:, is_open], initial_points[:, is_open]
     except TimeLimit:
         is_stopped = True
-    census = replace(census, stopped=is_stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
+    census = replace(census, is_stopped=is_stopped, steps=step, lengths=lengths, open=initial_points.shape[1])
     return replace(census, indeterminate=indeterminate[0], pre_indeterminate=indeterminate[1])
 
 
@@ -172,7 +172,7 @@ def _count_all_points(space: _ProjectiveMap, census: Census, progress: Callable[
             image_codes = place_values @ space.images(codes[k : k + space.batch_size] // place_values[:, None] % p)
             images[k : k + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
     except TimeLimit:
-        return replace(census, stopped=True)
+        return replace(census, is_stopped=True)
     iterates = images
     for _ in range(count.bit_length()):  # doubles the number of steps; at the end all orbits are in cycles
         iterates = iterates[iterates]

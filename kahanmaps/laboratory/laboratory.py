@@ -124,7 +124,7 @@ class Laboratory:
         if flow and file.map.root is not None:
             raise InputError(f"found a {file.map.root}, expected rational parameters for an analysis of the flow")
         if algebraic and isinstance(file.map, AlgebraicMap):
-            self.root, self.map = file.map.root, file.map.given
+            self.root, self.map = file.map.root, file.map.family
             if symbols or self.root.degree > MAX_DEGREE:
                 found_text = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
                 raise InputError(f"found {found_text}, expected no other symbols and a degree of at most {MAX_DEGREE}")
@@ -152,7 +152,7 @@ class Laboratory:
             raise InputError(
                 f"found {found_text}, expected a polynomial vector field without eps for an analysis of the flow"
             )
-        map_key = self.map.subject if self.root is None else file.map.subject
+        map_key = self.map.seed_data if self.root is None else file.map.seed_data
         self.seed = derive_seed(seed, self.symbols, map_key, self.eps)  # the seed of all random choices for this map
         self.maps = list(self._draw_maps("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
@@ -573,9 +573,9 @@ def verdict_on(
     parameters_text = " and ".join([*eps_texts, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"for {parameters_text}{restriction}" if parameters_text else restriction.removeprefix(", ").strip()
-    identity_key = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
+    identity_key = (map_.symbols, map_.seed_data, function, is_density, *([] if factor is None else [factor]))
     identity = Identity(
-        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=identity_key
+        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, seed_data=identity_key
     )
     return certified(identity, seed, expands=expands and n <= MAX_DIMENSION)
 

@@ -45,7 +45,7 @@ class Formulas:
         if isinstance(file.map, AlgebraicMap):
             if symbols:
                 raise InputError(f"found symbols together with a {file.map.root}, expected none: it is a symbol itself")
-            self.map: MapFamily = file.map.given
+            self.map: MapFamily = file.map.family
         else:
             self.map = map_with_symbols(file, symbols)
         map_ = self.map

@@ -12,7 +12,7 @@ from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):
-    """The map `given` with `root` as the value of its only symbol (if any); g is the minimal polynomial of `root`.
+    """The map `family` with `root` as the value of its only symbol (if any); g is the minimal polynomial of `root`.
 
     By default, `at` returns the map over Q[t]/g. `at_number` returns the map for a rational value of the symbol.
 
@@ -28,24 +28,24 @@ class AlgebraicMap(MapFamily):
 
     root: Root
 
-    def __init__(self, given: MapFamily, root: Root, at_number: Callable[[Any], MapFamily]) -> None:
-        self.given, self.root = given, root
-        self.variables, self.title, self.time_steps = given.variables, given.title, given.time_steps
-        self.denominator_name = given.denominator_name
+    def __init__(self, family: MapFamily, root: Root, at_number: Callable[[Any], MapFamily]) -> None:
+        self.family, self.root = family, root
+        self.variables, self.title, self.time_steps = family.variables, family.title, family.time_steps
+        self.denominator_name = family.denominator_name
         self._at_number = at_number
         self._cached_root: tuple[Field, Any] | None = None
 
     @property
     def has_eps(self) -> bool:
-        return self.given.has_eps
+        return self.family.has_eps
 
     @property
-    def subject(self) -> tuple[Any, ...]:
-        return (*self.given.subject, str(self.root))
+    def seed_data(self) -> tuple[Any, ...]:
+        return (*self.family.seed_data, str(self.root))
 
     @property
     def digits(self) -> int:
-        return self.given.digits
+        return self.family.digits
 
     @property
     def real_approximation(self) -> MapFamily:
@@ -61,21 +61,21 @@ class AlgebraicMap(MapFamily):
         over = self.root.number_field if over is QQ else over
         if self._cached_root is None or self._cached_root[0] is not over:
             self._cached_root = over, self.root.over(over)
-        return self.given.at(eps, over, [*values, self._cached_root[1]] if self.given.symbols else values)
+        return self.family.at(eps, over, [*values, self._cached_root[1]] if self.family.symbols else values)
 
     @property
     def _root_name(self) -> str:
         """The name under which the root is printed: the symbol of the map, or t if the map has no symbol."""
-        return self.given.symbols[0] if self.given.symbols else "t"
+        return self.family.symbols[0] if self.family.symbols else "t"
 
-    def written(self) -> dict[str, Any]:
-        return {**self.given.written(), "algebraic": {self._root_name: str(self.root)}}
+    def to_record(self) -> dict[str, Any]:
+        return {**self.family.to_record(), "algebraic": {self._root_name: str(self.root)}}
 
     def __str__(self) -> str:
-        return f"{self.given}\nwhere {self._root_name} is a {self.root}"
+        return f"{self.family}\nwhere {self._root_name} is a {self.root}"
 
     def __repr__(self) -> str:
-        return f"AlgebraicMap({self.given!r}, {self._root_name} = {self.root})"
+        return f"AlgebraicMap({self.family!r}, {self._root_name} = {self.root})"
 
 
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:

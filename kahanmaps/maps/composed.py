@@ -36,14 +36,14 @@ class MapFactor:
     values: tuple[RationalFunction, ...] = ()
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         """The data that determine the factor, including its direction."""
         return (int(self.is_inverse), *self.map_and_values)
 
     @property
     def map_and_values(self) -> tuple[Any, ...]:
         """The data that determine the factor, without its direction."""
-        return (self.map.subject, self.values)
+        return (self.map.seed_data, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
         """Return the map over a field. A pole of a symbol's value raises BadPrime, in characteristic 0 InputError."""
@@ -75,8 +75,8 @@ class ComposedMap(MapFamily):
         return any(part.map.has_eps for part in self.parts)
 
     @property
-    def subject(self) -> tuple[Any, ...]:
-        return (self.variables, self.symbols, [part.subject for part in self.parts])
+    def seed_data(self) -> tuple[Any, ...]:
+        return (self.variables, self.symbols, [part.seed_data for part in self.parts])
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
@@ -148,12 +148,12 @@ class ComposedMap(MapFamily):
         """The equations of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.equations
 
-    def written(self) -> dict[str, Any]:
+    def to_record(self) -> dict[str, Any]:
         if self.is_small:
-            return self.multiplied_out.written()
+            return self.multiplied_out.to_record()
         return {
             "composition": [
-                {"variables": list(part.map.variables), **part.map.written(), "inverse": part.is_inverse}
+                {"variables": list(part.map.variables), **part.map.to_record(), "inverse": part.is_inverse}
                 for part in self.parts
             ]
         }
@@ -256,7 +256,7 @@ def _invert_factors(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 def is_involution(map_: MapFamily) -> bool:
     """Test Phi(Phi(x)) = x for the map Phi at 3 random points modulo primes; True is wrong with probability < 2^-40."""
-    rng, success_count = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
+    rng, success_count = random.Random(f"involution {derive_seed(0, *map_.seed_data)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in map_.variables)

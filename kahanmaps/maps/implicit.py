@@ -86,7 +86,7 @@ class Map(LatexDisplay):
         time_step_text = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
         return f"Map({', '.join(self.variables)}; {eps_text}{time_step_text}, over {self.field})"
 
-    def written(self) -> dict[str, Any]:
+    def to_record(self) -> dict[str, Any]:
         """Return plain data about the map; "eps" is None if factors differ in eps, "time_step" is None without flow."""
         eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
         return {"map": repr(self), "eps": eps, "time_step": step}
@@ -412,7 +412,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     @abstractmethod
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         """The data that determine the map, for `derive_seed`."""
 
     @property
@@ -460,7 +460,7 @@ class MapFamily(LatexDisplay, ABC):
         return [list(row[:-1]) for row in self.rows]
 
     @abstractmethod
-    def written(self) -> dict[str, Any]:
+    def to_record(self) -> dict[str, Any]:
         """Return the map as plain data, for records."""
 
 
@@ -504,7 +504,7 @@ class ImplicitMap(MapFamily):
         return any("eps" not in entry.unused_gens() for row in self.rows for entry in row)
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return (self.variables, *(entry for row in self.rows for entry in row))
 
     @cached_property
@@ -531,7 +531,7 @@ class ImplicitMap(MapFamily):
             for row in self.rows
         )
 
-    def written(self) -> dict[str, list[str]]:
+    def to_record(self) -> dict[str, list[str]]:
         return {"equations": [f"{format_polynomial(equation)} = 0" for equation in self.equations]}
 
     @cached_property
@@ -543,7 +543,7 @@ class ImplicitMap(MapFamily):
 
     def __str__(self) -> str:
         if self.image is None:
-            return "\n".join(self.written()["equations"])
+            return "\n".join(self.to_record()["equations"])
         functions_by_name = zip(self.variables, self.image, strict=True)
         return "\n".join(f"{name}~ = {format_rational_function(function)}" for name, function in functions_by_name)
 
@@ -590,7 +590,7 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     each of the three points with probability below 2^-40. `root`, if given, is the value of the only symbol; then only
     primes are used modulo which the root exists.
     """
-    rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
+    rng = random.Random(f"map {derive_seed(0, *map_.seed_data, *(e for row in map_.backward or () for e in row))}")
     passed_count = 0
     while passed_count < 3:
         field = random_prime_field(rng)

@@ -73,12 +73,12 @@ class KahanMap(ElementaryMap):
         eps: Any = None,
         field: Field = QQ,
         values: Sequence[Any] = (),
-        inside: Any = None,
+        coefficient_eps: Any = None,
         *,
         time_step: Any = None,
         h: Any = None,
     ) -> None:
-        """`inside` is the eps in the coefficients (default `eps`); an inverse has -eps and the same coefficients."""
+        """`coefficient_eps`, by default `eps`, is the eps in the coefficients; an inverse keeps it and has -eps."""
         if eps is None:
             eps = resolve_eps(eps, time_step, h)
         if not isinstance(system, QuadraticSystem | SystemOver):
@@ -89,12 +89,12 @@ class KahanMap(ElementaryMap):
         else:
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
-            self._system_eps = self.eps if inside is None else inside
+            self._coefficient_eps = self.eps if coefficient_eps is None else coefficient_eps
             remaining_values = iter(self.values)
             self.local = system.over(
-                field, [self._system_eps if x == "eps" else next(remaining_values) for x in system.symbols]
+                field, [self._coefficient_eps if x == "eps" else next(remaining_values) for x in system.symbols]
             )
-            self._arguments = (system, field, self.values, self._system_eps)
+            self._arguments = (system, field, self.values, self._coefficient_eps)
         self.field, self.dim = self.local.field, self.local.dim
 
     def denominator_name(self, backward: bool) -> str:
@@ -155,7 +155,7 @@ class KahanMap(ElementaryMap):
         """The flow as ((system as text, values of its symbols), time step 2 eps); None for a `SystemOver`."""
         if isinstance(self._arguments[0], SystemOver):
             return None
-        symbols = self._system_eps if "eps" in self.system.symbols else None, *self.values
+        symbols = self._coefficient_eps if "eps" in self.system.symbols else None, *self.values
         with self.field.working():
             return (str(self.system), symbols), time_step_at(self.eps)
 
@@ -187,7 +187,7 @@ class KahanFamily(MapFamily):
         return self.system.is_homogeneous and "eps" not in self.system.symbols
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def seed_data(self) -> tuple[Any, ...]:
         return self.system.rhs
 
     @property
@@ -219,7 +219,7 @@ class KahanFamily(MapFamily):
             rows.append((*row, -product - 2 * eps * f.compose(*variables, ctx=context)))
         return tuple(rows)
 
-    def written(self) -> dict[str, list[str]]:
+    def to_record(self) -> dict[str, list[str]]:
         return {"rhs": [format_polynomial(polynomial) for polynomial in self.system.rhs]}
 
     def __str__(self) -> str:

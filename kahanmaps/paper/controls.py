@@ -16,9 +16,9 @@ from kahanmaps.systems.quadratic import SystemOver
 
 @dataclass(frozen=True)
 class Control:
-    """A negative control: `function` changes the objects so that a hypothesis fails; `breaks` says how it fails."""
+    """A negative control: `function` changes the objects so that a hypothesis fails; `violation` says how it fails."""
 
-    breaks: str
+    violation: str
     function: Callable[[PaperObjects], PaperObjects]
     least_m: int = 1
 

@@ -59,7 +59,7 @@ class Claim:
     """A statement or display of the paper.
 
     `place` is the number of the statement in the paper ("Lemma 3", "(28)"), `label` its label in the LaTeX source.
-    `breaks` lists the controls: inputs that violate one hypothesis, for which the claim must be refuted.
+    `controls` are names of inputs that violate one hypothesis, for which the claim must be refuted.
     """
 
     key: str
@@ -68,7 +68,7 @@ class Claim:
     label: str
     formula: str
     function: ClaimFunction
-    breaks: tuple[str, ...]
+    controls: tuple[str, ...]
     kind: ClaimKind = ClaimKind.EQUAL
     at_most: str = ""  # for a claim that a rank is attained: why the rank cannot be larger
     least_m: int = 1
@@ -110,10 +110,10 @@ class Claim:
 _claims: dict[str, Claim] = {}
 
 
-def claim(place: str, label: str, breaks: str = "", **options: Any) -> Callable[[ClaimFunction], ClaimFunction]:
+def claim(place: str, label: str, controls: str = "", **options: Any) -> Callable[[ClaimFunction], ClaimFunction]:
     """Register a function as a claim; its file determines the section.
 
-    The first line of the docstring is the title, the second line the formula. `breaks` are names of controls, separated
+    The first line of the docstring is the title, the second line the formula. `controls` are keys of CONTROLS separated
     by blanks. A claim with a reason `at_most` asserts that a rank is attained. Other keywords are fields of `Claim`.
     """
 
@@ -125,7 +125,7 @@ def claim(place: str, label: str, breaks: str = "", **options: Any) -> Callable[
             raise ValueError(f"two claims have the name {key}")
         formula = (function.__doc__ or "").splitlines()[1].strip()
         kind = options.pop("kind", ClaimKind.ATTAINED if options.get("at_most") else ClaimKind.EQUAL)
-        _claims[key] = Claim(key, section, place, label, formula, function, tuple(breaks.split()), kind, **options)
+        _claims[key] = Claim(key, section, place, label, formula, function, tuple(controls.split()), kind, **options)
         return function
 
     return register

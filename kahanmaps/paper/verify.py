@@ -500,7 +500,7 @@ class Verifier:
         sources = (self.exact_point, self.point) if is_rational_first else (self.point, self.exact_point)
         choices = list(product((False, True), sources, range(_POINT_COUNT)))
         controls = []
-        for name in claim.breaks:
+        for name in claim.controls:
             if self.m < CONTROLS[name].least_m or self.why_outside(claim) is not None:
                 continue
             outcome, failures = None, 0
@@ -515,9 +515,9 @@ class Verifier:
                 verdict, outcome_text = Certainty.SUPPORTED, "the claim holds all the same"
             else:
                 verdict, outcome_text = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
-            evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {outcome_text}")
+            evidence = Evidence("control", f"control {name}: {CONTROLS[name].violation}; {outcome_text}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
-            place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
+            place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].violation}
             controls.append(replace(finding, control=True, place=place, certified={}))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar): their controls are skipped.
         return [finding for finding in controls if finding.is_as_expected] or controls

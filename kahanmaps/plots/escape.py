@@ -47,7 +47,7 @@ def survey_escape(
     eps: Any,
     window: Window,
     axes: tuple[int, int] = (0, 1),
-    at: Sequence[Any] | None = None,
+    base_point: Sequence[Any] | None = None,
     *,
     cells: int = 300,
     steps: int = 200,
@@ -56,7 +56,7 @@ def survey_escape(
 ) -> Escape:
     """Follow the float orbits whose initial points are the centers of `cells` x `cells` cells of a window.
 
-    The window lies in the plane of the variables with indices `axes`; `at` are the other coordinates (default 0).
+    The window lies in the plane through `base_point` (default: 0) along the variables with the indices `axes`.
     Orbits of Kahan maps may return from points near poles: an orbit that leaves the ball need not go to infinity.
 
     >>> from kahanmaps.maps.kahan import as_map
@@ -71,13 +71,13 @@ def survey_escape(
         raise InputError(f"found {sizes}, expected 1 to {MAX_STEPS} steps, 1 to {MAX_CELLS} cells, radius > 0")
     if map_.dim < 2:
         raise InputError(f"found {counted(map_.dim, 'variable')}, expected at least 2")
-    if len(set(axes)) != 2 or (at is not None and len(at) != map_.dim):
-        raise InputError(f"found axes {axes} and a point {at}, expected two axes and {map_.dim} coordinates")
+    if len(set(axes)) != 2 or (base_point is not None and len(base_point) != map_.dim):
+        raise InputError(f"found axes {axes} and a point {base_point}, expected two axes and {map_.dim} coordinates")
     with np.errstate(over="ignore"):
         centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
     if not np.isfinite(centers).all():
         raise InputError(f"found the window {window}, expected a smaller one")
-    starts = np.tile(np.zeros(map_.dim) if at is None else to_floats(at), (cells * cells, 1))
+    starts = np.tile(np.zeros(map_.dim) if base_point is None else to_floats(base_point), (cells * cells, 1))
     starts[:, axes[0]], starts[:, axes[1]] = np.tile(centers[0], cells), np.repeat(centers[1], cells)
     ensemble = ensemble_for(map_, eps, starts, steps, radius=radius)
     ensemble.advance(steps, progress=progress)

@@ -266,7 +266,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
         degrees = tuple(map(_integer, record["degrees"]))
         if not (1 <= len(degrees) <= _MAX_TERMS and any(degrees)):
             raise InputError("no degrees, or all of them 0")
-        patterns = enclosure = None
+        patterns = bounds = None
         if (data := record.get("singularities")) is not None:
             fraction = data.get("generating_function") or {}
             series = tuple(tuple(map(int, fraction[part])) for part in ("numerator", "denominator") if fraction)
@@ -277,9 +277,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             patterns = Patterns(lengths, searched, data["some_confined"], str(data["running"]), series)
         if (data := record.get("enclosure")) is not None:
             names = ("steps", "degree_below", "degree_above", "prime", "eps_residue")
-            enclosure = DynamicalDegreeBounds(
-                str(data["lower"]), str(data["upper"]), *(int(data[name]) for name in names)
-            )
+            bounds = DynamicalDegreeBounds(str(data["lower"]), str(data["upper"]), *(int(data[name]) for name in names))
         growth = DegreeGrowth(
             degrees,
             None if record["eps"] == "generic" else parse_number(record["eps"]),
@@ -289,7 +287,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             tuple(int(line["prime"]) for line in record["lines"]),
             tuple(int(line["eps_residue"]) for line in record["lines"]),
             patterns=patterns,
-            enclosure=enclosure,
+            dynamical_degree_bounds=bounds,
         )
         return printable(str(record["system"])), growth
     except _READ_ERRORS as error:

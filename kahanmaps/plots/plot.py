@@ -186,9 +186,9 @@ class Plot(AttributeHints):
             Trajectories(trajectory.variables, points, np.array([point.step for point in trajectory])), (x, y)
         )
 
-    def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
+    def portrait(self, system: Any, *arguments: Any, **options: Any) -> Axes:
         """Draw a portrait; the arguments are those of `km.portrait`."""
-        return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
+        return public_function(plot_orbits, "portrait")(system, *arguments, **options)  # type: ignore[no-any-return]
 
 
 for _name in (

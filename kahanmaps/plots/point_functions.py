@@ -43,7 +43,7 @@ class PointFunction:
         variable = self.variable
         if variable is not None:
             return np.array(points[..., variable], dtype=np.float64)
-        numerator, denominator = self.parts(points)
+        numerator, denominator = self.numerator_and_denominator(points)
         with np.errstate(all="ignore"):
             values = numerator / denominator
         return np.where(np.isfinite(values), values, np.nan)
@@ -53,7 +53,7 @@ class PointFunction:
         value: fmpq | None = self.function.value(QQ, [*point, self.eps])
         return value
 
-    def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def numerator_and_denominator(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the values of numerator and denominator of the function at points (..., dim), as two arrays (...)."""
         with np.errstate(all="ignore"):
             return self._value(self.function.numerator, points), self._value(self.function.denominator, points)

@@ -58,13 +58,13 @@ class MapPair:
 class Squares:
     """Lattices of points for a point x and maps F, G: `g_after_f[i][j]` is G^j(F^i x), `f_after_g[i][j]` is F^i(G^j x).
 
-    `stopped` is a sentence that says why some points are missing; it is empty if none are missing.
+    `stop_reason` is a sentence that says why some points are missing; it is empty if none are missing.
     """
 
     pair: MapPair
     g_after_f: Lattice
     f_after_g: Lattice
-    stopped: str
+    stop_reason: str
 
     @property
     def steps(self) -> int:

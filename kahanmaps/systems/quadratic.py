@@ -203,7 +203,7 @@ class SystemOver:
     tensor: Any
     B: Any = None
     c: Any = None
-    exact: QuadraticSystem | None = None  # the system over Q from which this was made, if it has no symbols
+    rational_system: QuadraticSystem | None = None  # the system from which this was made, if it has no symbols
 
     def __post_init__(self) -> None:
         n, field = self.dim, self.field
@@ -281,9 +281,9 @@ class SystemOver:
 
     def value(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """Return f(x)."""
-        if self.exact is None:
+        if self.rational_system is None:
             return self.polarised(point, point)
-        return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)
+        return tuple(evaluate(polynomial, self.field, point) for polynomial in self.rational_system.rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
         """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's equation; not defined modulo 2."""

@@ -22,7 +22,7 @@ PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])
 
 def identity_of(right) -> Identity:
     """x = right(x, field)."""
-    return Identity(1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), None, subject=())
+    return Identity(1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), None, seed_data=())
 
 
 TRUE = identity_of(lambda x, field: x)
@@ -30,7 +30,7 @@ FALSE = identity_of(lambda x, field: x + field.one)
 # True at 1 and 2, on an orbit that random points do not meet.
 FALSE_BUT_ON_AN_ORBIT = identity_of(lambda x, field: x + (x - field.one) * (x - field.convert(2)))
 POLE_FIRST = Identity(
-    1, lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]), None, subject=()
+    1, lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]), None, seed_data=()
 )
 
 
@@ -43,7 +43,7 @@ def undefined(field, point, eps):
     raise SingularStep("no value")
 
 
-NOWHERE = Identity(1, undefined, None, subject=())
+NOWHERE = Identity(1, undefined, None, seed_data=())
 
 
 @pytest.fixture

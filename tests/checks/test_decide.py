@@ -55,7 +55,7 @@ def identity_of(
         (x,) = point
         return ([left(x, eps_value, field)], [right(x, eps_value, field)]) if defined(x, field) else None
 
-    return Stated(1, sides, eps, subject=(), stated=(CoefficientSize(degree, bits), poles))
+    return Stated(1, sides, eps, seed_data=(), stated=(CoefficientSize(degree, bits), poles))
 
 
 def counted(identity: Identity) -> tuple[Identity, list[Field]]:
@@ -129,7 +129,7 @@ def test_two_polynomials_are_refuted_exactly_when_they_differ(first, second, see
 
 
 def test_an_identity_that_holds_at_every_small_point_that_is_tried_is_refuted_by_a_high_one():
-    # The points that are tried follow `subject`, which is () here: whoever knows them can hide the failure from them.
+    # The points that are tried follow `seed_data`, which is () here: whoever knows them can hide the failure from them.
     seed = 3
     place = identity_of(square_left, square_right).seed(seed)
     hidden = {point[0] for point in small_points(1, random.Random(f"witness {place}"), 400)}
@@ -185,7 +185,7 @@ def raises(error):
     ids=["pole", "singular step", "singular matrix"],
 )
 def test_an_identity_defined_nowhere_is_undecided(sides):
-    decision = decide(Identity(1, sides, None, subject=()), 0)
+    decision = decide(Identity(1, sides, None, seed_data=()), 0)
     assert decision.verdict is UNDECIDED
     assert decision.witness is None
     assert "a denominator seems to vanish identically" in decision.evidence.summary
@@ -196,7 +196,7 @@ def test_an_identity_without_values_over_bounds_has_no_bound_and_is_not_supporte
     def sides(field, point, eps):
         return None if isinstance(field, BoundField) else (list(point), [factor * point[0]])
 
-    decision = decide(Identity(1, sides, None, subject=()), 0)
+    decision = decide(Identity(1, sides, None, seed_data=()), 0)
     assert decision.verdict is verdict
     assert ("no values over bounds" in decision.evidence.summary) == (verdict is UNDECIDED)
 

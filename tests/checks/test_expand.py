@@ -49,7 +49,7 @@ def test_a_quantity_that_is_not_conserved_is_never_proved(claim):
 
 @pytest.mark.parametrize("wrong", [(0,), (2,)])
 def test_all_components_have_to_agree(wrong):
-    right = Identity(3, lambda field, x, eps: (list(x), list(x)), None, subject=())
+    right = Identity(3, lambda field, x, eps: (list(x), list(x)), None, seed_data=())
 
     def sides(field, x, eps):
         return list(x), [x[k] + field.one if k in wrong else x[k] for k in range(3)]
@@ -89,10 +89,10 @@ def test_a_small_budget_ends_without_an_answer():
 def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
     """eps = x_k holds where eps is that coordinate, and eps x_k = x_k eps everywhere."""
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), None, subject=()))
+        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), None, seed_data=()))
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), None, subject=()))
-    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), None, subject=()))
+        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), None, seed_data=()))
+    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), None, seed_data=()))
     assert evidence is not None
     assert evidence.data["eps"] == "every"
 

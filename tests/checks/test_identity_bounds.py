@@ -119,7 +119,7 @@ BROKEN = [
     (claim, control)
     for claim in claims()
     if claim.kind is ClaimKind.EQUAL and claim.makes_sense(1) and is_short(claim)
-    for control in claim.breaks
+    for control in claim.controls
     if control in ("eps", "map", "B")
 ]
 

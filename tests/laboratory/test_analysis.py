@@ -226,7 +226,7 @@ def test_a_verdict_says_in_which_sense_and_on_what_ground(name, sense, ground):
 
 def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     analysis = analysis_of("lotka_volterra")
-    unproved = replace(analysis, degrees=replace(analysis.degrees, enclosure=None))
+    unproved = replace(analysis, degrees=replace(analysis.degrees, dynamical_degree_bounds=None))
     assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "derived")
     underived = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
     assert (underived.conclusion.kind, underived.conclusion.ground) == ("not integrable", "measured")
@@ -347,7 +347,7 @@ def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrenc
     # Degrees 2^n of lotka_volterra, whose singularities the budget left out.
     degrees = tuple(2**n for n in range(9))
     bounds = bound_dynamical_degree(km.load("lotka_volterra").map, None)
-    growth = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
+    growth = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), dynamical_degree_bounds=bounds)
     assert (str(growth.growth), growth.recurrence) == ("exponential", None)
     control = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), ())
     assert (str(control.growth), str(control.known)) == ("unknown", "undecided")

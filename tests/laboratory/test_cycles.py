@@ -145,7 +145,7 @@ def test_a_time_limit_keeps_the_complete_steps_of_random_points():
 
     system = load("lotka_volterra").system
     census = cycle_census(system, "1/7", 997, samples=50, progress=stop)
-    assert census == replace(cycle_census(system, "1/7", 997, samples=50, steps=3), stopped=True)
+    assert census == replace(cycle_census(system, "1/7", 997, samples=50, steps=3), is_stopped=True)
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def test_the_budget_and_the_degree_are_limits():
     assert growth.message == "work limit reached at iterate 8; raise --effort"
     known = degree_growth(load("lotka_volterra").system).patterns
     growth = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
-    assert (growth.ended, growth.enclosure) == ("derived", None)
+    assert (growth.ended, growth.dynamical_degree_bounds) == ("derived", None)
     assert growth.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
     growth = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (growth.ended, growth.growth) == ("budget", Growth.BOUNDED)
@@ -147,7 +147,8 @@ def test_a_time_limit_keeps_the_degrees_that_were_measured():
     short = {"max_terms": 6, "patterns": OPEN}
     growth = degree_growth(load("lotka_volterra").system, progress=stop_later, **short)
     complete = degree_growth(load("lotka_volterra").system, **short)
-    assert growth == replace(complete, enclosure=None, message=f"{complete.message}; the time limit of 1 s is over")
+    message = f"{complete.message}; the time limit of 1 s is over"
+    assert growth == replace(complete, dynamical_degree_bounds=None, message=message)
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         degree_growth(load("henon_heiles").system, effort=Budget(1e9), progress=stop)
 

@@ -123,7 +123,7 @@ def test_two_eps_that_differ_leave_the_patterns_open():
     runs = [singularities(planar("1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
     assert patterns_of(runs).running == "the singularities at the two values of eps differ; choose one with --eps"
     assert patterns_of(runs[:1]).running == ""
-    assert "work limit" in patterns_of([replace(runs[0], stopped=True)]).running
+    assert "work limit" in patterns_of([replace(runs[0], is_stopped=True)]).running
     assert "not dominant" in patterns_of([replace(runs[0], is_dominant=False)]).running
 
 

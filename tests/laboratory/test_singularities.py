@@ -91,7 +91,7 @@ def test_a_budget_that_is_spent_stops_it():
     top, before = load("euler_top").system, counted()
     complete = singularities(top, "1/7")
     run = singularities(top, "1/7", effort=Budget((counted() - before) / 2))
-    assert run.stopped
+    assert run.is_stopped
     assert run.verdict == "undecided"
     assert run.hypersurfaces[0] == complete.hypersurfaces[0]
     assert run.hypersurfaces[-1].note == BUDGET_SPENT
@@ -105,7 +105,7 @@ def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
             raise TimeLimit("the time limit of 1 s is over")
 
     run = singularities(top, "1/7", progress=stop)
-    assert (run.stopped, run.hypersurfaces) == (True, complete.hypersurfaces[:1])
+    assert (run.is_stopped, run.hypersurfaces) == (True, complete.hypersurfaces[:1])
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         singularities(top, "1/7", effort=Budget(1e9), progress=stop)
 

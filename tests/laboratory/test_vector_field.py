@@ -39,7 +39,7 @@ def system(names, *rhs):
 )
 def test_fixed_points_and_eigenvalues(f, texts):
     search = fixed_points(f)
-    messages = [entry.text.replace(", eigenvalues of f'", "") for entry in search.found]
+    messages = [entry.text.replace(", eigenvalues of f'", "") for entry in search.fixed_points]
     assert (len(messages), search.undecided) == (len(texts), "")
     for text, expected in zip(messages, texts, strict=True):
         assert expected in text
@@ -67,7 +67,7 @@ def test_fixed_points_and_eigenvalues(f, texts):
 )
 def test_where_an_equilibrium_is_a_fixed_point_of_the_map(f, eps, expected):
     eps = None if eps is None else fmpq(*map(int, eps.split("/")))
-    result = fixed_points(f).found
+    result = fixed_points(f).fixed_points
     assert [entry.are_fixed_by_map(eps) for entry in result] == expected
     for item, is_fixed in zip(result, expected, strict=True):
         if eps is None or item.equations or item.dimension:
@@ -152,6 +152,6 @@ GENERIC = [random_system(3, 1), read_system(Path(__file__).parent / "further_sys
 @pytest.mark.parametrize("file", [GENERIC[0], pytest.param(GENERIC[1], marks=THOROUGH)], ids=["3", "6"])
 def test_the_conjugate_fixed_points_of_a_generic_system_are_counted(file):
     points = fixed_points(file)
-    assert (points.undecided, [(entry.dimension, entry.count) for entry in points.found]) == ("", [(0, 2**file.dim)])
+    assert (points.undecided, [(entry.dimension, entry.count) for entry in points]) == ("", [(0, 2**file.dim)])
     short = fixed_points(file, effort=-20)
-    assert (short.found, short.undecided) == ((), "work limit reached; raise --effort")
+    assert (short.fixed_points, short.undecided) == ((), "work limit reached; raise --effort")

@@ -74,7 +74,7 @@ def test_long_words_are_stepped_and_refused_where_formulas_are_asked_for():
     for what in ("rows", "inverse_rows"):
         refuses("4 maps whose formulas are too large to be multiplied out", getattr, word, what)
     assert str(word).startswith("4 maps one after the other, too large to be multiplied out:\nthe Kahan map in q1")
-    assert len(word.written()["composition"]) == 4
+    assert len(word.to_record()["composition"]) == 4
     assert "4 maps one after the other" in word._repr_latex_()
     refuses("found a map with the symbol a", composed_map, parse_symbolic(), symbols=())
 

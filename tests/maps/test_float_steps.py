@@ -140,7 +140,7 @@ def test_kernels_threads_company_portions_and_records_make_no_difference(name):
     starts[70:80] = np.round(8 * starts_of(system.dim, 10)) * 10.0 ** rng.integers(0, 250, (10, 1))
 
     def taken(some, *portions, **options):
-        orbits = FloatEnsemble(system, "1/3", some, form=form, sampled=7, **options)
+        orbits = FloatEnsemble(system, "1/3", some, form=form, sample_interval=7, **options)
         return orbits, np.concatenate([x for steps in portions for x in orbits.records(steps, 4)])
 
     together, points = taken(starts, 60, kernel="numpy")
@@ -167,12 +167,14 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     lines = [row == [0, 1, 1, 0] for row in blocks.coefficients.tolist()]
     for r, has_pole in enumerate(lines):
         if has_pole:
-            at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
+            at, size = (2 * r, 2) if r < blocks.real_count else (4 * r - 2 * blocks.real_count, 4)
             rows = blocks.x_to_state @ starts[20 + r]
             rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
             starts[20 + r] = blocks.state_to_x @ rows
     system, form = MEMBERS[name].chosen.system, FORMS[name]
-    entry, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
+    entry, other = (
+        FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sample_interval=10) for k in ("numpy", "numba")
+    )
     for it in (entry, other):
         it.advance(40)
     same(entry, other)
@@ -230,7 +232,7 @@ def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
     [
         (np.ones((1, 3)), {"kernel": "fortran"}, "found the kernel 'fortran', expected numpy or numba"),
         (np.ones((1, 3)), {"threads": 0}, "found 0 threads"),
-        (np.ones((1, 3)), {"sampled": 0}, "sample every 0 steps"),
+        (np.ones((1, 3)), {"sample_interval": 0}, "sample every 0 steps"),
         (np.ones((1, 3)), {"form": FORMS["a complex pair"]}, "belongs to another system"),
         (np.ones(3), {}, "one row for each point, with columns x1, x2, x3"),
         (np.ones((2, 2)), {}, "one row for each point"),

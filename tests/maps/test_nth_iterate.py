@@ -43,7 +43,7 @@ def coordinates(value):
     """As a tuple; fractions from numerators over one denominator (lowest terms have tests of their own)."""
     if not isinstance(value, PlanesPoint):
         return tuple(value)
-    numerators, below = value.common()
+    numerators, below = value.over_common_denominator()
     return tuple(fmpq(above, below) for above in numerators)
 
 

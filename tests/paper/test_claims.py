@@ -28,13 +28,13 @@ MISPRINTS = [claim for claim in CLAIMS if claim.misprint]
 
 def test_every_claim_names_a_control_that_applies_to_the_least_m_for_which_it_makes_sense():
     def applies(claim):
-        return any(CONTROLS[name].least_m <= (claim.only_m or claim.least_m) for name in claim.breaks)
+        return any(CONTROLS[name].least_m <= (claim.only_m or claim.least_m) for name in claim.controls)
 
     assert [claim.key for claim in RIGHT if not applies(claim)] == []
 
 
 def test_every_control_is_named_by_a_claim():
-    assert {name for claim in CLAIMS for name in claim.breaks} == set(CONTROLS)
+    assert {name for claim in CLAIMS for name in claim.controls} == set(CONTROLS)
 
 
 def test_the_misprints_are_those_documented():
@@ -105,7 +105,7 @@ def outcome(claim, name, control):
 def idle_controls(claim, spectra, first_alone):
     """The controls that a claim names and that do not refute it: on the first member that can show it, or on all."""
     results = []
-    for control in claim.breaks:
+    for control in claim.controls:
         able = (
             n for n in members_of(claim, spectra) if member(n).m >= max(2, CONTROLS[control].least_m) or claim.only_m
         )
@@ -127,7 +127,7 @@ def test_every_control_that_a_claim_names_refutes_it_on_all_members(claim):
 
 @together("claim", [entry for entry in RIGHT if entry.makes_sense(1)])
 def test_some_control_refutes_a_claim_for_m_1(claim):
-    applicable = [control for control in claim.breaks if CONTROLS[control].least_m == 1]
+    applicable = [control for control in claim.controls if CONTROLS[control].least_m == 1]
     assert "fails" in [outcome(claim, "m=1", control) for control in applicable]
 
 

@@ -79,14 +79,14 @@ def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     pair = plane_pair(["x^2", "0"], ["0", "y^2"])
     result = squares(pair, [5, 2], "1/10")
     assert (result.closes, result.verdict) == (None, "no fourth corner")
-    assert result.stopped == "Phi_f: the map is not defined at a point on the way"
+    assert result.stop_reason == "Phi_f: the map is not defined at a point on the way"
     later = squares(pair, ["5/3", "1/7"], "1/10", 3)
-    assert (later.g_after_f[3][0], later.closes, bool(later.stopped)) == (None, True, True)
+    assert (later.g_after_f[3][0], later.closes, bool(later.stop_reason)) == (None, True, True)
 
 
 def test_numbers_that_grow_too_long_are_left_out_and_wrong_numbers_of_steps_refused(monkeypatch):
     monkeypatch.setattr(module, "MAX_BITS", 40)
-    assert "more than 40 bits" in squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2).stopped
+    assert "more than 40 bits" in squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2).stop_reason
     for steps in (0, 13):
         refuses("expected 1 to 12", squares, plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", steps)
 

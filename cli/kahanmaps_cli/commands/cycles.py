@@ -66,7 +66,7 @@ def command(system: str | None, **options: Any) -> int:
             for eps in eps_values if file.map.has_eps else [1]:
                 if not search.is_over:
                     runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=search))
-        outcomes = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
+        outcomes = ("stopped" if run.is_stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
         line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(outcomes, runs, strict=True))
 
         def print_text() -> None:
@@ -87,9 +87,8 @@ def command(system: str | None, **options: Any) -> int:
                 primes=list(dict.fromkeys(options["primes"])),
                 runs=[
                     {
-                        **lib.attributes(
-                            census, "prime", "complete", "stopped", "examined", "indeterminate", "open", "steps"
-                        ),
+                        **lib.attributes(census, "prime", "complete", stopped="is_stopped", examined="examined"),
+                        **lib.attributes(census, "indeterminate", "open", "steps"),
                         **lib.attributes(census, "pre_indeterminate", "preperiodic", "periodic", "cycles", "longest"),
                         "eps": str(census.eps),
                         "time_step": lib.eps_record(census.eps, file.map)["time_step"],

@@ -241,8 +241,8 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
         "A": lib.plain(A),
         "dim": A.nrows(),
         "dimension": cubics.dimension,
-        "expected_for_generic_A": cubics.expected,
-        "unknowns": cubics.unknowns,
+        "expected_for_generic_A": cubics.expected_dimension,
+        "unknowns": cubics.unknown_count,
         "rank": cubics.rank,
         "diagnosis": lib.diagnosis(A),
         "basis": [lib.format_polynomial(H) for H in cubics.basis],
@@ -251,8 +251,8 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
         print_json(data)
         return
     print_stdout(
-        f"dimension {cubics.dimension} (generic A: 4m = {cubics.expected}); "
-        f"the linear system has {cubics.unknowns} unknowns and rank {cubics.rank}"
+        f"dimension {cubics.dimension} (generic A: 4m = {cubics.expected_dimension}); "
+        f"the linear system has {cubics.unknown_count} unknowns and rank {cubics.rank}"
     )
     print_stdout(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):

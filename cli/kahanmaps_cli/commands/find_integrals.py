@@ -207,7 +207,7 @@ def _search_bases(system: str | None, options: dict[str, Any]) -> int:
         for vector in basis.constant:
             names = [name for name, is_constant in zip(basis.functions, vector, strict=True) if not is_constant]
             print_stdout(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
-        if not basis.agree:
+        if not basis.orbits_agree:
             print_stdout("\tthe orbits that were compared do not agree: try another --seed")
     for text in filter(None, (note, reason)):
         print_stdout(f"note\t{text}")

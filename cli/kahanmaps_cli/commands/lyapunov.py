@@ -76,7 +76,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             **lib.eps_record(eps, file.map),
             **starts_record(options, result.orbits),
             steps_requested=steps,
-            **lib.attributes(result, "orbits", "ended", "steps", "transient", "stopped"),
+            **lib.attributes(result, "orbits", ended="ended_count", steps="steps", transient="transient"),
+            stopped=result.is_stopped,
             **{name: [number(value) for value in values] for name, values in arrays.items()},
             sum=number(result.mean.sum()),
             log_volume=number(result.log_volume.mean()) if len(result.log_volume) else None,
@@ -85,8 +86,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         print_json(record)
     else:
         print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, double precision")
-        print_stdout(f"orbits\t{result.orbits - result.ended} of {result.orbits}")
-        if result.stopped and not result.steps:  # exponents are means over counted steps, and there are none
+        print_stdout(f"orbits\t{result.orbits - result.ended_count} of {result.orbits}")
+        if result.is_stopped and not result.steps:  # exponents are means over counted steps, and there are none
             print_stdout(f"steps\tnone counted: stopped in the transient, after {result.transient} of its steps")
         else:
             print_stdout(f"steps\t{result.steps} after {result.transient}")
@@ -100,6 +101,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             volume = result.log_volume.mean() if len(result.log_volume) else float("nan")
             print_stdout(f"sum\t{result.mean.sum():.6g}")
             print_stdout(f"log |det dPhi|\t{volume:.6g}\tresidual {result.residual:.2g}")
-    if result.ended and not quiet:
-        print_stderr(f"{result.ended} of {result.orbits} orbits overflowed or reached a pole")
-    return 3 if result.ended or search.is_over else 0
+    if result.ended_count and not quiet:
+        print_stderr(f"{result.ended_count} of {result.orbits} orbits overflowed or reached a pole")
+    return 3 if result.ended_count or search.is_over else 0

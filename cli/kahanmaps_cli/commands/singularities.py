@@ -66,7 +66,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     verdict = runs[0].verdict if is_consistent else lib.UNDECIDED
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
-        run_keys = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
         hypersurface_keys = (
             "polynomial",
             "degree",
@@ -79,7 +78,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         step_keys = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
         records = [
             {
-                **lib.attributes(run, *run_keys, singular_everywhere="is_undefined", dominant="is_dominant"),
+                **lib.attributes(run, "verdict", "denominator", "map_degree", "critical_degree"),
+                **lib.attributes(run, stopped="is_stopped", followed="followed", text="text"),
+                **lib.attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
                 "eps": str(run.eps),
                 "time_step": lib.eps_record(run.eps, file.map)["time_step"],
                 "maps_a_step": None if run.word is None else run.word.length,
@@ -122,7 +123,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             )
         print_stdout(f"\n# {runs[0].text if is_consistent else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
-        if any(run.stopped for run in runs):
+        if any(run.is_stopped for run in runs):
             reason = "work limit reached; raise --effort"
         elif not is_consistent:
             reason = "the two values of eps give different results; choose one with --eps"

@@ -58,7 +58,7 @@ def command(
                 **envelope("systems"),
                 **_summary(file),
                 "variables": list(file.variables),
-                **file.map.written(),
+                **file.map.to_record(),
                 "integrals": {name: lib.format_rational_function(f) for name, f in file.integrals.items()},
                 "density": lib.format_rational_function(file.density) if file.density is not None else None,
                 "facts": list(file.catalog.get("facts", [])),

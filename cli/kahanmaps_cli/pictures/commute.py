@@ -77,6 +77,6 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         names = captions[0] if captions else " and ".join(square.pair.names)
         messages.append(f"{names}: {square.verdict}")
         messages += [f"  {square.pair.note}"] * bool(square.pair.note)
-        messages += [f"  points are missing: {square.stopped}"] * bool(square.stopped)
-    is_partial = any(square.stopped for square in squares_of_pairs)
+        messages += [f"  points are missing: {square.stop_reason}"] * bool(square.stop_reason)
+    is_partial = any(square.stop_reason for square in squares_of_pairs)
     return Drawing(figure, file if second_file is None else None, messages, 3 if is_partial else 0)

@@ -33,19 +33,19 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
         return
     divergence = format_polynomial(result.file.system.divergence)
     yield Statement(PROVED, f"div f = {divergence}{': the flow preserves volume' if divergence == '0' else ''}")
-    yield from (Statement(PROVED, points.text) for points in search.found[:MAX_POINTS])
-    if len(search.found) > MAX_POINTS:
-        count_text = counted(len(search.found) - MAX_POINTS, "more set")
+    yield from (Statement(PROVED, points.text) for points in search.fixed_points[:MAX_POINTS])
+    if len(search.fixed_points) > MAX_POINTS:
+        count_text = counted(len(search.fixed_points) - MAX_POINTS, "more set")
         yield Statement(NOTE, f"and {count_text} of fixed points, which --json lists")
     if search.undecided:
         yield Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}")
-    elif not search.found:
+    elif not search.fixed_points:
         yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
         # A fixed point x of the flow is a fixed point of the map if det(I - eps f'(x)) is not 0.
-        are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
+        are_fixed = [points.are_fixed_by_map(result.eps) for points in search.fixed_points]
         undefined = [
-            points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False
+            points.where for points, is_fixed in zip(search.fixed_points, are_fixed, strict=True) if is_fixed is False
         ]
         where = "" if all(are_fixed) else " where det(I - eps f'(x)) is not 0"
         if undefined:
@@ -94,7 +94,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
             relation_texts += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
             yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relation_texts)}")
-            if not profile.agree:
+            if not profile.maps_agree:
                 yield Statement(NOTE, "the orbits that were compared disagree")
         yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in result.relations)
         if integrals := list(dict.fromkeys(name for relation in result.relations for name in relation.integrals)):
@@ -176,8 +176,8 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
             yield Statement(certainty, f"recurrence: {degrees.recurrence.text}")
             if degrees.recurrence.closed_form_text:
                 yield Statement(certainty, f"d_n = {degrees.recurrence.closed_form_text}")
-        if degrees.enclosure is not None:
-            yield Statement(PROVED, degrees.enclosure.text)
+        if degrees.dynamical_degree_bounds is not None:
+            yield Statement(PROVED, degrees.dynamical_degree_bounds.text)
     if heights is not None:
         doubt = doubt_of_heights(result)
         status = UNDECIDED if doubt or heights.kind is Growth.UNDECIDED else MEASURED

@@ -111,7 +111,7 @@ def bound_dynamical_degree(
     """
     if map_.dim != 2 or map_.symbols or map_.root is not None:
         return None
-    rng = random.Random(f"enclosure {derive_seed(seed, map_.subject, eps)}")
+    rng = random.Random(f"enclosure {derive_seed(seed, map_.seed_data, eps)}")
     budget = budget_for("dynamical degree", effort)
     for _ in range(_TRIES):
         try:

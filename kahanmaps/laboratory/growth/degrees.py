@@ -69,9 +69,9 @@ class DegreeGrowth(PrintableResult):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and their growth.
 
     `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns; None if
-    they were not computed. Degrees and patterns are measured modulo primes, which is evidence but no proof. `enclosure`
-    has proved bounds of the dynamical degree of a planar map; it is None without a proved lower bound above 1. `proof`
-    is a proof of the growth, or None. The degrees of monomial maps are exact; `primes` is then empty.
+    they were not computed. Degrees and patterns are measured modulo primes, which is evidence but no proof.
+    `dynamical_degree_bounds` are proved for planar maps, or None without a proved lower bound above 1. `proof` is a
+    proof of the growth, or None. The degrees of monomial maps are exact; `primes` is then empty.
     """
 
     _parts = "degrees"
@@ -85,7 +85,7 @@ class DegreeGrowth(PrintableResult):
     residues: tuple[int, ...]
     notes: tuple[str, ...] = ()
     patterns: Patterns | None = None
-    enclosure: DynamicalDegreeBounds | None = None
+    dynamical_degree_bounds: DynamicalDegreeBounds | None = None
     proof: GrowthProof | None = None
 
     @cached_property
@@ -156,7 +156,7 @@ class DegreeGrowth(PrintableResult):
         if self.ended == Ended.CONSTANT:
             return Growth.ZERO
         if self.recurrence is None:
-            return Growth.UNKNOWN if self.enclosure is None else Growth.EXPONENTIAL
+            return Growth.UNKNOWN if self.dynamical_degree_bounds is None else Growth.EXPONENTIAL
         return self.recurrence.growth
 
     @property
@@ -204,9 +204,9 @@ class DegreeGrowth(PrintableResult):
         if self.looks_exponential:
             reason = self.unconfirmed or f"no recurrence in {terms_text}"
             quotients = sorted(d / c for c, d in zip(self.degrees[-4:], self.degrees[-3:], strict=False))
-            quotients_text = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}"
-            growth_text = "exponential growth" if self.enclosure is None else "exponential growth (proved),"
-            return f"{growth_text} by a factor of about {self.estimate} (estimated: {quotients_text}; {reason})"
+            quotients_text = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}; {reason}"
+            proved_text = "" if self.dynamical_degree_bounds is None else " (proved),"
+            return f"exponential growth{proved_text} by a factor of about {self.estimate} (estimated: {quotients_text})"
         if self.fitted is not None:
             return f"{terms_text} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
         n = len(self.degrees) - 1
@@ -222,7 +222,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def known(self) -> Certainty:
-        """The certainty of the kind of growth; the bounds in `enclosure` are always proved."""
+        """The certainty of the kind of growth; `dynamical_degree_bounds` are always proved."""
         if self.proof is not None:
             return Certainty.PROVED
         if self.derived is not None:
@@ -256,8 +256,8 @@ class DegreeGrowth(PrintableResult):
             lines.append(("singularities", self.patterns.text))
             lines += [("exceptional hypersurface", text) for text in self.patterns.sentences]
             lines += [("note", self.patterns.word_text)] if self.patterns.word_text else []
-        if self.enclosure is not None:
-            lines.append(("proved", self.enclosure.text))
+        if self.dynamical_degree_bounds is not None:
+            lines.append(("proved", self.dynamical_degree_bounds.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
         return "\n".join(f"{label}\t{value}" for label, value in lines)
 
@@ -270,8 +270,8 @@ class DegreeGrowth(PrintableResult):
             "eps": "generic" if self.eps is None else format_number(self.eps),
             **attributes(self, "ended", "message", "seed"),
             "lines": [{"prime": str(p), "eps_residue": str(e)} for p, e in lines],
-            **attributes(self, *names, singularities="patterns"),
-            **attributes(self, "enclosure", "proof", "unconfirmed", "notes"),
+            **attributes(self, *names, singularities="patterns", enclosure="dynamical_degree_bounds"),
+            **attributes(self, "proof", "unconfirmed", "notes"),
         }
 
 
@@ -309,7 +309,7 @@ def degree_growth(
         progress: called with a message at each stage.
 
     Returns:
-        A `DegreeGrowth`. Degrees are measured modulo random primes of 61 bits; only `enclosure` and `proof` are proved.
+        A `DegreeGrowth`. Degrees are measured modulo random primes of 61 bits; only bounds and `proof` are proved.
         A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised again.
 
     Raises:
@@ -354,7 +354,7 @@ def dynamical_degree(
     <GrowthRate: 1>
     """
     growth = degree_growth(system, eps, time_step=time_step, h=h, effort=effort, seed=seed)
-    return growth.dynamical_degree or growth.enclosure
+    return growth.dynamical_degree or growth.dynamical_degree_bounds
 
 
 def algebraic_entropy(
@@ -408,7 +408,7 @@ class _Search:
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
             return self.result(ending, message, proof=period_proof or proof)
 
-        rng = random.Random(f"degrees {derive_seed(self.seed, self.map.subject, self.eps)}")
+        rng = random.Random(f"degrees {derive_seed(self.seed, self.map.seed_data, self.eps)}")
 
         def new_line() -> Line:
             while True:
@@ -444,11 +444,11 @@ class _Search:
         if not enclosed or (result.growth is not Growth.EXPONENTIAL and not result.looks_exponential):
             return result
         self.measured = result
-        enclosure = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
-        if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
+        bounds = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
+        if bounds is None and self.map.dim == 2 and self.budget.is_spent:
             note = "work limit reached before bounds of the dynamical degree were proved; raise --effort"
             return replace(result, notes=(*result.notes, note))
-        return replace(result, enclosure=enclosure)
+        return replace(result, dynamical_degree_bounds=bounds)
 
     def result(self, ending: str, message: str, **proofs: Any) -> DegreeGrowth:
         primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)

@@ -172,7 +172,7 @@ def height_survey(
     eps_values = DEFAULT_EPS if eps is None else (rational(eps),)  # rejects invalid text for every map
     for value in eps_values if map_.has_eps else (fmpq(1),):
         map_at_eps = map_.at(value)
-        rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
+        rng = random.Random(f"heights {derive_seed(seed, map_.seed_data, value)}")
         initial_points = (
             [None] * starts
             if isinstance(starts, int)

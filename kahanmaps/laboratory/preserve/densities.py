@@ -77,24 +77,24 @@ class DensitySearch(Search):
 
     `densities` is a basis of all phi of the least degree in which any exist, with two exceptions. If no phi of this
     basis is proved, a known proved phi of another degree comes first. For a Hamiltonian system the list has only
-    det(I - eps f'), whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says why
-    the search stopped before the requested degree, and is empty if it did not stop. `period` is the period of the map,
-    if orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
-    |dx/phi| is invariant.
+    det(I - eps f'), whose degree need not be the least. `degree` is the largest degree that was tried; `stop_reason`
+    says why the search stopped before the requested degree, or is empty. `period` is the period of the map, if orbits
+    close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and |dx/phi|
+    is invariant.
     """
 
     _parts, _noun = "densities", ("density", "densities")
 
     densities: tuple[FoundDensity, ...]
     degree: int
-    cut: str
+    stop_reason: str
     period: int | None = None
     anti_invariant: FoundDensity | None = None
 
     @property
     def shows_none(self) -> bool:
         """Whether all requested degrees were searched and no density of these degrees exists (measured)."""
-        return not self.densities and not self.cut
+        return not self.densities and not self.stop_reason
 
     @property
     def may_use_integrals(self) -> bool:
@@ -107,7 +107,7 @@ class DensitySearch(Search):
         if self.shows_none:
             polynomials_text = f"no polynomial of degree at most {self.degree}"
             return f"{polynomials_text}, and no product of powers of known ones, is a density"
-        return self.cut
+        return self.stop_reason
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
@@ -243,7 +243,7 @@ def densities_of(
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
     result = DensitySearch(*laboratory.request, tuple(densities), degree, reason, period, anti_invariant, flow=flow)
     if result.may_use_integrals:
-        on_result(replace(result, cut=UNFINISHED))
+        on_result(replace(result, stop_reason=UNFINISHED))
         if integrals is None:
             file, symbols, eps, seed, _ = laboratory.request
             integral_search = find_integrals(

@@ -63,7 +63,7 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}  # by dimension
 class OrbitRelations:
     """The space of the polynomials up to a degree that vanish along one orbit; `dimension` is its dimension.
 
-    `independent` is the rank of the monomials on the orbit. `form` is the reduced echelon form of the values of the
+    `rank` is that of the monomials on the orbit. `form` is the reduced echelon form of the values of the
     monomials in `exponents_up_to`. If multiples of leading monomials were left out, `form` has only the other
     monomials, whose relations imply all relations. `leading` are the monomials that depend linearly on earlier ones;
     all multiples of leading monomials are leading. `normals` is a basis of the span of the gradients of the relations
@@ -71,7 +71,7 @@ class OrbitRelations:
     """
 
     form: nmod_mat
-    independent: int
+    rank: int
     dimension: int
     normals: list[list[int]]
     period: int | None
@@ -86,7 +86,7 @@ class OrbitRelations:
     @cached_property
     def vectors(self) -> list[list[int]]:
         """The reduced echelon basis of the relations; it requires that no monomials were left out."""
-        return echelon(kernel(self.form, self.independent), self.form.modulus())
+        return echelon(kernel(self.form, self.rank), self.form.modulus())
 
 
 @dataclass(frozen=True)
@@ -94,18 +94,18 @@ class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
     `codimensions` are the codimensions of the varieties that these polynomials define, and `with_known` is the largest
-    codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. `agree`
-    says whether all maps gave the same numbers. Unless `complete`, `cut` says why not all requested degrees were tried.
+    codimension if the known integrals are added. `period` is the number of points of closed orbits, else None. If
+    `maps_agree`, all maps gave the same numbers. Unless `complete`, `stop_reason` says why some degrees were not tried.
     """
 
     dim: int
     nullities: tuple[int, ...]
     codimensions: tuple[int, ...]
     period: int | None
-    agree: bool
+    maps_agree: bool
     complete: bool
     with_known: int = 0
-    cut: str = ""
+    stop_reason: str = ""
 
     @property
     def codimension(self) -> int:
@@ -130,7 +130,7 @@ class Profile:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         names = ("nullities", "codimensions", "codimension", "period")
-        return attributes(self, *names, maps_agree="agree", complete="complete")
+        return attributes(self, *names, "maps_agree", "complete")
 
 
 def relations_on_orbit(
@@ -182,7 +182,7 @@ def span_of_relations(map_: ModularMap, degree: int, max_dimension: float = inf)
     Orbits are added until two successive ones do not enlarge the span, or its dimension exceeds `max_dimension`.
     """
     first_orbit, unchanged_count = relations_on_orbit(map_, degree), 0
-    basis, rank_bound = first_orbit.vectors, first_orbit.independent
+    basis, rank_bound = first_orbit.vectors, first_orbit.rank
     while basis and unchanged_count < 2 and len(basis) <= max_dimension:
         enlarged_basis = echelon([*basis, *relations_on_orbit(map_, degree, rank_bound).vectors], map_.prime)
         unchanged_count = unchanged_count + 1 if len(enlarged_basis) == len(basis) else 0
@@ -270,19 +270,19 @@ class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
     `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; if not, it
-    is an integral. `agree` says whether all orbits gave this `dimension`. `period` is the period if orbits close.
+    is an integral. If `orbits_agree`, all orbits gave this `dimension`. `period` is the period if orbits close.
     """
 
     functions: tuple[str, ...]
     dimension: int
     constant: tuple[tuple[bool, ...], ...]
-    agree: bool
+    orbits_agree: bool
     period: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         integrals = [[not is_constant for is_constant in row] for row in self.constant]
-        agreement = attributes(self, orbits_agree="agree", period="period")
+        agreement = attributes(self, "orbits_agree", "period")
         return {**attributes(self, "functions", "dimension"), "integrals": integrals, **agreement}
 
 

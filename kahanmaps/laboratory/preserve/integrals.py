@@ -408,7 +408,7 @@ def integrals_of(
         verb = "has" if missing_count == 1 else "have"
         reason = f"{missing_count} of the {result_so_far.codimension} independent integrals {verb} no closed form P/Q"
         reason += f" {space_search.tried}: coefficients of Hirota-Kimura bases are such integrals"
-    reasons = [reason, *([space_search.cut, note] if missing_count > 0 else []), *collection.skipped_searches]
+    reasons = [reason, *([space_search.stop_reason, note] if missing_count > 0 else []), *collection.skipped_searches]
     if map_at_values is not None:
         # At the values of the file, integrals with symbols may become dependent or vanish.
         independent = IndependentGradients(map_at_values)
@@ -422,9 +422,9 @@ def integrals_of(
             values_text = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
             count_text = f"only {rank} of the {len(rows)} formulas {'is' if rank == 1 else 'are'} independent"
             reasons.append(f"at {values_text} {count_text}: without --symbolic others may be found")
-    if profile.cut and (profile.cut == SPENT or max_degree is not None or not profile.is_settled):
-        reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
-    elif not profile.agree:
+    if profile.stop_reason and (profile.stop_reason == SPENT or max_degree is not None or not profile.is_settled):
+        reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.stop_reason}")
+    elif not profile.maps_agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
     return replace(result_so_far, reason="; ".join(filter(None, reasons)))
 

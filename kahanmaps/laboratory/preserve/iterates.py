@@ -173,14 +173,14 @@ def verdict_on_ratio(
 
     scopes = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
     scope = " and ".join([*scopes, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
-    identity_key = (map_.symbols, map_.subject, ratio.text, ratio.numerator, ratio.denominator)
+    identity_key = (map_.symbols, map_.seed_data, ratio.text, ratio.numerator, ratio.denominator)
     identity = Identity(
         n + len(map_.symbols),
         sides,
         eps,
         scope=f"for {scope}" if scope else "",
         has_eps=map_.has_eps,
-        subject=identity_key,
+        seed_data=identity_key,
     )
     return certified(
         identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in too_long)

@@ -38,10 +38,10 @@ def conditions(
         for sweep in sweeps:
             if sweep.on_lines is on_lines and degrees in sweep.classes:
                 unassigned = points_outside(sweep.classes[degrees], components, sweep.prime)
-                min_dimension = 0 if sweep.complete else parameter_count - sweep.width
+                min_dimension = 0 if sweep.complete else parameter_count - sweep.subspace_dimension
                 if unassigned:
                     reductions.append(
-                        find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check)
+                        find_components(unassigned, sweep.prime, sweep.member_count, min_dimension, rng, check)
                     )
         if parameter_count > 1:  # the constant is the last entry of a hyperplane, but the first of other forms
             hypersurfaces = {

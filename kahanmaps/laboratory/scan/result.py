@@ -135,7 +135,7 @@ class Scan(PrintableResult):
         """The lists of sweeps over all members, over random lines of parameter space, and over random planes."""
         return (
             [sweep for sweep in self.sweeps if sweep.complete],
-            *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == k] for k in (1, 2)),
+            *([sweep for sweep in self.sweeps if not sweep.complete and sweep.subspace_dimension == k] for k in (1, 2)),
         )
 
     @property
@@ -143,7 +143,7 @@ class Scan(PrintableResult):
         """The maximal total degree of hypersurfaces with the same degrees of iterates that can be detected."""
         count = len(self.over)
         degrees = [
-            degree_reached(0.75 * min(sweep.measured / sweep.prime for sweep in sweeps), count)
+            degree_reached(0.75 * min(sweep.member_count / sweep.prime for sweep in sweeps), count)
             for sweeps in self._grouped_sweeps
             if len(sweeps) > 2
         ]
@@ -169,7 +169,7 @@ class Scan(PrintableResult):
         phrases = [f"all members with parameters modulo {complete}"] if complete else []
         for k, subspaces, primes in ((1, "lines", lines), (2, "planes", planes)):
             if primes:
-                subspace_count = round(min(sweep.measured / sweep.prime**k for sweep in self._grouped_sweeps[k]))
+                subspace_count = round(min(sweep.member_count / sweep.prime**k for sweep in self._grouped_sweeps[k]))
                 noun = "those" if phrases else "members"
                 phrases.append(f"{noun} on {subspace_count} random {subspaces} of parameter space modulo {primes}")
         small_components = (
@@ -245,12 +245,10 @@ class Scan(PrintableResult):
             count_texts = [f"{n} modulo {sweep.prime}" for n, sweep in pairs if n or len(pairs) <= _MAX_LISTED]
             missed_dimension = 0  # the largest dimension of a variety that has about n points or fewer
             for n, sweep in pairs:
-                dimension = len(self.over) - 1
-                while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (
-                    len(self.over) - dimension
-                ):
-                    dimension -= 1
-                missed_dimension = dimension
+                codimension, dim = 1, len(self.over)
+                while codimension < dim - missed_dimension and n < 0.5 * sweep.member_count / sweep.prime**codimension:
+                    codimension += 1
+                missed_dimension = dim - codimension
             variety_text = "a curve" if missed_dimension == 1 else f"a variety of dimension {missed_dimension}"
             warning = f"; as many as {variety_text} has, so one may have been missed" if missed_dimension else ""
             lines.append(("unassigned", f"special members on no component: {_abbreviate(count_texts)}{warning}"))
@@ -274,7 +272,8 @@ class Scan(PrintableResult):
             "symmetric": [list(images) for images in self.symmetric],
             "sweeps": [
                 {
-                    **attributes(sweep, "prime", "measured", "complete", "width", "false_alarms"),
+                    **attributes(sweep, "prime", measured="member_count", complete="complete"),
+                    **attributes(sweep, width="subspace_dimension", false_alarms="false_alarms"),
                     "special": sum(map(len, sweep.classes.values())),
                     "unassigned": unassigned,
                 }

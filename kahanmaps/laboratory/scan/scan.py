@@ -152,7 +152,7 @@ def scan(
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         primes_text = ", ".join(map(str, primes))
         raise InputError(f"found the primes {primes_text}, expected at least three different ones, from 5 on")
-    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact_eps)}")
+    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.seed_data, exact_eps)}")
     terms, max_polynomial_length, cost = _choose_terms(map_, len(names), exact_eps, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
     max_members = _SWEEP_SHARE * budget.units / cost
@@ -278,7 +278,7 @@ class _ScanRun:
 
         def on_progress(done: int, _: int) -> None:
             self.report(
-                f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.planned_members} members"
+                f"scan: {done + sum(sweep.member_count for sweep in self.sweeps)} of {self.planned_members} members"
             )
 
         for index, (p, subspace_count, dimension) in enumerate(plan):
@@ -311,9 +311,9 @@ class _ScanRun:
         A hypersurface was probably missed if there are as many unassigned members as a hypersurface has points. The
         plan replaces the earlier sweeps over lines. It is empty if none was missed, or if it is too long.
         """
-        sweeps = [sweep for sweep in self.sweeps if sweep.on_lines]
-        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in sweeps]
-        is_missing = any(_count_unassigned(sweep, components) >= 0.5 * sweep.measured / sweep.prime for sweep in sweeps)
+        pairs = [(sweep, sweep.member_count / sweep.prime) for sweep in self.sweeps if sweep.on_lines]
+        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(size), 1) for sweep, size in pairs]
+        is_missing = any(_count_unassigned(sweep, components) >= 0.5 * size for sweep, size in pairs)
         if not is_missing or _count_members(len(self.family.names), plan) > max_members:
             return []
         self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
@@ -327,7 +327,7 @@ class _ScanRun:
         Points were probably missed if there are unassigned members, but fewer than a curve (on random lines: a
         hypersurface) has points. The plan is empty if no points were missed, or if the user gave the primes.
         """
-        pairs = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
+        pairs = ((sweep, sweep.prime if sweep.complete else sweep.member_count / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(
             0 < _count_unassigned(sweep, components) < 0.5 * size for sweep, size in pairs
         ):

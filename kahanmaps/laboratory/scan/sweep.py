@@ -35,23 +35,23 @@ class TimeOver(Exception):
 class Sweep:
     """The special members modulo one prime: `classes` maps degrees d_1, d_2, ... to lists of points.
 
-    `measured` is the number of measured members, and `generic` are the degrees of the generic ones. If not `complete`,
-    only members on random affine subspaces of dimension `width` were measured. `false_alarms` is the number of generic
-    members that looked special on their first line.
+    `member_count` is the number of measured members, and `generic` are the degrees of the generic ones. If not
+    `complete`, only members on random affine subspaces of dimension `subspace_dimension` were measured. `false_alarms`
+    is the number of generic members that looked special on their first line.
     """
 
     prime: int
     generic: Degrees
     classes: dict[Degrees, list[Point]]
-    measured: int
+    member_count: int
     complete: bool
     false_alarms: int
-    width: int = 1
+    subspace_dimension: int = 1
 
     @property
     def on_lines(self) -> bool:
         """Whether only members on random lines were measured; lines rarely meet components other than hypersurfaces."""
-        return not self.complete and self.width == 1
+        return not self.complete and self.subspace_dimension == 1
 
     @property
     def special(self) -> dict[Point, Degrees]:

@@ -104,7 +104,7 @@ class SingularityRun(PrintableResult):
     map_degree: int
     critical_degree: int | None = None
     hypersurfaces: tuple[Hypersurface, ...] = ()
-    stopped: bool = False
+    is_stopped: bool = False
     is_undefined: bool = False
     is_dominant: bool = True
     word: Word | None = None
@@ -116,7 +116,7 @@ class SingularityRun(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return all_fields(self)
+        return all_fields(self, stopped="is_stopped")
 
     @property
     def verdict(self) -> str:
@@ -130,7 +130,7 @@ class SingularityRun(PrintableResult):
         if not self.is_dominant:
             return "not dominant"
         states = {h.status for h in self.hypersurfaces if h.status != NOT_CONTRACTED}
-        if self.stopped or UNDECIDED in states:
+        if self.is_stopped or UNDECIDED in states:
             return UNDECIDED
         if not self.hypersurfaces:
             return "no singularities"
@@ -227,7 +227,7 @@ def singularities(
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _step_limits(map_.dim, steps, budget)
-    map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
+    map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.seed_data, exact_eps)}")
     try:
         if is_long(map_at_eps):
             raise TooLarge("forms that would take long to expand, too long for their determinant")
@@ -250,7 +250,7 @@ def singularities(
                 "maps whose equations are linear in both points, which are treated at random points"
             ) from None
         random_hypersurfaces = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
-        return replace(run, hypersurfaces=random_hypersurfaces, stopped=limits.budget.is_spent)
+        return replace(run, hypersurfaces=random_hypersurfaces, is_stopped=limits.budget.is_spent)
     denominator = map_form.denominator
     # The minors have signs: the last minor of each factor is (-1)^n det(I - eps f'(x)) at Z = 1.
     run = SingularityRun(
@@ -291,16 +291,16 @@ def singularities(
     is_stopped |= limits.budget.is_spent and (
         critical_degree is None or any(h.settled_at is None for h in hypersurfaces)
     )
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_stopped)
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), is_stopped=is_stopped)
 
 
 def _follow_map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: StepLimits, progress: Callable[[str], None]
 ) -> SingularityRun | None:
     """Return the run for a composition whose factors are followed one by one; None if a factor is too large."""
-    rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
+    rng = random.Random(f"map by map {derive_seed(seed, map_.seed_data, run.eps)}")
     result = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), stopped=limits.budget.is_spent)
+    return result and replace(run, word=result[0], hypersurfaces=tuple(result[1]), is_stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -402,7 +402,7 @@ def patterns_of(runs: Sequence[SingularityRun], has_eps: bool = True) -> Pattern
     for run in runs:
         if not run.is_dominant:
             result = _patterns_if_not_dominant(run.eps)
-        elif run.stopped:
+        elif run.is_stopped:
             result = _no_patterns(_STOPPED)
         else:
             result = _merge_patterns(
@@ -446,7 +446,7 @@ def patterns(
             results = set()
             for value, share in zip(values, budgets, strict=True):
                 limits, equations = _step_limits(map_.dim, steps, share), map_.at(value).equations
-                rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
+                rng = random.Random(f"patterns {derive_seed(seed, map_.seed_data, value)}")
                 if not _is_dominant(map_, value):
                     result_at_eps = _patterns_if_not_dominant(value)
                 elif period_of(equations) > 1:
@@ -563,7 +563,7 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
         raise InputError(unsupported_reason)
     if not as_map(system).has_eps:
         return (fmpq(1),)
-    rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).subject)}")
+    rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).seed_data)}")
     first_eps = fmpq(rng.randint(2, 9), 11)
     return first_eps, fmpq(rng.randint(2, 11), 13)
 
@@ -573,7 +573,7 @@ def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
 
     The answer True is proved. False is wrong if the determinant vanishes at all these points, but not identically.
     """
-    rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
+    rng = random.Random(f"dominant {derive_seed(0, map_.seed_data, eps)}")
     for _ in range(_POINTS):
         field = GF(random_prime(rng))  # if det dPhi is not 0 modulo p, it is not 0 over Q
         try:

@@ -420,7 +420,7 @@ def find_commuting(
     """
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}
     map_ = as_map(system)
-    kahan = map_.given if isinstance(map_, AlgebraicMap) else map_
+    kahan = map_.family if isinstance(map_, AlgebraicMap) else map_
     if not isinstance(kahan, KahanFamily) or "eps" in kahan.system.symbols:
         raise InputError(f"found {kahan.kind}, expected a quadratic vector field without eps")
     if not isinstance(map_, AlgebraicMap):

@@ -119,4 +119,4 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Solution
 
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
     identity_key = (f.rhs, coefficients, free_indices)
-    return Identity(n + len(free_indices), sides, None, *labels, subject=identity_key)
+    return Identity(n + len(free_indices), sides, None, *labels, seed_data=identity_key)

@@ -178,7 +178,7 @@ def _candidate_frames(f: QuadraticSystem, search: FixedPointSearch) -> Iterator[
     yield QQ.identity(n)
     normals = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
     yield from itertools.islice(_bases_among(normals, n), MAX_FRAMES)
-    lines = [component for component in search.found if component.dimension == 1 and not component.equations]
+    lines = [component for component in search.fixed_points if component.dimension == 1 and not component.equations]
     directions = [[sum(linear_coefficients(value), fmpq(0)) for value in line.coordinates] for line in lines]
     yield from (columns.transpose().inv() for columns in itertools.islice(_bases_among(directions, n), MAX_FRAMES))
 

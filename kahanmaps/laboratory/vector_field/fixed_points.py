@@ -81,9 +81,9 @@ class FixedPoints(ResultPart):
             eps: an exact number, or None for all but finitely many eps.
 
         >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
-        >>> [points.are_fixed_by_map(fmpq(1)) for points in fixed_points(pendulum).found]
+        >>> [points.are_fixed_by_map(fmpq(1)) for points in fixed_points(pendulum).fixed_points]
         [False, True]
-        >>> line = fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "0"])).found[0]
+        >>> line = fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "0"])).fixed_points[0]
         >>> line.where, line.are_fixed_by_map(None)
         ('line of fixed points (0, y)', None)
         """
@@ -109,30 +109,30 @@ class FixedPoints(ResultPart):
 class FixedPointSearch(ResultPart):
     """All fixed points, rational ones first; `undecided` says why some may be missing (empty: none are missing)."""
 
-    found: tuple[FixedPoints, ...]
+    fixed_points: tuple[FixedPoints, ...]
     undecided: str
 
     @property
     def text(self) -> str:
         """A line for each point or set of points, and a last line for `undecided` if it is not empty."""
-        texts = [points.text for points in self.found] or ["no fixed point"] * (not self.undecided)
+        texts = [points.text for points in self.fixed_points] or ["no fixed point"] * (not self.undecided)
         return "\n".join([*texts, *([f"undecided: {self.undecided}"] if self.undecided else [])])
 
     def __str__(self) -> str:
         return self.text
 
     def __iter__(self) -> Iterator[FixedPoints]:
-        return iter(self.found)
+        return iter(self.fixed_points)
 
     def __len__(self) -> int:
-        return len(self.found)
+        return len(self.fixed_points)
 
     def __getitem__(self, index: int) -> FixedPoints:
-        return self.found[index]
+        return self.fixed_points[index]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return attributes(self, "found", "undecided")
+        return attributes(self, found="fixed_points", undecided="undecided")
 
 
 def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
@@ -144,9 +144,9 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     >>> print(fixed_points(pendulum))
     fixed point (0, 0), eigenvalues of f': (lambda - 1)*(lambda + 1) = 0
     fixed point (1, 0), eigenvalues of f': lambda^2 + 1 = 0
-    >>> [points.where for points in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
+    >>> [points.where for points in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"]))]
     ['fixed point (2, 0)', 'line of fixed points (0, y)']
-    >>> [points.text for points in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
+    >>> [points.text for points in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"]))]
     ["2 fixed points (x) with x^2 - 2 = 0, eigenvalues of f': lambda - 2*x = 0"]
     """
     system = as_system(system)

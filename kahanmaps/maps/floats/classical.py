@@ -263,14 +263,14 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
         if checks.careful:
             for d in correction:
                 if not is_zero(d):
-                    checks.zero = checks.zero | (abs(d) > _STALLED * size)
-            checks.near = True
+                    checks.is_singular = checks.is_singular | (abs(d) > _STALLED * size)
+            checks.is_near_singular = True
         else:
-            checks.good = checks.good & newton_checks.good
+            checks.is_valid = checks.is_valid & newton_checks.is_valid
             # The residuals after the last corrections d_s: h sum_s A_rs Q(d_s, d_s), with the quadratic part Q of f.
             for residual in stage_sums([field(correction[s * n : s * n + n], (2,)) for s in stages]):
                 if not is_zero(residual):
-                    checks.good = checks.good & (abs(residual) <= _ROUNDING * size)
+                    checks.is_valid = checks.is_valid & (abs(residual) <= _ROUNDING * size)
         return [a + _sum(w * z[s * n + i] for s, w in enumerate(weights)) for i, a in enumerate(x)]
 
     return write

@@ -103,7 +103,7 @@ class FloatEnsemble(AttributeHints):
         threads: the number of cores that numba may use (default: all).
         integrals: a dict {name: function}, such as `load(name).integrals`; each function has one point as argument, or
             is a rational function of the variables and eps. Its drift is measured at recorded points.
-        sampled: the number of steps from one sample to the next, for the integrals of the normal form, and for
+        sample_interval: the number of steps from one sample to the next, for the integrals of the normal form, and for
             `integrals` if no points are recorded.
         radius: if given, every step is examined, and for each orbit the first point with max |x_i| > radius is stored.
 
@@ -126,12 +126,12 @@ class FloatEnsemble(AttributeHints):
         kernel: str | None = None,
         threads: int | None = None,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLE_INTERVAL,
+        sample_interval: int = SAMPLE_INTERVAL,
         radius: float | None = None,
     ) -> None:
         epsilon = rational(eps)
-        if sampled < 1:
-            raise InputError(f"found a sample every {sampled} steps, expected at least 1")
+        if sample_interval < 1:
+            raise InputError(f"found a sample every {sample_interval} steps, expected at least 1")
         self.system = as_map(system)
         if isinstance(starts, np.ndarray) and starts.dtype.kind in "fiu":
             self._starts = np.array(starts, dtype=np.float64, order="C")
@@ -178,7 +178,7 @@ class FloatEnsemble(AttributeHints):
             if isinstance(integral, RationalFunction):
                 function = _float_integral(integral, to_float(epsilon))
             self._watched_functions.append(WatchedFunction(name, function, self._starts))
-        self._sample_interval = sampled
+        self._sample_interval = sample_interval
         self._interrupted = False
         self._radius = radius
         self._escaped_at = np.full(self.n, -1)
@@ -231,12 +231,12 @@ class FloatEnsemble(AttributeHints):
     @property
     def near_singular(self) -> NDArray[np.int64]:
         """The number of near-singular steps of each orbit (see steps.py)."""
-        return self._batch.near.copy()
+        return self._batch.near_singular.copy()
 
     @property
     def near_singular_at(self) -> NDArray[np.int64]:
         """The index of the point before the first near-singular step of each orbit; -1 if there was no such step."""
-        return self._batch.near_at.copy()
+        return self._batch.near_singular_at.copy()
 
     @property
     def escaped_at(self) -> NDArray[np.int64]:
@@ -269,9 +269,8 @@ class FloatEnsemble(AttributeHints):
             current_drift[:, self._batch.status != RUNNING] = np.nan
             largest = np.fmax(self._largest_drift, current_drift)
             for r, label in enumerate(self._blocks.labels):
-                initial: NDArray[Any] = (
-                    self._initial_values[r].copy() if r >= self._blocks.reals else self._initial_values[r].real.copy()
-                )
+                values = self._initial_values[r]
+                initial: NDArray[Any] = (values.real if r < self._blocks.real_count else values).copy()
                 drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current_drift[r]))
         return (*drifts, *(function.drift for function in self._watched_functions))
 
@@ -458,7 +457,7 @@ def ensemble(
     kernel: str | None = None,
     threads: int | None = None,
     integrals: Mapping[str, Function] | None = None,
-    sampled: int = SAMPLE_INTERVAL,
+    sample_interval: int = SAMPLE_INTERVAL,
     radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.
@@ -481,15 +480,8 @@ def ensemble(
     options: dict[str, Any] = {"backward": backward, "form": form, "kernel": kernel, "threads": threads}
     epsilon = resolve_eps(eps, time_step, h, floats=True)
     map_ = as_map(system)
-    result = FloatEnsemble(
-        map_,
-        epsilon,
-        start_rows(starts, map_.variables),
-        **options,
-        integrals=integrals,
-        sampled=sampled,
-        radius=radius,
-    )
+    options |= {"integrals": integrals, "sample_interval": sample_interval, "radius": radius}
+    result = FloatEnsemble(map_, epsilon, start_rows(starts, map_.variables), **options)
     if steps:
         result.advance(steps)
     return result

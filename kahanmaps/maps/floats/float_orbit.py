@@ -55,7 +55,7 @@ class FloatOrbit:
         form: the normal form of the system; with it, steps are much faster and lose fewer digits.
         kernel: "numpy" or "numba"; by default numba, if it is installed and more than 20,000 steps are requested.
         every: only the points whose step is a multiple of this number are yielded.
-        integrals, sampled: see FloatEnsemble.
+        integrals, sample_interval: see FloatEnsemble.
 
     Points are computed in portions, ahead of the point yielded. The number of near-singular steps and the drift refer
     to all points computed so far.
@@ -79,7 +79,7 @@ class FloatOrbit:
         kernel: str | None = None,
         every: int = 1,
         integrals: Mapping[str, Function] | None = None,
-        sampled: int = SAMPLE_INTERVAL,
+        sample_interval: int = SAMPLE_INTERVAL,
     ) -> None:
         require_steps(steps)
         require_every(every)
@@ -103,7 +103,7 @@ class FloatOrbit:
             kernel=choose_kernel(kernel, is_long=steps is None or steps > _MIN_COMPILED_STEPS),
             threads=1,
             integrals=integrals,
-            sampled=sampled,
+            sample_interval=sample_interval,
         )
         self._ensemble = self._new_ensemble()
         self._interrupted = False

@@ -46,32 +46,33 @@ class Lyapunov(ResultPart):
     """The Lyapunov exponents of an ensemble of float orbits, largest exponent first.
 
     `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are then per step.
-    `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them. `half`
-    contains the exponents over the first half of the steps, to show how far they have converged. `log_volume` is the
-    mean of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is
-    the number of orbits that overflowed or became singular; they are excluded. `steps` is the number of counted steps,
-    after `transient` uncounted steps; it is smaller than requested if a time limit `stopped` the computation.
+    `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them;
+    `first_half_exponents`, over the first half of the steps, show how far they have converged. `log_volume` is the
+    mean of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. The orbits
+    that overflowed or became singular, `ended_count` of them, are excluded. `steps` is the number of counted steps,
+    after `transient` uncounted steps; it is smaller than requested if `is_stopped`: a time limit ended the computation.
     """
 
     unit: float
     steps: int
     transient: int
     orbits: int
-    ended: int
+    ended_count: int
     exponents: FloatArray
-    half: FloatArray
+    first_half_exponents: FloatArray
     log_volume: FloatArray
-    stopped: bool
+    is_stopped: bool
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return all_fields(self)
+        return all_fields(self, ended="ended_count", half="first_half_exponents", stopped="is_stopped")
 
     @property
     def text(self) -> str:
         """The table of the exponents."""
-        lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
-        lines.append("# exponent\tper unit of time\tper step\tspread\tchange from first half")
+        lines = [f"orbits\t{self.orbits - self.ended_count} of {self.orbits}"]
+        columns = ("# exponent", "per unit of time", "per step", "spread", "change from first half")
+        lines += [f"steps\t{self.steps} after {self.transient}", "\t".join(columns)]
         table = zip(self.mean, self.per_step, self.spread, self.change, strict=True)
         lines += ["\t".join([str(k), *(f"{number:.6g}" for number in row)]) for k, row in enumerate(table, 1)]
         return "\n".join(lines)
@@ -80,8 +81,8 @@ class Lyapunov(ResultPart):
         return self.text
 
     def __repr__(self) -> str:
-        exponents_text = ", ".join(f"{x:.6g}" for x in self.mean)
-        return f"<Lyapunov: {exponents_text} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
+        orbits_text = f"{self.orbits - self.ended_count} of {self.orbits} orbits"
+        return f"<Lyapunov: {', '.join(f'{x:.6g}' for x in self.mean)} per unit of time, {orbits_text}>"
 
     @property
     def mean(self) -> FloatArray:
@@ -101,14 +102,13 @@ class Lyapunov(ResultPart):
     @property
     def change(self) -> FloatArray:
         """The absolute differences between the mean exponents over the first half of the steps and over all steps."""
-        return np.abs(_statistic_over_orbits(np.mean, self.half) - self.mean)
+        return np.abs(_statistic_over_orbits(np.mean, self.first_half_exponents) - self.mean)
 
     @property
     def residual(self) -> float:
         """The maximum over orbits of |sum of exponents - `log_volume`|, normally round-off; NaN if none completed."""
-        return (
-            float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max()) if len(self.exponents) else float("nan")
-        )
+        residuals = np.abs(self.exponents.sum(axis=1) - self.log_volume)
+        return float(residuals.max()) if len(residuals) else float("nan")
 
 
 def _statistic_over_orbits(function: Any, values: FloatArray) -> FloatArray:
@@ -153,7 +153,7 @@ def lyapunov_exponents(
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> oscillator = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> exponents = lyapunov_exponents(oscillator, [1, 0], "1/10", 100)
-    >>> bool(np.abs(exponents.mean).max() < 1e-12), exponents.ended
+    >>> bool(np.abs(exponents.mean).max() < 1e-12), exponents.ended_count
     (True, 0)
     """
     starts, steps = either(starts=starts, x0=x0), integer(either(steps=steps, n=n) or 0, "steps")

@@ -55,7 +55,7 @@ Frame = tuple[list[acb], list[acb]]
 class PlanarBlocks:
     """The planar maps of a normal form at one eps, in doubles.
 
-    The `reals` real blocks come first, sorted by root; then one block for each root with positive imaginary part.
+    The `real_count` real blocks come first, sorted by root; then one block for each root with positive imaginary part.
     `coefficients` has a row (a, b, c, d) of complex numbers for each block. `x_to_state` is the 2m x 2m matrix that
     maps x to the rows of the blocks, and `state_to_x` is its inverse.
 
@@ -63,11 +63,11 @@ class PlanarBlocks:
     >>> from kahanmaps.family.random_members import random_member_with_chi
     >>> from kahanmaps.family.planar import normal_form
     >>> blocks = planar_blocks(normal_form(random_member_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7)), "1/10")
-    >>> blocks.reals, blocks.coefficients.real.tolist(), blocks.labels
+    >>> blocks.real_count, blocks.coefficients.real.tolist(), blocks.labels
     (1, [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]], ('1.25992', '-0.629961+-1.09112i'))
     """
 
-    reals: int
+    real_count: int
     coefficients: NDArray[np.complex128]
     kappa: NDArray[np.complex128]
     x_to_state: FloatArray
@@ -93,11 +93,11 @@ class PlanarBlocks:
         integrals = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
         with np.errstate(all="ignore"):
             for r, (coefficients, kappa) in enumerate(zip(self.coefficients, self.kappa, strict=True)):
-                if r < self.reals:
+                if r < self.real_count:
                     U, V = z[2 * r : 2 * r + 2]
                     (a, b, c, d), kappa = coefficients.real, kappa.real
                 else:
-                    row = 4 * r - 2 * self.reals
+                    row = 4 * r - 2 * self.real_count
                     U, V = z[row] + 1j * z[row + 1], z[row + 2] + 1j * z[row + 3]
                     a, b, c, d = coefficients
                 A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
@@ -180,9 +180,9 @@ class _BallBlocks:
         arrays = [np.array(coefficients), np.array(kappas), np.array(to_state), np.ascontiguousarray(np.array(to_x).T)]
         if not all(np.isfinite(array).all() for array in arrays):
             raise InputError("the normal form exceeds the range of floating-point numbers: use exact arithmetic")
-        reals = sum(1 for root in self.roots if root.imag.is_zero())
+        real_count = sum(1 for root in self.roots if root.imag.is_zero())
         roots = tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots)
-        return PlanarBlocks(reals, arrays[0], arrays[1], arrays[2], arrays[3], roots)
+        return PlanarBlocks(real_count, arrays[0], arrays[1], arrays[2], arrays[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
         """Return for a root: (a, b, c, d); kappa; U and V as forms in x; the columns that express x in U and V."""

@@ -101,7 +101,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
     def write(z: Sequence[Any], checks: StepChecks) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
-            row, is_real = len(image), r < blocks.reals
+            row, is_real = len(image), r < blocks.real_count
             if is_real:
                 U, V = z[row : row + 2]
                 a, b, c, d = coefficients.real.tolist()
@@ -278,15 +278,15 @@ class BatchState(NamedTuple):
     """The states of a batch of n orbits, one per column, and the status of each orbit.
 
     `z` has the shape (rows, n); its columns are 0 for orbits that have ended. `failed_at` is the index of the first
-    iterate that does not exist, `near` the number of near-singular steps, `near_at` the index of the point before the
-    first near-singular step; -1 means none.
+    iterate that does not exist, `near_singular` the number of near-singular steps, `near_singular_at` the index of the
+    point before the first near-singular step; -1 means none.
     """
 
     z: FloatArray
     status: IntArray
     failed_at: IntArray
-    near: IntArray
-    near_at: IntArray
+    near_singular: IntArray
+    near_singular_at: IntArray
 
     @classmethod
     def of(cls, z: FloatArray) -> BatchState:
@@ -302,8 +302,8 @@ class BatchState(NamedTuple):
         self.status[orbits[has_ended]] = np.where(singular[has_ended], SINGULAR, OVERFLOW)
         self.failed_at[orbits[has_ended]] = index + 1
         near_orbits = orbits[near & ~has_ended]
-        self.near_at[near_orbits] = np.where(self.near[near_orbits] == 0, index, self.near_at[near_orbits])
-        self.near[near_orbits] += 1
+        self.near_singular_at[near_orbits[self.near_singular[near_orbits] == 0]] = index
+        self.near_singular[near_orbits] += 1
         return has_ended
 
 

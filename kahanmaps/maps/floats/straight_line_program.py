@@ -258,45 +258,46 @@ def extreme(name: str, x: Any, y: Any) -> Any:
 class StepChecks:
     """The checks on the intermediate numbers of a step.
 
-    For a fast step, `good` is true if the result is valid. For a careful step, `near` is true if a pivot was small,
-    `zero` if a pivot was 0, and `finite` if all numbers were finite.
+    For a fast step, `is_valid` is true if the result is valid. For a careful step, `is_near_singular` is true if a
+    pivot was small, `is_singular` if a pivot was 0, and `is_finite` if all numbers were finite.
     """
 
     def __init__(self, careful: bool) -> None:
         self.careful = careful
-        self.good: Any = True
-        self.near: Any = False
-        self.zero: Any = False
-        self.finite: Any = True
+        self.is_valid: Any = True
+        self.is_near_singular: Any = False
+        self.is_singular: Any = False
+        self.is_finite: Any = True
         self._sum: Any = 0.0
 
     def pivot(self, pivot: Any, threshold: Any) -> None:
         """Check a divisor, which counts as small if its absolute value is at most `threshold`."""
         if isinstance(pivot, float):  # a constant, which is 0 if the matrix is singular at all points
-            self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
+            self.is_singular, self.is_valid = self.is_singular | (pivot == 0.0), self.is_valid & (pivot != 0.0)
             return
         is_large = abs(pivot) > threshold
         if self.careful:
-            self.near, self.zero = self.near | ~is_large, self.zero | pivot.code.emit("eq", pivot, 0.0)
+            self.is_near_singular |= ~is_large
+            self.is_singular |= pivot.code.emit("eq", pivot, 0.0)
         else:
-            self.good = self.good & is_large
+            self.is_valid = self.is_valid & is_large
         self.number(pivot)
 
     def number(self, x: Any) -> None:
         """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each number."""
-        if isinstance(x, Value):
-            if self.careful:
-                self.finite = self.finite & (abs(x) <= LARGEST_DOUBLE)
-            else:
-                self._sum = x + self._sum
+        if isinstance(x, Value) and self.careful:
+            self.is_finite = self.is_finite & (abs(x) <= LARGEST_DOUBLE)
+        elif isinstance(x, Value):
+            self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """Return [good] for a fast step, and [near-singular, singular, overflow] for a careful step."""
+        """Return [valid] for a fast step, and [near-singular, singular, overflow] for a careful step."""
         if not self.careful:
-            return [self.good & (abs(self._sum) <= LARGEST_DOUBLE) if isinstance(self._sum, Value) else self.good]
-        singular = self.zero
-        has_failed = singular | _negation(self.finite)
-        return [self.near & _negation(has_failed), singular, has_failed & _negation(singular)]
+            has_sum = isinstance(self._sum, Value)
+            return [self.is_valid & (abs(self._sum) <= LARGEST_DOUBLE) if has_sum else self.is_valid]
+        is_singular = self.is_singular
+        has_failed = is_singular | _negation(self.is_finite)
+        return [self.is_near_singular & _negation(has_failed), is_singular, has_failed & _negation(is_singular)]
 
 
 def _negation(x: Any) -> Any:
@@ -410,7 +411,8 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
     if not checks.careful:
-        checks.good = checks.good & (smallest_pivot > MIN_PIVOT_RATIO * entry_bound()) & (largest_factor <= MAX_FACTOR)
+        checks.is_valid &= smallest_pivot > MIN_PIVOT_RATIO * entry_bound()
+        checks.is_valid &= largest_factor <= MAX_FACTOR
     solution: list[Any] = [0.0] * n
     for (i, j), inverse in zip(reversed(pivots), reversed(inverses), strict=True):
         solution[j] = M[i][n] * inverse

@@ -152,7 +152,7 @@ class AlgebraBlock(LevelBlock):
         return residue
 
     @staticmethod
-    def same(P: Triple, Q: Triple) -> bool:
+    def is_same_point(P: Triple, Q: Triple) -> bool:
         """Return whether two triples are the same point."""
         return same_point(P, Q)
 
@@ -209,7 +209,7 @@ class ShortElements:
 
     @staticmethod
     def prepared_divisor(value: EtaleElement) -> EtaleElement:
-        """Return 1/value, by which `difference` and `combined` multiply instead of dividing."""
+        """Return 1/value, by which `difference` and `combine` multiply instead of dividing."""
         return 1 / value
 
     def difference(
@@ -232,7 +232,7 @@ class ShortElements:
         rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]
         return fmpq_mat(rows).numer_denom()
 
-    def combined(
+    def combine(
         self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
         """Return the triple of the sum of scale * term * lift, times `inverse`, in lowest terms without denominator.

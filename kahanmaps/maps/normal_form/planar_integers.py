@@ -144,7 +144,7 @@ class IntegerBlock(LevelBlock):
         return None if value == 0 else value
 
     @staticmethod
-    def same(P: IntegerTriple, Q: IntegerTriple) -> bool:
+    def is_same_point(P: IntegerTriple, Q: IntegerTriple) -> bool:
         """Return whether two primitive triples are the same point."""
         return P[2] in (Q[2], -Q[2]) and tuple(P) in (tuple(Q), tuple(-entry for entry in Q))
 
@@ -171,7 +171,7 @@ class PlaneIntegers(Integers):
         """Multiply triples of rational numbers by a common denominator."""
         return _clear_denominators(points)
 
-    def combined(
+    def combine(
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
         """Return the primitive triple of the sum of scale * term * lift; `divisor` divides the sum."""

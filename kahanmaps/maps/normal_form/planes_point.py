@@ -124,7 +124,7 @@ class PlanesPoint:
         `bits` differs by a few bits, but is much too large if denominators of planes have common factors.
         """
         if self._height is None:
-            numerators, denominator = self.common()
+            numerators, denominator = self.over_common_denominator()
             largest = max(map(abs, [*numerators, denominator]))
             self._height = int((largest // content([denominator, *numerators])).bit_length())
         return self._height
@@ -139,13 +139,13 @@ class PlanesPoint:
         if not isinstance(other, PlanesPoint):
             return NotImplemented
         pairs = zip(self._assembly.blocks, self.triples, other.triples, strict=True)
-        return all(block.same(P, Q) for block, P, Q in pairs)
+        return all(block.is_same_point(P, Q) for block, P, Q in pairs)
 
     def __hash__(self) -> int:
         # Triples over an extension field are not unique.
         return hash(tuple(abs(W) for _, _, W in self.triples if isinstance(W, fmpz)))
 
-    def common(self) -> tuple[list[fmpz], fmpz]:
+    def over_common_denominator(self) -> tuple[list[fmpz], fmpz]:
         """Return the numerators of all coordinates and a common denominator; common factors of the W_i remain."""
         column, product = _scale_to_common_denominator([(numerators, W) for numerators, W, _ in self._fractions])
         return (self._assembly.forms * column).entries(), self._assembly.denominator * product

@@ -143,5 +143,5 @@ class TauTable:
         # The scales, divided by the scale of the first term.
         ratio = chi.mixed_quotient(n)
         scales = [self._one, chi.own_quotient(n) / ratio, ratio / psi.own_quotient(n)]
-        point: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
+        point: Triple = self._numbers.combine(scales, terms, self._lifts, self._divisor)
         return point

@@ -452,7 +452,7 @@ class Trajectory(HtmlDisplay):
         header = {
             "system": name,
             "variables": list(self.variables),
-            **request.map.written(),
+            **request.map.to_record(),
             **({} if isinstance(request.map, Map) else eps_record(request.eps, request.map)),
             "arithmetic": str(self.arithmetic),
             "method": self.method,

@@ -283,7 +283,7 @@ def _cell(function: ClaimFunction, name: str, is_true: bool) -> ClaimFunction:
     return cell
 
 
-for _function, _statement, _breaks, _fields, _signs in STATEMENTS:
+for _function, _statement, _controls, _fields, _signs in STATEMENTS:
     for (_name, _variation), _sign in zip(VARIATIONS.items(), _signs, strict=True):
         if _sign == " ":
             continue
@@ -294,8 +294,8 @@ for _function, _statement, _breaks, _fields, _signs in STATEMENTS:
         _options["least_m"] = max(_variation.least_m, _fields.get("least_m", 1), 3 if _needs_g else 1)
         if _sign == "+":
             _claim_function.__doc__ = f"{_title}\n{_statement}"
-            _options |= {"breaks": _breaks, "symplectic": not _variation.theorem, "theorem": _variation.theorem}
+            _options |= {"controls": _controls, "symplectic": not _variation.theorem, "theorem": _variation.theorem}
         else:
             _claim_function.__doc__ = f"{_title}\nnot {_statement}"
-            _options |= {"breaks": "unvaried", "kind": ClaimKind.DIFFERENT, "in_general": True}
+            _options |= {"controls": "unvaried", "kind": ClaimKind.DIFFERENT, "in_general": True}
         claim(_variation.title, "", **_options)(_claim_function)

@@ -62,7 +62,7 @@ def level_curves(
     def fraction_at(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         full_points = np.zeros((*points.shape[:-1], dim))
         full_points[..., list(plane)] = points
-        return function.parts(full_points)
+        return function.numerator_and_denominator(full_points)
 
     fraction_on_grid = fraction_at(_grid(window)[-1])
     curves = []

@@ -351,8 +351,8 @@ class SpaceSearch:
     """The result of a search on one map: a list of spaces for each step.
 
     The steps of kind "cofactor" refer to products of the `cofactors`; for these, polynomials up to `cofactor_degree`
-    were tried. `searched` lists the degrees in which the span of the relations along orbits was searched. `cut` says
-    which cofactors were left out because the budget was spent.
+    were tried. `searched` lists the degrees in which the span of the relations along orbits was searched. `stop_reason`
+    says which cofactors were left out because the budget was spent.
     """
 
     steps: list[SearchStep] = field(default_factory=list)
@@ -360,7 +360,7 @@ class SpaceSearch:
     cofactors: Sequence[Cofactor] = ()
     cofactor_degree: int = 0
     searched: list[int] = field(default_factory=list)
-    cut: str = ""
+    stop_reason: str = ""
 
     @property
     def all_spaces(self) -> list[DarbouxSpace]:
@@ -422,7 +422,7 @@ def search_cofactors(
             break
         message = f"polynomials of degree {degree} and more with known cofactors were not all tried: {SPENT}"
         if budget.is_spent:
-            return replace(result, cut=message)
+            return replace(result, stop_reason=message)
         orbit = relations_on_orbit(map_, degree)
         relations, indices = orbit.vectors, monomial_index(dim, degree)
         if relations:
@@ -450,7 +450,7 @@ def search_cofactors(
                 break
             work += point_count**2
             if work > _MAX_WORK or budget.is_spent:
-                return replace(result, cut=message) if budget.is_spent else result
+                return replace(result, stop_reason=message) if budget.is_spent else result
             count_work(point_count * len(relations) / 3)
             # The equations are b P(x~) = a P(x), where a/b is the value of the cofactor at the point x.
             fractions = sample.values(product, point_count)
@@ -486,7 +486,7 @@ def search_cofactors(
         work += 3 * points_needed(dim, degree) ** 2
         if budget.is_spent:
             message = f"polynomials of degree {degree} and more with known cofactors up to numbers were not all tried"
-            return replace(result, cut=f"{message}: {SPENT}")
+            return replace(result, stop_reason=f"{message}: {SPENT}")
         if work > 2 * _MAX_WORK:
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominator_cofactors)))

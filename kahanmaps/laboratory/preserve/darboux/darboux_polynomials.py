@@ -271,8 +271,8 @@ def _find_formulas(
             return [lhs], [rhs]
 
         powers = [(cofactor.polynomial, k) for cofactor, k in zip(cofactors, product.powers, strict=True)]
-        identity_key = (map_.symbols, map_.subject, P, factor, powers)
-        identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=identity_key)
+        identity_key = (map_.symbols, map_.seed_data, P, factor, powers)
+        identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, seed_data=identity_key)
         return certified(identity, laboratory.seed)[0]
 
     verdicts = [certify_cofactor(P) for P in polynomials]

@@ -124,7 +124,7 @@ class FlowAndMap:
     def lost(self) -> int:
         """A lower bound (measured) of the number of `other_integrals` that are not limits of integrals of the map."""
         profile = self.map_search.profile
-        return max(0, len(self.other_integrals) - self.without_limit) if profile.nullities and profile.agree else 0
+        return max(0, len(self.other_integrals) - self.without_limit) if profile.nullities and profile.maps_agree else 0
 
     def __str__(self) -> str:
         return "\n".join("\t".join(line) for line in self.lines())
@@ -160,7 +160,7 @@ class FlowAndMap:
             other_text = "other " * bool(self.limits or self.other_integrals)
             scope = f"relations along solutions up to degree {self.search.profile.degree}"
             statements.append(("measured", f"no {other_text}rational integral of the flow shows in {scope}"))
-        if self.search is not None and self.search.profile.cut == SPENT:
+        if self.search is not None and self.search.profile.stop_reason == SPENT:
             scope = f"relations of degree {self.search.profile.degree + 1} and more along solutions were not tried"
             statements.append(("undecided", f"of the flow: {scope}: {SPENT}"))
         if self.density is not None:

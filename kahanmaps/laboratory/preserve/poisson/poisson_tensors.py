@@ -514,9 +514,9 @@ def _involution(
                     brackets += [(gradients[j].transpose() * hamiltonian_field)[0, 0] for j in range(k)]
         return brackets, [field.zero] * len(brackets)
 
-    identity_key = ("brackets", tensor.subject, list(functions), of_variables)
+    identity_key = ("brackets", tensor.seed_data, list(functions), of_variables)
     has_eps = laboratory.map.has_eps or tensor.has_eps
-    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=identity_key)
+    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, seed_data=identity_key)
 
 
 def _generic_combination(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
