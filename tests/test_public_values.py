@@ -61,6 +61,14 @@ def test_systems_maps_and_orbits_are_copied_and_pickled(again):
     for name in ("lorenz", "paper_m3", "lyness", "henon_heiles", "lv(5,1)"):
         file = km.load(name)
         assert again(file) == file
+    for reference in (
+        "lyness",
+        "lotka_volterra_symplectic_euler",
+        km.load("lotka_volterra", a="root of t^2 - 2 near 1.4"),
+    ):
+        phi = km.map(reference, "1/5")
+        assert (again(phi), again(phi.inverse)) == (phi, phi.inverse)
+        assert again(phi.inverse)(phi([2, 3])) == phi.point([2, 3])
     phi = km.map(FISH, "1/5")
     assert again(phi @ phi) == phi**2
     assert again(phi).field is phi.field

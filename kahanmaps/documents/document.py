@@ -60,6 +60,13 @@ _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamil
 Values = dict[str, RationalFunction]
 
 
+def _map_at(reader: DocumentReader, parameter: str, value: fmpq) -> MapFamily:
+    """Return the map in the document of a reader, with a rational approximation in place of an algebraic number."""
+    overrides = {**reader.overrides, parameter: value}
+    parsed_map: MapFamily = DocumentReader(reader.document, reader.where, overrides, reader.look_up).read()["map"]
+    return parsed_map
+
+
 class _Part(NamedTuple):
     """A part of a composition: its map, the exponent, functions for the symbols of the map, and its table in TOML."""
 
@@ -167,14 +174,7 @@ class DocumentReader(PartReader):
         elif map_ is not None:
             if self.root is not None:
                 parameter, root = self.root
-
-                def map_at(value: fmpq) -> MapFamily:  # `value` approximates the algebraic number
-                    overrides = {**self.overrides, parameter: value}
-                    reader = DocumentReader(self.document, self.where, overrides, self.look_up)
-                    parsed_map: MapFamily = reader.read()["map"]
-                    return parsed_map
-
-                map_ = AlgebraicMap(map_, root, map_at)
+                map_ = AlgebraicMap(map_, root, partial(_map_at, self, parameter))
             self.variables = map_.variables  # a polarised map has more variables than the system in the file
             for name in set(self.variables) & set(self.parameters):
                 self._report(f"parameters.{name}", "is a variable of the map as well, expected distinct names")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from kahanmaps.algebra.fields import QQ, Field
@@ -14,7 +15,8 @@ from kahanmaps.maps.implicit import Map, MapFamily
 class AlgebraicMap(MapFamily):
     """The map `family` with `root` as the value of its only symbol (if any); g is the minimal polynomial of `root`.
 
-    By default, `at` returns the map over Q[t]/g. `at_number` returns the map for a rational value of the symbol.
+    By default, `at` returns the map over Q[t]/g. `at_number` returns the map for a rational value of the symbol; it is
+    pickled with the map, so it must not be a lambda.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
@@ -78,10 +80,14 @@ class AlgebraicMap(MapFamily):
         return f"AlgebraicMap({self.family!r}, {self._root_name} = {self.root})"
 
 
+def _without_number(map_: MapFamily, _: Any) -> MapFamily:
+    return map_
+
+
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:
     """Return the map over Q[t]/g, where `root` is a root of g. Raises InputError if the map contains another root."""
     if map_.root is None:
-        return AlgebraicMap(map_, root, lambda _: map_)
+        return AlgebraicMap(map_, root, partial(_without_number, map_))
     if map_.root != root:
         raise InputError(
             f"found a {map_.root} in the map and a {root} in the point, expected the same algebraic number"

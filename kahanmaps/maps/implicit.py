@@ -22,9 +22,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from importlib import import_module
-from operator import mul
+from operator import attrgetter, mul
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -247,8 +247,9 @@ class Map(LatexDisplay):
 class ElementaryMap(Map):
     """The map of one equation M(x) x~ = r(x) over a field.
 
-    `backward` is a function that returns the equation of the inverse. If it is None, the equation must have degree 1;
-    x and x~ are then exchanged. KahanMap has faster methods for M, r and N (see `numerator_matrix`).
+    `backward` is a function that returns the equation of the inverse, no lambda: maps are pickled. If it is None, the
+    equation must have degree 1; x and x~ are then exchanged. KahanMap has faster methods for M, r and N (see
+    `numerator_matrix`).
     """
 
     def __init__(
@@ -281,7 +282,7 @@ class ElementaryMap(Map):
     def inverse(self) -> ElementaryMap:
         """The inverse map. Raises InputError if the inverse is not known."""
         backward = self._equation.transposed() if self._backward is None else self._backward()
-        inverse = ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
+        inverse = ElementaryMap(backward, self.eps, partial(attrgetter("equation"), self), self.variables)
         inverse.has_eps = self.has_eps
         return inverse
 
@@ -560,11 +561,14 @@ class ImplicitMap(MapFamily):
         point = (*values, eps_element)
         equation = equation_of(self.rows, over, point)
         needs_inverse_rows = self.backward is not None or equation.degree > 1
-        backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
+        backward = partial(self._inverse_equation, over, point) if needs_inverse_rows else None
         map_at_eps = ElementaryMap(equation, eps_element, backward, self.variables)
         map_at_eps.has_eps = self.has_eps
         self._cached_maps[:] = [] if values else [(over, eps_element, map_at_eps)]  # maps with symbols are not cached
         return map_at_eps
+
+    def _inverse_equation(self, over: Field, point: Sequence[Any]) -> Equation:
+        return equation_of(self.inverse_rows, over, point)
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
