@@ -217,12 +217,17 @@ def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]]
 
 
 def table(path: Path) -> dict[str, list[str]]:
-    """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines."""
+    """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines.
+
+    A line that begins with two blanks continues the one before.
+    """
     result: dict[str, list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         line = "" if line.startswith("# ") else line.partition("  # ")[0]
         if line.startswith("== "):
             lines = result.setdefault(line.removeprefix("== "), [])
+        elif line.startswith("  "):
+            lines[-1] += line[1:]
         elif line:
             lines.append(line)
     return result
