@@ -27,12 +27,13 @@ for number, handler in [
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)
 
-THOROUGH = frozenset((Path(__file__).parent / "thorough.txt").read_text(encoding="utf-8").splitlines())
+ENTRIES = [line.split(" => ") for line in (Path(__file__).parent / "thorough.txt").read_text("utf-8").splitlines()]
+THOROUGH = {f"{test}[{case}]" for test, *cases in ENTRIES for case in cases} | {e[0] for e in ENTRIES if len(e) == 1}
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark as slow the tests and cases that thorough.txt names: their subjects have quicker tests as well.
+    """Mark as slow the tests of thorough.txt, or the cases behind ` => `: their subjects have quicker tests as well.
 
     Public functions that were used before sessions are collected are found in `kahanmaps` as well as in their files,
     where the names of their sessions are known.

@@ -5,10 +5,12 @@ Strategies draw plain data, so that hypothesis can shrink a failure to something
 
 import ast
 import random
+import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import cache, wraps
 from inspect import signature
+from operator import add
 from pathlib import Path
 from typing import Any
 
@@ -217,15 +219,27 @@ def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]]
 
 
 def table(path: Path) -> dict[str, list[str]]:
-    """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines."""
+    """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines.
+
+    A line that begins with two blanks continues the one before. Braces `{A|B}` make two lines of one, with A and with
+    B; if a line has several of them, all take their first part in the first line, and so on.
+    """
     result: dict[str, list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         line = "" if line.startswith("# ") else line.partition("  # ")[0]
         if line.startswith("== "):
             lines = result.setdefault(line.removeprefix("== "), [])
+        elif line.startswith("  "):
+            lines[-1] += line[1:]
         elif line:
             lines.append(line)
-    return result
+    return {name: [each for line in lines for each in _alternatives(line)] for name, lines in result.items()}
+
+
+def _alternatives(line: str) -> list[str]:
+    fixed, *rest = re.split(r"\{([^{}]*\|[^{}]*)\}", line)
+    choices = zip(*(part.split("|") for part in rest[::2]), strict=True)
+    return [fixed + "".join(map(add, choice, rest[1::2])) for choice in choices] or [line]
 
 
 def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:

@@ -7,14 +7,17 @@ Formulas are read here by Python with fractions, not by the library that wrote t
 import ast
 import operator
 import random
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from flint import fmpq, fmpz_poly, nmod_poly
+from helpers import table
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import rank
@@ -23,6 +26,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.inline import System
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -34,7 +38,19 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
+FURTHER = table(Path(__file__).parent / "laboratory" / "further_systems.txt")
+DEGENERATE = table(Path(__file__).parent / "laboratory" / "degenerate_systems.txt")
 OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+
+
+@cache
+def file_of(name: str) -> SystemFile:
+    """A system of further_systems.txt, of degenerate_systems.txt, or else of the catalogue."""
+    equations = (FURTHER | DEGENERATE).get(name, [""])[0]
+    hamiltonian = re.fullmatch(r"H\((.*)\) = (.*)", equations)
+    if hamiltonian is not None:
+        return System(hamiltonian=hamiltonian[2], variables=hamiltonian[1])
+    return System(equations) if equations else load(name)
 
 
 @cache

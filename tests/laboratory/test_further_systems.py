@@ -1,48 +1,54 @@
 """Systems of the catalogue and beyond, analysed blind and compared with answers that were found without this library.
 
-further_systems/ has the right-hand sides, answers.json what is known of their Kahan maps for generic eps. Integrals and
-densities of the answers are tried here on exact orbits first, by the arithmetic of the tests; then `analyze` has to
-give the same. The systems in degenerate/ are linear, constant, one-dimensional, or special at some eps.
+Integrals and densities of further_systems.txt and degenerate_systems.txt are tried here on exact orbits first, by the
+arithmetic of the tests; then `analyze` has to give what stands there.
 """
 
-import json
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from itertools import islice
-from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from check_helpers import determinant, function_value, kahan_jacobian, kahan_step, modified_value, slope, unit
 from helpers import fraction, together
-from search_helpers import Answer, differences, ranks, residues_of, verdict_of
+from search_helpers import DEGENERATE, FURTHER, Answer, differences, file_of, ranks, residues_of, verdict_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import SystemFile, read_system
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
 
-FOLDER = Path(__file__).parent / "further_systems"
-FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))
-DEGENERATE = json.loads((FOLDER / "degenerate" / "answers.json").read_text(encoding="utf-8"))
-KNOWN = FURTHER | DEGENERATE
+
+def known_of(growth_and_degrees, *more):
+    """What is known of a Kahan map, from the lines below its equations."""
+    growth, degrees = growth_and_degrees.split(": ")
+    more = {key: rest.split("; ") for key, _, rest in (line.partition(" ") for line in more)}
+    assert set(more) <= {"integrals", "density", "at"}
+    is_slow = growth in ("bounded", "linear", "quadratic")
+    return SimpleNamespace(
+        growth=growth if is_slow else "exponential",
+        dynamical_degree="x - 1" if is_slow else growth,
+        degrees=tuple(map(int, degrees.split(", "))),
+        integrals=more.get("integrals", []),
+        density=more.get("density", [None])[0],
+        at=dict(entry.split(": ") for entry in more.get("at", [])),
+    )
+
+
+KNOWN = {name: known_of(*lines) for name, (_, *lines) in (FURTHER | DEGENERATE).items()}
 MODIFIED, DETERMINANT = "modified Hamiltonian", "determinant"  # of theorems, for which no formula is written out
 
 # Analysed in less than half a second.
-FAST = ("nahm_icosahedral", "suslov_pencil", "riccati_pair", "gauss_skew", "volterra_open_3")
+FAST = ("suslov_pencil", "riccati_pair", "gauss_skew", "volterra_open_3")
 FAST = (*FAST, "rabinovich_conservative", "zander_11m1_lines", "zander_112_affine")
 BOUNDED = ("hamiltonian_6_generic",)  # has a test of its own
 EPS = ("1/10", "-2/7")
-
-
-@cache
-def file_of(name):
-    folder = FOLDER / "degenerate" if name in DEGENERATE else FOLDER
-    return read_system(folder / f"{name}.toml")
 
 
 @cache
@@ -61,7 +67,7 @@ def function(file, text):
 
 def formulas(name):
     """The integrals of the answer that are written out, as functions of the variables and eps."""
-    return tuple(parsed(name, text) for text in KNOWN[name]["integrals"] if text != MODIFIED)
+    return tuple(parsed(name, text) for text in KNOWN[name].integrals if text != MODIFIED)
 
 
 def denominator_of(map_: ModularMap, x):
@@ -71,20 +77,19 @@ def denominator_of(map_: ModularMap, x):
 
 def answer_for(name):
     known = KNOWN[name]
-    density = known["density"]
-    if density == DETERMINANT:
+    if known.density == DETERMINANT:
         value = denominator_of
     else:
-        value = None if density is None else residues_of(parsed(name, density))
+        value = None if known.density is None else residues_of(parsed(name, known.density))
     return Answer(
-        known["independent_integrals"],
-        known["growth"],
-        tuple(known["degrees"]),
-        known["dynamical_degree"],
+        len(known.integrals),
+        known.growth,
+        known.degrees,
+        known.dynamical_degree,
         formulas(name),
         value,
-        density is None,
-        verdict_of(known["growth"]),
+        known.density is None,
+        verdict_of(known.growth),
     )
 
 
@@ -114,22 +119,20 @@ def slow_unless(names, fast):
     return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in names]
 
 
-@pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 2]))
+@pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if file_of(name).dim <= 2]))
 def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
     file, known = file_of(name), KNOWN[name]
-    compared, seen = 0, [set() for _ in known["integrals"]]
+    compared, seen = 0, [set() for _ in known.integrals]
     for eps, points in orbits(file):
-        rows = [[value_at(text, name, x, eps) for x in points] for text in known["integrals"]]
+        rows = [[value_at(text, name, x, eps) for x in points] for text in known.integrals]
         x, image = points[:2]
-        before, after = (
-            (1, 1) if known["density"] is None else (value_at(known["density"], name, y, eps) for y in (x, image))
-        )
+        before, after = (1 if known.density is None else value_at(known.density, name, y, eps) for y in (x, image))
         if before == 0 or any(None in row for row in rows):
             continue  # a point on an invariant line, or a pole of an integral
         for values, row in zip(seen, rows, strict=True):
             assert len(set(row)) == 1
             values |= set(row)
-        assert known["density"] is None or after == determinant(kahan_jacobian(file.system, eps, x)) * before
+        assert known.density is None or after == determinant(kahan_jacobian(file.system, eps, x)) * before
         compared += 1
     assert compared >= 4
     assert all(len(values) > 1 for values in seen)  # no constants
@@ -139,7 +142,7 @@ def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
 def test_the_answers_count_their_independent_integrals(name):
     known = KNOWN[name]
     _, rank, _ = ranks([], formulas(name), Laboratory(file_of(name)).maps[0])
-    assert rank + (MODIFIED in known["integrals"]) == known["independent_integrals"] <= known["dim"]
+    assert rank + (MODIFIED in known.integrals) == len(known.integrals) <= file_of(name).dim
 
 
 @pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
@@ -152,29 +155,29 @@ def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
     analysis = analyze(file_of(name))
     assert differences(analysis, replace(answer_for(name), verdict=None), 4) == set()
     affine = all(int(p.total_degree()) <= 1 for p in analysis.file.system.rhs)
-    growth = KNOWN[name]["growth"]
-    assert analysis.conclusion.kind == ("linear" if affine else verdict_of(growth))
+    assert analysis.conclusion.kind == ("linear" if affine else verdict_of(KNOWN[name].growth))
     assert analysis.skipped == []
 
 
-SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["at_special_eps"]]
+SPECIAL = [(name, eps) for name, known in KNOWN.items() for eps in known.at]
 
 
 @pytest.mark.parametrize(("name", "eps"), SPECIAL)
 def test_special_eps(name, eps):
-    file, special = file_of(name), DEGENERATE[name]["at_special_eps"][eps]
+    file, special = file_of(name), KNOWN[name].at[eps]
     analysis = analyze(file, eps=eps)
     assert f"All this holds at eps = {eps}; other eps may differ." in analysis.conclusion.sentence
-    if "period" in special:
-        assert analysis.integrals.profile.period == special["period"]
-        is_proved = f"Phi^{special['period']} is the identity (proved)" in analysis.conclusion.sentence
+    if special.startswith("period "):
+        period = int(special.removeprefix("period "))
+        assert analysis.integrals.profile.period == period
+        is_proved = f"Phi^{period} is the identity (proved)" in analysis.conclusion.sentence
         assert is_proved or analysis.conclusion.kind == "linear"
         assert analysis.conclusion.integrals == file.system.dim
         return
     assert analysis.integrals.integrals == analysis.densities.densities == ()
-    defect = {"no value": "is defined nowhere", "not invertible": "is not invertible"}[special["defect"]]
+    defect = {"no value": "is defined nowhere", "not invertible": "is not invertible"}[special]
     assert defect in analysis.integrals.reason
-    if special["defect"] == "no value":
+    if special == "no value":
         assert analysis.conclusion.kind == "singular"
 
 

@@ -3,17 +3,15 @@ close; relations with few terms hold on exact orbits, and tell numbers, eps and 
 
 from fractions import Fraction
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from check_helpers import kahan_step
 from flint import fmpq, fmpq_mat
 from helpers import fraction, quick
-from search_helpers import system, value_of
+from search_helpers import file_of, system, value_of
 
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import read_system
 from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import (
@@ -86,8 +84,6 @@ def test_which_coefficients_are_integrals():
     assert basis.to_json()["integrals"] == [[not same for same in row] for row in basis.constant]
 
 
-FURTHER = Path(__file__).parent / "further_systems"
-
 # Of the literature: the Euler top has (x1^2 - a x3^2) and (x2^2 - b x3^2) with integrals a, b; sums of open and closed
 # chains are constant; the Casimir functions of the tops in their Hirota-Kimura form.
 WRITTEN = [
@@ -97,11 +93,6 @@ WRITTEN = [
     ("ishii", 2, ["x^2 - eps^2*y^2 - 1/6*z + c1 = 0", "x*z - 3/2*y^2 + 1/2*eps^2*z^2 + c2*x + c3 = 0"]),
     ("lorenz", 3, []),
 ]
-
-
-def file_of(name):
-    path = FURTHER / f"{name}.toml"
-    return read_system(path) if path.exists() else load(name)
 
 
 def relations_of(name, degree, eps=None, **more):

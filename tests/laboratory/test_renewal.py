@@ -6,13 +6,13 @@ Compositions that are too long to be multiplied out are followed map by map.
 import random
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpz_poly
 from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
+from search_helpers import file_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.work import Budget
@@ -38,7 +38,6 @@ def derived(name):
 
 WRITTEN = [name for name in (*names(), *map_names()) if DIMENSION[name] <= 4]
 DAILY = ["riccati", "weierstrass", "euler_top", "mcmillan", "hietarinta_viallet"]
-FURTHER = Path(__file__).parent / "further_systems"
 # In these several contracted hypersurfaces are zeros of one form over Q: the degrees of all of them.
 OF_ONE_FORM = {
     "clebsch_first_flow": [1, 5, 8, 18],
@@ -46,7 +45,7 @@ OF_ONE_FORM = {
     "lagrange_top": [1, 4, 4, 8],
     "so4_euler_manakov": [5, 10, 20],
     "three_wave": [10, 15],
-    str(FURTHER / "coupled_euler_tops.toml"): [8, 16],  # 8 + 8, each of which splits over a field of degree 2
+    "coupled_euler_tops": [8, 16],  # 8 + 8, each of which splits over a field of degree 2
 }
 
 
@@ -61,10 +60,10 @@ def test_the_degrees_of_the_catalogue_are_derived(name):
 
 @pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
 def test_hypersurfaces_of_one_form_are_told_apart_and_derive_degrees(name):
-    result = patterns(load(name).map, fmpq(2, 7))
+    result = patterns(file_of(name).map, fmpq(2, 7))
     sizes = [h.degree for h in result.exceptional]
     assert sorted(sizes) == OF_ONE_FORM[name]
-    measured = degree_growth(load(name).map, max_terms=6, patterns=result)
+    measured = degree_growth(file_of(name).map, max_terms=6, patterns=result)
     assert measured.derived is not None
     # Each degree counts: with another one in its place the degrees of the map are other ones.
     every = [h.orbit_data for h in result.exceptional]

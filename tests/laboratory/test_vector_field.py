@@ -1,16 +1,15 @@
 """What a vector field tells by itself: fixed points, which are those of the map, and systems of the catalogue in it."""
 
 import random
-from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import THOROUGH
-from search_helpers import random_system
+from search_helpers import file_of, random_system
 
 from kahanmaps import KahanMap, System
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, read_system
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
@@ -146,7 +145,7 @@ def test_a_near_miss_is_no_equivalence():
     assert not holds(bad, equivalence)
 
 
-GENERIC = [random_system(3, 1), read_system(Path(__file__).parent / "further_systems" / "hamiltonian_6_generic.toml")]
+GENERIC = [random_system(3, 1), file_of("hamiltonian_6_generic")]
 
 
 @pytest.mark.parametrize("file", [GENERIC[0], pytest.param(GENERIC[1], marks=THOROUGH)], ids=["3", "6"])
