@@ -4,8 +4,6 @@ what was asked before change no byte. An analysis alone finds no less than `anal
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from helpers import quick
@@ -122,7 +120,7 @@ def test_work_that_is_not_the_search_is_not_charged_to_it():
     assert len(less.degrees) < len(complete.degrees)
 
 
-ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
+ALONE = [
     ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
     ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),
     ("poisson", lambda name: find_poisson(load(name)), lambda found: [one.text for one in found.tensors]),
@@ -133,13 +131,10 @@ ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
 
 
 @pytest.mark.parametrize(
-    "name",
-    quick(["euler_top", "lotka_volterra", "volterra_periodic_3", "weierstrass"], ["euler_top"]),
+    "name", quick(["euler_top", "lotka_volterra", "volterra_periodic_3", "weierstrass"], ["euler_top"])
 )
 @pytest.mark.parametrize(("result", "search", "texts"), ALONE, ids=[row[0] for row in ALONE])
-def test_what_analyze_finds_the_command_finds(
-    name: str, result: str, search: Callable[[str], Any], texts: Callable[[Any], list[str]]
-) -> None:
+def test_what_analyze_finds_the_command_finds(name, result, search, texts):
     together = analysis_of(name)[result]
     alone = search(name)
     if together is None:  # tensors of the plane are densities
