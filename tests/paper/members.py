@@ -47,15 +47,9 @@ LARGE_SPECTRA: dict[str, Any] = {
 @cache
 def member(name: str) -> FamilyMember:
     """The member of one spectrum, one object for all tests."""
-    return fresh(name)
-
-
-def fresh(name: str) -> FamilyMember:
-    """The same member, made anew: nothing has been computed with it yet."""
     spectrum = {**SPECTRA, **LARGE_SPECTRA}[name]
-    if isinstance(spectrum, list):
-        return random_member_with_eigenvalues(spectrum, seed=3)
-    return random_member_with_chi(spectrum, seed=3)
+    draw = random_member_with_eigenvalues if isinstance(spectrum, list) else random_member_with_chi
+    return draw(spectrum, seed=3)
 
 
 def file(name: str) -> SystemFile:
