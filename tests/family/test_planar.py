@@ -13,14 +13,10 @@ from flint import fmpq, fmpq_mat
 from helpers import random_point, refuses
 from planar_helpers import diagonal
 
-from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.documents.catalog import load
+from kahanmaps import FamilyMember, KahanMap, NormalForm, load, normal_form, parse_polynomial
 from kahanmaps.errors import HypothesisError, SingularStep
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.planar import NormalForm, normal_form
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.maps.kahan import KahanMap
 
 
 def split(eigenvalues, H: str) -> FamilyMember:

@@ -18,21 +18,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import invertible, moved, over_members, structure_and_system
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, FamilyMember, KahanMap, QuadraticSystem, parse_polynomial
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.errors import HypothesisError
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables, third_derivatives
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.recognition import find_family_structure, structure_space, why_not_member
 from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 MEMBERS = GENERIC | {
     "m = 2, complex": random_member_with_chi(t**2 + 1, 1),

@@ -14,12 +14,11 @@ from helpers import random_skew_hamiltonian
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kahanmaps import normal_form, standard_structure
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.family.cubics import belongs
-from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, factors_of_chi, random_symplectic
-from kahanmaps.systems.hamiltonian import standard_structure
 
 over_m = pytest.mark.parametrize("m", [1, 2, 3, 4])
 seeds = st.integers(0, 10**6)

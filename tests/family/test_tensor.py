@@ -9,12 +9,9 @@ import pytest
 from check_helpers import claim, system_of
 from flint import fmpq, fmpq_mat, fmpq_poly
 
+from kahanmaps import QQ, InputError, KahanMap, QuadraticSystem, load, tensor_file
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.tensor import tensor_file
-from kahanmaps.errors import InputError
 from kahanmaps.family.tensor import (
     TensorStructure,
     centroid,
@@ -24,8 +21,6 @@ from kahanmaps.family.tensor import (
     over_algebra,
     tensor_structure,
 )
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
 MODULI = [t**2 - 2, t**2, t**2 - 1, t**3 - t - 1, t**3, (t - 1) ** 2 * (t + 2)]

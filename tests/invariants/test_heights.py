@@ -17,16 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import over_members, side_by_side, structure_and_system
 
+from kahanmaps import KahanMap, NormalSteps, TimeLimit, height_survey, load, system_normal_form
 from kahanmaps.algebra.work import Budget, counted
-from kahanmaps.documents.catalog import load
-from kahanmaps.family.system_normal_form import system_normal_form
-from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, decimal_text, height, height_growth
-from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-from kahanmaps.maps.normal_form.planes_point import NormalSteps
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]

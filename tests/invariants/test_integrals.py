@@ -27,10 +27,9 @@ from helpers import fraction, over_exact_fields, points, random_point, rationals
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, CubicHamiltonian, KahanMap, random_member_with_chi, standard_structure
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import BadPrime, SingularStep
-from kahanmaps.family.random_members import random_member_with_chi
 from kahanmaps.invariants.integrals_and_densities import (
     CommutantIntegral,
     ModifiedHamiltonian,
@@ -39,8 +38,6 @@ from kahanmaps.invariants.integrals_and_densities import (
     where,
 )
 from kahanmaps.invariants.poisson import HamiltonianTensor, jacobi_defects, poisson_tensor, transformation_sides
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 nonzero = rationals(6).filter(lambda eps: eps != 0)
 

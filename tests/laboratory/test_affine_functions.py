@@ -8,15 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import diagonal
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, KahanMap, QuadraticSystem, SingularStep, load
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
-from kahanmaps.documents.catalog import load
-from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux import affine_functions
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, affine_integrals, under_map
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 KNOWN = [
     (load("lotka_volterra").system, (), {"x": "-y + 1", "y": "x - 1"}),

@@ -10,18 +10,12 @@ from helpers import refuses, together
 from search_helpers import analysis_of, system
 
 import kahanmaps as km
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
+from kahanmaps import InputError, analyze, find_densities, find_integrals, find_poisson, load, names, parse_system
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.analyses.table import ANALYSES
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.singular.singularities import Patterns, singularities
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries

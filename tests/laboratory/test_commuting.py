@@ -13,15 +13,11 @@ from helpers import fraction
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps import random_member_with_eigenvalues
+from kahanmaps import QQ, Budget, commuting_systems, load, random_member_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
-from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
-from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.settings import Settings, random_starts
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, certify_family, certify_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
     bracket_vanishes,

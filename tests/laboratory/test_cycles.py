@@ -8,12 +8,8 @@ import pytest
 from check_helpers import system_of
 from search_helpers import by_formulas
 
-from kahanmaps.algebra.fields import GF
-from kahanmaps.documents.catalog import load
+from kahanmaps import GF, TimeLimit, composed_map, cycle_census, load
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.hard_stop import TimeLimit
-from kahanmaps.laboratory.cycles import cycle_census
-from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
 

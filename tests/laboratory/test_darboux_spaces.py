@@ -12,12 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from search_helpers import map_file, system
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, Certainty, KahanMap, Laboratory, darboux_polynomials, load, names
 from kahanmaps.algebra.modular_matrices import combine, rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as module
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -26,9 +23,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     determinant_polynomial,
 )
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
-from kahanmaps.maps.kahan import KahanMap
 
 SMALL = 101
 

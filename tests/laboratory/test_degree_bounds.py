@@ -8,7 +8,7 @@ from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import GF
+from kahanmaps import GF, QuadraticSystem, degree_growth
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduce_map
 from kahanmaps.laboratory.growth.degree_bounds import (
@@ -18,9 +18,7 @@ from kahanmaps.laboratory.growth.degree_bounds import (
     lower_bound,
     round_up,
 )
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
 PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]

@@ -11,14 +11,10 @@ import pytest
 from helpers import DIMENSION, quick
 from search_helpers import polynomial_degrees
 
-from kahanmaps.algebra.work import Budget
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.hard_stop import TimeLimit
+from kahanmaps import Budget, DegreeGrowth, QuadraticSystem, TimeLimit, degree_growth, load, names
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.singularities import Patterns
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
 OPEN = Patterns((), None, False, "not looked at")

@@ -7,15 +7,10 @@ from flint import fmpq
 from helpers import DIMENSION, quick
 from search_helpers import is_density, random_system, system
 
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.inline import System
+from kahanmaps import Certainty, KahanMap, System, find_densities, load, names, parse_rational_function
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
 from kahanmaps.laboratory.preserve import densities as module
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.maps.kahan import KahanMap
 
 density_verdict = partial(verdict_on, is_density=True)
 

@@ -5,16 +5,13 @@ import random
 import pytest
 from search_helpers import system
 
-from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps import find_integrals, flow_and_map, load, parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import flow_preserves
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
-from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField
 
 

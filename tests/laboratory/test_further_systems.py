@@ -17,13 +17,9 @@ from check_helpers import determinant, function_value, kahan_jacobian, kahan_ste
 from helpers import fraction, together
 from search_helpers import Answer, differences, ranks, residues_of, verdict_of
 
-from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps import Laboratory, SystemFile, analyze, load, names, parse_rational_function, read_system
 from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import SystemFile, read_system
 from kahanmaps.documents.structured_facts import relations
-from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.laboratory import Laboratory
 
 FOLDER = Path(__file__).parent / "further_systems"
 FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))

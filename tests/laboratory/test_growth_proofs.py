@@ -8,17 +8,13 @@ import pytest
 from flint import fmpq, fmpz_mat, fmpz_poly
 from search_helpers import by_formulas
 
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
+from kahanmaps import Certainty, QuadraticSystem, composed_map, degree_growth, load
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.proofs import exponent_matrix, linear_iterate, monomial_growth, spectral_radius
 from kahanmaps.laboratory.singular import written
 from kahanmaps.laboratory.singular.singularities import Patterns, singularities
-from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.projective import homogeneous_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 OPEN = Patterns((), None, False, "not looked at")
 

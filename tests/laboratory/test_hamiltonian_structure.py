@@ -11,23 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import system, values_on_orbits
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, Certainty, KahanMap, Laboratory, Orbit, QuadraticSystem, find_integrals, load
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.integrals_and_densities import DeterminantDensity, ModifiedHamiltonian
-from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     ConstantStructures,
     constant_structures,
     inherited_integrals,
 )
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def checked(system: QuadraticSystem) -> ConstantStructures:

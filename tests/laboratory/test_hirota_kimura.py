@@ -11,11 +11,9 @@ from flint import fmpq, fmpq_mat
 from helpers import fraction, quick
 from search_helpers import system, value_of
 
+from kahanmaps import Laboratory, load, names, read_system
 from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import read_system
 from kahanmaps.documents.structured_facts import relation_functions, relations
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import (
     SparseRelation,
     hirota_kimura_basis,

@@ -8,16 +8,13 @@ from helpers import points
 from hypothesis import given
 from search_helpers import integrals_of, system
 
-from kahanmaps import KahanMap
-from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps import KahanMap, find_densities, load, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
-from kahanmaps.documents.catalog import load
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory import laboratory as module
 from kahanmaps.laboratory.laboratory import Laboratory, separate_planes, verdict_on
-from kahanmaps.laboratory.preserve.densities import find_densities
 
 ROTATION = load("harmonic").system
 

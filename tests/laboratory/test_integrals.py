@@ -9,11 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import integrals_of, map_file, random_system, ranks, system, values_on_orbits
 
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps import Budget, Certainty, Laboratory, load, names, parse_rational_function
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.preserve.results import closing_note

@@ -9,13 +9,8 @@ import pytest
 from flint import fmpq
 from search_helpers import system
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps import QQ, Budget, Certainty, Laboratory, affine_integrals, load
 from kahanmaps.laboratory.modular_points import IndependentGradients
-from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals
 from kahanmaps.laboratory.preserve.iterates import integrals_in_iterates, verdict_on_ratio
 
 GAUDIN = system(

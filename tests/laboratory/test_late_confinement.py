@@ -15,13 +15,10 @@ from helpers import quick
 from search_helpers import analysis_of, polynomial_degrees
 from search_helpers import system as file_from
 
+from kahanmaps import Budget, DegreeGrowth, QuadraticSystem, analyze, degree_growth, load
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.work import Budget
-from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.following import StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
     BUDGET_SPENT,
@@ -33,7 +30,6 @@ from kahanmaps.laboratory.singular.outcomes import (
     outcome_of,
 )
 from kahanmaps.laboratory.singular.singularities import Patterns, _merge_patterns, patterns_of, singularities
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def resonant(k: object) -> QuadraticSystem:

@@ -7,15 +7,10 @@ import pytest
 from helpers import quick
 from search_helpers import integrals_of, system
 
+from kahanmaps import find_densities, find_integrals, flow_and_map, load, parse_rational_function, parse_system
 from kahanmaps.algebra.functions import FunctionField
-from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.printing import format_rational_function
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory, flow_preserves
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 
 THREE_LINES = system("x y", "3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)")
 

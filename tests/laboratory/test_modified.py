@@ -7,12 +7,9 @@ import pytest
 from flint import fmpq
 from helpers import refuses
 
-from kahanmaps.algebra.parsing import parse_polynomial
+from kahanmaps import QuadraticSystem, System, load, parse_polynomial
 from kahanmaps.algebra.polynomials import gradient
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.inline import System
 from kahanmaps.laboratory.vector_field.modified import modified, modified_fields, modified_hamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 # H = x^3/3 + x^2 y - x y^2 + 2/3 y^3 + x^2/2 + 3/2 y^2 - 2 y
 PLANAR = "x' = x^2 - 2*x*y + 2*y^2 + 3*y - 2; y' = -x^2 - 2*x*y + y^2 - x"

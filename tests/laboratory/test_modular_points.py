@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from search_helpers import PRIME, system
 
-from kahanmaps.algebra.fields import GF
+from kahanmaps import GF, load
 from kahanmaps.algebra.modular_matrices import combine, echelon, null_space, rank
 from kahanmaps.algebra.polynomials import evaluate, ring
-from kahanmaps.documents.catalog import load
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.modular_points import (
     ModularFlow,

@@ -4,10 +4,8 @@ import pytest
 from helpers import refuses
 
 import kahanmaps as km
-from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.interpolation import reconstruct
+from kahanmaps import GF, Certainty, reconstruct
 from kahanmaps.algebra.roots import parse_root
-from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import reconstruct_at
 

@@ -7,13 +7,8 @@ import pytest
 from helpers import random_point
 from search_helpers import TODD, map_file, random_system, system
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps import QQ, Certainty, find_integrals, find_poisson, load, parse_rational_function
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
 PROVED = Certainty.PROVED
 

@@ -7,14 +7,8 @@ import pytest
 from flint import fmpq, fmpz_mat, nmod_poly
 from search_helpers import TODD, is_density, random_system, system
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
+from kahanmaps import QQ, Budget, Certainty, find_densities, find_integrals, load, parse_rational_function
 from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import (
     candidates,
     coprime_base,

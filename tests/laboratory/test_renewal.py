@@ -15,15 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from search_helpers import by_formulas
 
-from kahanmaps.algebra.work import Budget
+from kahanmaps import Budget, QuadraticSystem, degree_growth, parse_system
 from kahanmaps.documents.catalog import load, map_names, names
-from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed_hypersurfaces
 from kahanmaps.laboratory.singular.following import OrbitData, StepLimits
 from kahanmaps.laboratory.singular.singularities import Patterns, default_eps, patterns
 from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def settled(*rows, continues_as=None):

@@ -9,14 +9,8 @@ import pytest
 from helpers import quick
 from search_helpers import analysis_of, integrals_of
 
+from kahanmaps import degree_growth, find_commuting, find_densities, find_poisson, height_survey, load, singularities
 from kahanmaps.algebra.work import Budget, count_work, counted
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.singular.singularities import singularities
-from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 SYSTEMS = ("riccati",)

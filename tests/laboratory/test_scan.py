@@ -11,15 +11,10 @@ import pytest
 from flint import fmpq
 from search_helpers import map_file, system
 
+from kahanmaps import Budget, InputError, TimeLimit, degree_growth, load, parse_system
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.work import Budget
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import InputError
-from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.scan import scan as scan_module
 from kahanmaps.laboratory.scan.lift import lift_conjugate_points, lift_hypersurfaces, lift_linear
 from kahanmaps.laboratory.scan.members import ScannedFamily

@@ -8,17 +8,12 @@ from flint import nmod_poly
 from helpers import quick
 from search_helpers import map_file, system, values_on_orbits
 
+from kahanmaps import Budget, Certainty, Laboratory, find_integrals, load, orbit_profile
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
-from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import candidates
 from kahanmaps.laboratory.preserve.search import Branches, find_branches, may_be_conjugate, repeat_search, search_spaces
 

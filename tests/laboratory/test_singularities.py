@@ -11,21 +11,15 @@ import pytest
 from check_helpers import system_of
 from flint import fmpq, nmod_poly
 
-from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.algebra.parsing import parse_polynomial
+from kahanmaps import GF, QQ, KahanMap, TimeLimit, degree_growth, load, parse_polynomial, parse_system
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.work import Budget, counted
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
-from kahanmaps.hard_stop import TimeLimit
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import outcomes
 from kahanmaps.laboratory.singular.exceptional import components
 from kahanmaps.laboratory.singular.jets import image_of, images_of_curve
 from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.laboratory.singular.written import with_eps
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 
 PRIME = 2**61 - 1

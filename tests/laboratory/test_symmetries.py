@@ -11,14 +11,9 @@ from helpers import step_or_none
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps import KahanMap
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_polynomial
+from kahanmaps import QQ, KahanMap, affine_darboux, commuting_systems, load, parse_polynomial
 from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
-from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.symmetries import is_singular, is_symmetry, linear_symmetries
 
 

@@ -9,11 +9,7 @@ from flint import fmpq, fmpq_mat
 from helpers import THOROUGH
 from search_helpers import random_system
 
-from kahanmaps import KahanMap, System
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, read_system
-from kahanmaps.errors import SingularStep
-from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
+from kahanmaps import KahanMap, SingularStep, System, SystemFile, equivalent_system, load, read_system
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
 
 

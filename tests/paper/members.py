@@ -6,12 +6,9 @@ from typing import Any
 
 from flint import fmpq_poly
 
+from kahanmaps import FamilyMember, Settings, SystemFile, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.algebra.chance import random_prime_field
-from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.paper import specialize
 from kahanmaps.paper.objects import PaperObjects

@@ -16,11 +16,7 @@ from flint import fmpq_mat, fmpq_poly
 from helpers import quick
 from paper.members import LARGE_SPECTRA, SPECTRA, file, member, verifier_of
 
-from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.files import SystemFile
-from kahanmaps.family.associated import FamilyMember
+from kahanmaps import Certainty, FamilyMember, Settings, SystemFile, parse_polynomial
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.paper import specialize
 from kahanmaps.paper import verify as verify_module
@@ -35,11 +31,8 @@ PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Cer
 QUICK = ("m=1", "m=2, split")
 LONGER = [pytest.mark.slow, pytest.mark.timeout(900)]
 LARGE = [name for name in (*SPECTRA, *LARGE_SPECTRA) if name[:3] not in ("m=1", "m=2", "m=3")]
-CASES = [
-    *quick([name for name in SPECTRA if name not in LARGE], QUICK),
-    *(pytest.param(n, marks=LONGER) for n in LARGE),
-]
-over_members = pytest.mark.parametrize("name", CASES)
+CASES = quick([name for name in SPECTRA if name not in LARGE], QUICK)
+over_members = pytest.mark.parametrize("name", [*CASES, *(pytest.param(name, marks=LONGER) for name in LARGE)])
 SIXTH = VerifyOptions(sections=(6,))
 
 
