@@ -67,9 +67,22 @@ def integrals_of(name: str, *symbols: str) -> IntegralSearch:
 
 def system(names: str, *rhs: str, **parameters: Any) -> SystemFile:
     """A system file: the names of the variables with spaces between them, the right-hand sides, the parameters."""
-    lines = [f"variables = {list(names.split())}", "[system]", f"rhs = {list(rhs)}", "[parameters]"]
-    lines += [f"{name} = '{value}'" for name, value in parameters.items()]
-    return parse_system("\n".join(lines))
+    return _file(names, ["[system]", f"rhs = {[*rhs]}"], parameters)
+
+
+def map_file(names: str, *image: str, inverse: Sequence[str] = (), **parameters: Any) -> SystemFile:
+    """The file of the map with this image."""
+    lines = ["[map]", f"image = {[*image]}", f"inverse = {[*inverse]}"]
+    return _file(names, lines if inverse else lines[:2], parameters)
+
+
+def _file(names: str, lines: Sequence[str], parameters: Mapping[str, Any]) -> SystemFile:
+    values = [f"{name} = '{value}'" for name, value in parameters.items()]
+    return parse_system("\n".join([f"variables = {names.split()}", *lines, "[parameters]", *values]))
+
+
+# x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}
+TODD = map_file("x y z", "y", "z", "(3 + y + z)/x", inverse=["(3 + x + y)/z", "x", "y"])
 
 
 def random_system(dim: int, seed: int) -> SystemFile:
@@ -126,6 +139,22 @@ def values_on_orbits(
             if values and len(results) < expected:
                 results.append(values)
     return results
+
+
+def is_density(file: SystemFile, formula: str, eps: Any, starts: int = 2, **more: Any) -> bool:
+    """phi(x~) = det dPhi(x) phi(x) at rational points, the derivative of the map computed from its definition."""
+    map_, tried = file.map.at(eps), 0
+    for x in islice(random_starts(file.dim, 3), 4 * starts):
+        try:
+            image = map_.step(x)
+            slope = Fraction(str(map_.jacobian(x).det()))
+            after, before = (value_of(formula, file.variables, point, eps, **more) for point in (image, x))
+        except (SingularStep, ZeroDivisionError):
+            continue
+        tried += 1
+        if after != slope * before:
+            return False
+    return tried >= starts
 
 
 def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int]) -> list[int]:

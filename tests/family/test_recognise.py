@@ -7,8 +7,10 @@ structure nothing is found; and an A that leaves repeated roots is said not to b
 
 import random
 from dataclasses import replace
+from itertools import product
 
 import pytest
+from check_helpers import hamiltonian_of, system_of
 from family.members import GENERIC, t
 from flint import fmpq, fmpq_mat
 from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_point, refuses
@@ -16,21 +18,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import invertible, moved, over_members, structure_and_system
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, FamilyMember, KahanMap, QuadraticSystem, parse_polynomial
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.errors import HypothesisError
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables, third_derivatives
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.recognition import find_family_structure, structure_space, why_not_member
 from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 MEMBERS = GENERIC | {
     "m = 2, complex": random_member_with_chi(t**2 + 1, 1),
@@ -46,13 +44,6 @@ def forgotten(member: FamilyMember) -> CubicHamiltonian:
     return CubicHamiltonian(member.H, standard_structure(member.dim))
 
 
-def found_in(hamiltonian: CubicHamiltonian):
-    """The member found, which has to be there."""
-    structure = find_family_structure(hamiltonian)
-    assert structure is not None
-    return structure
-
-
 def involutions(member: FamilyMember) -> set[str]:
     """All B_s and -B_s: what the splitting is, whatever A is."""
     return {str(B) for g in member.associated() for B in (g.B, -g.B)}
@@ -60,9 +51,8 @@ def involutions(member: FamilyMember) -> set[str]:
 
 @over_generic
 def test_the_splitting_is_found_again(member):
-    result = found_in(forgotten(member))
-    assert result.is_generic
-    assert (result.dimension, result.member.H) == (member.m, member.H)
+    result = find_family_structure(forgotten(member))
+    assert (result.is_generic, result.dimension, result.member.H) == (True, member.m, member.H)
     assert involutions(result.member) == involutions(member)
     assert sorted(f.degree for f in result.member.factors) == sorted(f.degree for f in member.factors)
 
@@ -71,9 +61,8 @@ def test_the_splitting_is_found_again(member):
 def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
     member = random_member_with_eigenvalues(eigenvalues, seed % 5)
     S = random_symplectic(member.m, random.Random(seed))
-    result = found_in(moved(forgotten(member), S))
-    assert result.is_standard
-    assert result.is_generic
+    result = find_family_structure(moved(forgotten(member), S))
+    assert (result.is_standard, result.is_generic) == (True, True)
     # In the new coordinates x = S z the matrix B is S^-T B S^T.
     inverse = S.inv().transpose()
     expected = {str(s * inverse * g.B * S.transpose()) for g in member.associated() for s in (1, -1)}
@@ -115,24 +104,19 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
     J = R * standard_structure(n) * R.transpose()
     rows = []
     for left, sign in [(J, 1), *((third, -1) for third in third_derivatives(H))]:
-        for i in range(n):
-            for j in range(n):
-                row = fmpq_mat(n, n)
-                for k in range(n):
-                    if sign > 0:  # (A^T J - J A)[i, j]
-                        row[k, i] += left[k, j]
-                        row[k, j] -= left[i, k]
-                    else:  # (A T - T A^T)[i, j]
-                        row[i, k] += left[k, j]
-                        row[j, k] -= left[i, k]
-                rows.append(row.entries())
+        for i, j in product(range(n), repeat=2):
+            row = fmpq_mat(n, n)
+            for k in range(n):  # (A^T J - J A)[i, j] and (A T - T A^T)[i, j]
+                row[(k, i) if sign > 0 else (i, k)] += left[k, j]
+                row[(k, j) if sign > 0 else (j, k)] -= left[i, k]
+            rows.append(row.entries())
     assert len(structure_space(H, J)) == n * n - rank(QQ, fmpq_mat(rows))
 
 
 @pytest.mark.parametrize("power", [2, 3])
 def test_nilpotent_structure_is_found_and_not_generic(power):
     member = random_member_with_chi((t - 5) ** power, 1)
-    result = found_in(forgotten(member))
+    result = find_family_structure(forgotten(member))
     assert (result.is_generic, result.dimension, chi(result.A)) == (False, power, (t - 1) ** power)
     nilpotent = result.A - QQ.identity(2 * power)
     assert evaluate_at_matrix(t ** (power - 1), nilpotent) != nilpotent * 0 == evaluate_at_matrix(t**power, nilpotent)
@@ -140,15 +124,11 @@ def test_nilpotent_structure_is_found_and_not_generic(power):
 
 
 def test_a_member_of_another_system_is_refused():
-    result = found_in(forgotten(GENERIC["m = 2, split"]))
+    result = find_family_structure(forgotten(GENERIC["m = 2, split"]))
     with pytest.raises(HypothesisError, match=r"not H\(T y\)"):
         replace(result, hamiltonian=CubicHamiltonian(2 * result.hamiltonian.H, result.hamiltonian.J))
     refuses("J is not T", replace, result, T=2 * result.T, error=HypothesisError)
     refuses("sign -1", replace, result, member=replace(result.member, signs=(1, -1)), error=HypothesisError)
-
-
-def hamiltonian(text: str, n: int) -> CubicHamiltonian:
-    return CubicHamiltonian(parse_polynomial(text, default_variables(n)), standard_structure(n))
 
 
 def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
@@ -176,7 +156,7 @@ def test_the_structure_steps_like_the_system(name):
 @pytest.mark.parametrize("n", [2, 4, 6])
 def test_with_another_J_there_is_a_change_of_coordinates(n):
     member = random_member_with_eigenvalues([1, -2, 3][: n // 2], 2)
-    other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
+    other = moved(forgotten(member), invertible(n, 5))
     normal_form = system_normal_form(other.system, other)
     assert normal_form.T * standard_structure(n) * normal_form.T.transpose() == other.J
     assert steps_like(normal_form, other.system)
@@ -184,15 +164,13 @@ def test_with_another_J_there_is_a_change_of_coordinates(n):
     assert not steps_like(SystemNormalForm(normal_form.form, None, False, ""), other.system)
 
 
-# None, with the reason.
-
 REASONS = [
     (HENON_HEILES, "H is not a homogeneous cubic"),
     (LORENZ, "x' is not J grad H"),
     (EULER_TOP, "x' is not J grad H"),
     (LOTKA_VOLTERRA, "x' is not J grad H"),
-    (hamiltonian("x1^3 + x2^3 + x3^3 + x4^3 + x1*x2*x3", 4).system, "only the multiples of I satisfy"),
-    (QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), "H is not a homogeneous cubic"),
+    (hamiltonian_of("x y z w", "x^3 + y^3 + z^3 + w^3 + x*y*z").system, "only the multiples of I satisfy"),
+    (system_of("x y", "x", "-y"), "H is not a homogeneous cubic"),
 ]
 
 

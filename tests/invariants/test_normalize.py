@@ -5,11 +5,10 @@ import random
 import pytest
 
 import kahanmaps as km
-from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps import Laboratory, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import format_factored
 from kahanmaps.invariants.integrals_and_densities import normalized
-from kahanmaps.laboratory.laboratory import Laboratory
 
 CLAIMED = [
     (name, claim)

@@ -1,72 +1,60 @@
 """Affine integrals and affine Darboux functions: known ones, none too many, and what the Kahan map makes of them."""
 
 import pytest
+from check_helpers import system_of
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 from helpers import EULER_TOP, LORENZ, random_point, systems
 from hypothesis import given
 from hypothesis import strategies as st
+from planar_helpers import diagonal
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, KahanMap, QuadraticSystem, SingularStep, load
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
-from kahanmaps.documents.catalog import load
-from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux import affine_functions
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, affine_integrals, under_map
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.quadratic import QuadraticSystem
 
-
-def darboux(system: QuadraticSystem) -> dict[str, str]:
-    polynomials = affine_darboux(system)
-    assert polynomials.complete
-    assert polynomials.reason == ""
-    return {str(d.function): str(d.cofactor) for d in polynomials.functions}
-
-
-def test_known_hyperplanes() -> None:
-    assert darboux(load("lotka_volterra").system) == {"x": "-y + 1", "y": "x - 1"}
+KNOWN = [
+    (load("lotka_volterra").system, (), {"x": "-y + 1", "y": "x - 1"}),
     # (x1 + x3)' = x2 (x1 + x3), since the coefficients of x1' and x3' are equal.
-    assert darboux(EULER_TOP) == {"x1 + x3": "x2", "x1 - x3": "-x2"}
+    (EULER_TOP, (), {"x1 + x3": "x2", "x1 - x3": "-x2"}),
     # H = y (3 x^2 - y^2)/3: the two other lines of the triangle have slopes of sqrt(3).
-    assert darboux(load("nahm_tetrahedral").system) == {"y": "-2*x"}
-    assert darboux(QuadraticSystem.from_text(["x"], ["x^2 - 1"])) == {"x + 1": "x - 1", "x - 1": "x + 1"}
+    (load("nahm_tetrahedral").system, (), {"y": "-2*x"}),
+    (system_of("x", "x^2 - 1"), (), {"x + 1": "x - 1", "x - 1": "x + 1"}),
+    (LORENZ, (), {}),
+    (load("riccati").system, (), {}),  # x' = x^2 + x - 1: they lie over Q(sqrt(5))
+    # z is conserved, and then x and x - z are invariant: different hyperplanes, the same modulo z.
+    (system_of("x y z", "x*(x - z)", "y^2 + x + 1", "0"), ((0, 0, 1),), {"x": "x - z", "x - z": "x"}),
+    (system_of("x y", "0", "0"), ((1, 0), (0, 1)), {}),
+]
 
 
-@pytest.mark.parametrize("system", [LORENZ, load("riccati").system])
-def test_systems_without(system: QuadraticSystem) -> None:
-    # Over Q: those of x' = x^2 + x - 1 lie over Q(sqrt(5)), those of the harmonic oscillator over Q(i).
-    assert affine_integrals(system) == ()
-    assert darboux(system) == {}
+@pytest.mark.parametrize(("system", "integrals", "functions"), KNOWN)
+def test_known_affine_integrals_and_hyperplanes(system, integrals, functions):
+    found = affine_darboux(system)
+    assert (found.complete, found.reason, affine_integrals(system)) == (True, "", integrals)
+    assert {str(d.function): str(d.cofactor) for d in found.functions} == functions
 
 
-def test_functions_that_are_hidden_by_an_integral() -> None:
-    """z is conserved, and then x and x - z are invariant: different hyperplanes, the same modulo z."""
-    system = QuadraticSystem.from_text(["x", "y", "z"], ["x*(x - z)", "y^2 + x + 1", "0"])
-    assert affine_integrals(system) == ((0, 0, 1),)
-    assert darboux(system) == {"x": "x - z", "x - z": "x"}
+@pytest.mark.parametrize(
+    ("system", "words", "functions"),
+    [
+        (system_of("x y", "x", "y"), "infinitely many", ["x", "y"]),
+        # The flow does not move on x = 0, where others may hide.
+        (system_of("x y z", "x*(1 + y)", "x*(z - 2)", "x*(y - 3*z)"), "degenerates", ["x"]),
+    ],
+)
+def test_where_hyperplanes_are_not_counted(system, words, functions):
+    found = affine_darboux(system)
+    assert (found.complete, words in found.reason) == (False, True)
+    assert [str(d.function) for d in found.functions] == functions
 
 
-def test_where_hyperplanes_are_not_counted() -> None:
-    scaling = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x", "y"]))
-    assert not scaling.complete
-    assert "infinitely many" in scaling.reason
-    assert [str(d.function) for d in scaling.functions] == ["x", "y"]
+def test_in_a_large_dimension_hyperplanes_are_not_counted():
     names = [f"x{i}" for i in range(25)]
-    large = affine_darboux(QuadraticSystem.from_text(names, [f"{x}*({x} + x{i // 2})" for i, x in enumerate(names)]))
+    large = affine_darboux(system_of(" ".join(names), *(f"{x}*({x} + x{i // 2})" for i, x in enumerate(names))))
     assert not large.complete
     assert {str(d.function) for d in large.functions} >= {"x0", "x24"}
-    zero = QuadraticSystem.from_text(["x", "y"], ["0", "0"])
-    assert affine_integrals(zero) == ((1, 0), (0, 1))
-    assert darboux(zero) == {}
-
-
-def test_a_hyperplane_of_equilibria() -> None:
-    system = QuadraticSystem.from_text(["x", "y", "z"], ["x*(1 + y)", "x*(z - 2)", "x*(y - 3*z)"])
-    polynomials = affine_darboux(system)
-    assert [str(d.function) for d in polynomials.functions] == ["x"]
-    assert not polynomials.complete  # the flow does not move on x = 0, where others may hide
-    assert "degenerates" in polynomials.reason
 
 
 @st.composite
@@ -77,7 +65,7 @@ def with_hyperplane(draw: st.DrawFn) -> tuple[QuadraticSystem, fmpq_mat]:
     entries = draw(st.lists(st.integers(-3, 3), min_size=n * n, max_size=n * n))
     T = fmpq_mat(n, n, entries)
     if T.det() == 0:
-        T = T * 0 + fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+        T = QQ.identity(n)
     gens = system.rhs[0].context().gens()
     first = gens[0] * (system.rhs[0].derivative(1) + draw(st.integers(-3, 3)))
     rhs = (first, *system.rhs[1:])
@@ -88,9 +76,7 @@ def with_hyperplane(draw: st.DrawFn) -> tuple[QuadraticSystem, fmpq_mat]:
 
 
 @given(with_hyperplane(), st.integers(0, 100))
-def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
-    case: tuple[QuadraticSystem, fmpq_mat], seed: int
-) -> None:
+def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(case, seed):
     system, T = case
     n = system.dim
     planted = [T[0, j] for j in range(n)]
@@ -119,8 +105,8 @@ def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
 
 # At a named eps
 
-LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
-CHAIN = QuadraticSystem.from_text(["x", "y", "z"], ["x*(2 + y)", "y*(1 + x - z)", "z*(y - 3)"])
+LOTKA_VOLTERRA = load("lotka_volterra").system
+CHAIN = system_of("x y z", "x*(2 + y)", "y*(1 + x - z)", "z*(y - 3)")
 
 
 def images_of(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> list[tuple[fmpq, ...] | None]:
@@ -145,7 +131,7 @@ def images_of(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> list[
 @pytest.mark.parametrize("scales", [(1, 1, 1), (10**6, 1, fmpq(1, 7))], ids=str)
 def test_what_the_map_makes_of_a_hyperplane_is_seen_at_its_points(system, eps, scales):
     n = system.dim
-    D = fmpq_mat(n, n, [scales[i] if i == j else 0 for i in range(n) for j in range(n)])
+    D = diagonal(scales[:n])
     system = system.composed(D.inv(), [fmpq(0)] * n).transformed(D)
     for entry in affine_darboux(system).functions:
         fate, images = under_map(system, entry.function, eps), images_of(system, entry.function, eps)

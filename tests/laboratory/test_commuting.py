@@ -1,23 +1,23 @@
 """Which Kahan maps commute with a given one: the paper's theorem found without its matrix A, and everything else."""
 
 import random
+from fractions import Fraction
+from itertools import islice
 from types import SimpleNamespace
 
 import pytest
-from check_helpers import check
-from flint import fmpq, fmpq_mat
+from check_helpers import check, commute_at
+from check_helpers import system_of as system
+from flint import fmpq
+from helpers import fraction
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps import KahanMap, random_member_with_eigenvalues
+from kahanmaps import QQ, Budget, commuting_systems, load, random_member_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.catalog import load
-from kahanmaps.errors import SingularStep
-from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, certify_family, certify_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
     bracket_vanishes,
@@ -26,34 +26,15 @@ from kahanmaps.laboratory.symmetry.commuting_space import (
     field_at,
     system_of,
 )
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 TRIVIAL = ["0", "f", "-f"]
 
 
-def system(names, *rhs):
-    return QuadraticSystem.from_text(names.split(), rhs)
-
-
-def texts(g):
-    return ", ".join(g.rhs)
-
-
-def commute_exactly(f, g, tries=3, seed=0):
-    """Phi_f Phi_g = Phi_g Phi_f at rational points, at two values of eps."""
-    rng = random.Random(seed)
-    compared = 0
-    while compared < tries:
-        x = [fmpq(rng.randint(-9, 9), rng.randint(1, 5)) for _ in range(f.dim)]
-        eps = fmpq(1 + compared, 7)
-        try:
-            phi, psi = KahanMap(f, eps), KahanMap(g, eps)
-            if psi.step(phi.step(x)) != phi.step(psi.step(x)):
-                return False
-        except SingularStep:
-            continue
-        compared += 1
-    return True
+def commute_exactly(f, g, tries=3):
+    """Phi_f Phi_g = Phi_g Phi_f at rational points, at as many values of eps."""
+    points = (tuple(map(fraction, x)) for x in random_starts(f.dim, 0))
+    answers = (commute_at(f, g, Fraction(1 + k, 7), x) for k, x in enumerate(points))
+    return all(islice((answer for answer in answers if answer is not None), tries))
 
 
 # petrera-suris-2016, Theorem 9: 2^m associated fields; where a block is left out the maps commute as well.
@@ -70,15 +51,11 @@ def test_the_associated_fields_of_the_paper_are_found_from_the_equations_alone(e
     for associate in member.associated():
         assert systems.count(associate.system) == systems.count(associate.system.scaled(-1)) == 1
     if shape == "linear":
-        involutions = [str(g.B) for g in result.solutions if g.B * g.B == _identity(2 * m)]
+        involutions = [str(g.B) for g in result.solutions if g.B * g.B == QQ.identity(2 * m)]
         expected = [str(a.B.transpose() * fmpq(sign)) for a in member.associated() for sign in (1, -1)]
         assert sorted(involutions) == sorted(expected)
         assert all(g.B * g.B * g.B == g.B for g in result.solutions)
     assert all(commute_exactly(systems[0 if k < 3 else k], member.chosen.system, 1) for k in range(2, 3**m, 4))
-
-
-def _identity(n):
-    return fmpq_mat([[int(i == j) for i in range(n)] for j in range(n)])
 
 
 def test_where_chi_does_not_split_only_rational_fields_are_found_and_the_others_reported():
@@ -97,34 +74,29 @@ def test_most_systems_commute_with_nothing(name, shape):
 
 def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional():
     f = system("x", "x^2 + 1")
-    assert (
-        certify_field(f, system("x", "3*x^2 + 3"), Settings()).evidence.data["theorem"] == "the lemma of Moebius maps"
-    )
-    for other in ("x", "3*x^2 + 2"):
-        assert str(certify_field(f, system("x", other), Settings()).verdict) == "refuted"
+    proof = certify_field(f, system("x", "3*x^2 + 3"), Settings())
+    assert proof.evidence.data["theorem"] == "the lemma of Moebius maps"
     # In dimension 2 proportional fields need not commute.
-    f, g = system("x y", "x^2 + y", "x*y - 1"), system("x y", "3*x^2 + 3*y", "3*x*y - 3")
-    assert str(certify_field(f, g, Settings()).verdict) == "refuted"
+    plane = system("x y", "x^2 + y", "x*y - 1")
+    for first, other in ((f, system("x", "x")), (f, system("x", "3*x^2 + 2")), (plane, plane.scaled(3))):
+        assert str(certify_field(first, other, Settings()).verdict) == "refuted"
 
 
 @pytest.mark.parametrize(
-    ("f", "shape", "directions", "verdict"),
+    ("f", "shape", "directions"),
     [
-        # Moebius maps of dimension 1
-        (system("x", "x^2 + x - 1"), "linear", ["x^2 + x - 1"], "proved"),
+        (system("x", "x^2 + x - 1"), "linear", ["x^2 + x - 1"]),  # Moebius maps of dimension 1
         # z' = z^2 with complex z = x + i y: all its complex multiples
-        (system("x y", "x^2 - y^2", "2*x*y"), "linear", ["x^2 - y^2, 2*x*y", "2*x*y, -x^2 + y^2"], "proved"),
-        # linear systems: Cayley transforms of matrices that commute
-        (system("x y", "y", "-x"), "quadratic", ["y, -x", "x, y"], "proved"),
-        # a nilpotent field: the map is the flow
-        (system("x y z", "y*z", "0", "0"), "linear", ["y*z, 0, 0"], "proved"),
+        (system("x y", "x^2 - y^2", "2*x*y"), "linear", ["x^2 - y^2, 2*x*y", "2*x*y, -x^2 + y^2"]),
+        (system("x y", "y", "-x"), "quadratic", ["y, -x", "x, y"]),  # Cayley transforms of matrices that commute
+        (system("x y z", "y*z", "0", "0"), "linear", ["y*z, 0, 0"]),  # a nilpotent field: the map is the flow
     ],
 )
-def test_whole_linear_families_commute(f, shape, directions, verdict):
+def test_whole_linear_families_commute(f, shape, directions):
     systems = commuting_systems(f, shape)
     (family,) = systems.families
-    assert [texts(g) for g in family.directions] == directions
-    assert (family.base.trivial, str(family.finding.verdict), systems.complete) == ("0", verdict, True)
+    assert [", ".join(g.rhs) for g in family.directions] == directions
+    assert (family.base.trivial, str(family.finding.verdict), systems.complete) == ("0", "proved", True)
     assert [g.trivial for g in systems.solutions] == TRIVIAL
 
 
@@ -196,31 +168,25 @@ def test_curved_families_are_reported_as_equations():
     [(["x*y", "-x^2"], ["y^2", "x"]), (["y", "x"], ["10^20*x", "10^20*y + x^2"]), (["y", "x"], ["10^20", "10^20*x*y"])],
 )
 def test_the_identity_of_a_family_is_bounded(f, g, below):
-    first, second = (QuadraticSystem.from_text(["x", "y"], rhs) for rhs in (f, g))
     family = SolutionComponent((ring(["b"]).gens()[0] / below,))
-    equation, _ = check(_family_identity(first, SimpleNamespace(fields=[second]), family), differs=True)
+    space = SimpleNamespace(fields=[system("x y", *g)])
+    equation, _ = check(_family_identity(system("x y", *f), space, family), differs=True)
     assert equation.bits >= log2(below)
 
 
 def test_too_large_is_undecided_with_a_reason():
-    n = 12
-    names = [f"x{i}" for i in range(n)]
-    free = QuadraticSystem.from_text(names, [f"{names[0]}^2", *["0"] * (n - 1)])
-    systems = commuting_systems(free, "quadratic")
-    assert (systems.complete, str(systems.verdict), [g.trivial for g in systems.solutions]) == (
-        False,
-        "undecided",
-        TRIVIAL,
+    large, middle, small = (
+        commuting_systems(system(" ".join("abcdefghijkl"[:n]), "a^2", *["0"] * (n - 1)), "quadratic")
+        for n in (12, 6, 4)
     )
-    assert "unknown coefficients" in systems.undecided[0]
-    systems = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
-    assert (systems.dimension, systems.complete) == (31, False)
-    systems = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
-    assert (systems.dimension, len(systems.basis), systems.complete) == (None, 1, False)
+    assert (large.complete, str(large.verdict), [g.trivial for g in large.solutions]) == (False, "undecided", TRIVIAL)
+    assert "unknown coefficients" in large.undecided[0]
+    assert (middle.dimension, len(middle.basis), middle.complete) == (None, 1, False)
+    assert (small.dimension, small.complete) == (31, False)
 
 
 def test_where_little_work_does_not_find_all_quadratic_fields_the_linear_ones_are_given_and_it_is_said(monkeypatch):
-    f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
+    f = system("x y", "x^2", "y^2")
     assert (commuting_systems(f).shape, commuting_systems(f).note) == ("quadratic", "")
     monkeypatch.setattr("kahanmaps.laboratory.symmetry.commuting.QUICK_UNITS", 1)
     systems = commuting_systems(f)

@@ -5,28 +5,13 @@ import math
 from dataclasses import replace
 
 import pytest
+from check_helpers import system_of
+from search_helpers import by_formulas
 
-from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.documents.catalog import load
+from kahanmaps import GF, TimeLimit, composed_map, cycle_census, load
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.hard_stop import TimeLimit
-from kahanmaps.laboratory.cycles import cycle_census
-from kahanmaps.maps.composed import composed_map
-from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
-from kahanmaps.systems.quadratic import QuadraticSystem
-
-
-def system_of(*rhs: str) -> QuadraticSystem:
-    return QuadraticSystem.from_text(["x", "y", "z"][: len(rhs)], list(rhs))
-
-
-def map_of(*image: str):
-    names = ["x", "y", "z"][: len(image)]
-    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
-
 
 # --- a walk by hand: Python integers, the forms evaluated one monomial after the other -------------------------------
 
@@ -78,11 +63,11 @@ MAPS = {
     "lotka_volterra": lambda: load("lotka_volterra").map,
     "euler_top": lambda: load("euler_top").map,
     "riccati": lambda: load("riccati").map,
-    "the minors have a factor in common": lambda: system_of("y", "x^2"),
-    "linear": lambda: system_of("x + y", "1 - y"),
-    "the identity": lambda: system_of("0", "0"),
-    "explicit": lambda: map_of("y", "(3 + y)/x"),
-    "explicit, with powers": lambda: map_of("y", "-x + 1/y^3"),
+    "the minors have a factor in common": lambda: system_of("x y", "y", "x^2"),
+    "linear": lambda: system_of("x y", "x + y", "1 - y"),
+    "the identity": lambda: system_of("x y", "0", "0"),
+    "explicit": lambda: by_formulas("x,y", "y; (3 + y)/x"),
+    "explicit, with powers": lambda: by_formulas("x,y", "y; -x + 1/y^3"),
     "a composition": lambda: composed_map(load("lotka_volterra").map, (load("lyness").map, -1)),
 }
 
@@ -113,29 +98,31 @@ def test_more_points_than_one_portion_holds_are_those_of_random_walks():
     assert some != cycle_census(load("weierstrass").system, "1/7", 257, samples=2000, seed=4)
 
 
-def test_a_translation_has_one_cycle_of_p_points_and_a_multiplication_one_of_p_minus_1():
-    assert dict(cycle_census(map_of("x + 1"), 1, 101).lengths) == {1: 1, 101: 1}
-    assert dict(cycle_census(map_of("2*x"), 1, 101).lengths) == {1: 2, 100: 1}  # 2 is a primitive root modulo 101
+@pytest.mark.parametrize(
+    ("map_", "eps", "lengths"),
+    [
+        (by_formulas("x", "x + 1"), 1, {1: 1, 101: 1}),
+        (by_formulas("x", "2*x"), 1, {1: 2, 100: 1}),  # 2 is a primitive root modulo 101
+        (load("riccati").map, "2/11", {1: 1}),  # a constant, for x' = x^2 + x - 1 where 5 eps^2 = 1
+    ],
+)
+def test_the_cycles_of_a_map_of_the_line_are_known(map_, eps, lengths):
+    census = cycle_census(map_, eps, 101)
+    assert (census.lengths, census.indeterminate, census.pre_indeterminate) == (lengths, 0, 0)
 
 
-EXCHANGES_LEVELS = ("(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)", "(x^2-y)/(x^2*y+1)")
+EXCHANGES_LEVELS = "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x); (x^2-y)/(x^2*y+1)"
 
 
 def test_cycles_of_an_integrable_map_are_longer_than_the_bound_of_hasse_and_weil():
     """The map sends the level I = c to I = -c, and a cycle goes through both."""
-    assert cycle_census(map_of(*EXCHANGES_LEVELS), 1, 47).longest == 114 > 47 + 1 + math.isqrt(4 * 47)
+    assert cycle_census(by_formulas("x,y", EXCHANGES_LEVELS), 1, 47).longest == 114 > 47 + 1 + math.isqrt(4 * 47)
 
 
 def test_a_map_without_eps_needs_none():
     assert cycle_census(load("mcmillan"), prime=31) == cycle_census(load("mcmillan"), 1, 31)
     with pytest.raises(InputError, match="found None, expected an exact number"):
         cycle_census(load("weierstrass"), prime=31)
-
-
-def test_a_map_that_degenerates_modulo_the_prime_is_a_constant():
-    """For x' = x^2 + x - 1 that is where 5 eps^2 = 1, as 2/11 modulo 101."""
-    census = cycle_census(load("riccati").system, "2/11", 101)
-    assert (census.lengths, census.preperiodic) == ({1: 1}, 101)
 
 
 def test_a_time_limit_keeps_the_complete_steps_of_random_points():

@@ -4,22 +4,17 @@ nothing is. All Darboux polynomials of a degree have their identities on exact p
 
 import random
 from math import comb
-from typing import Any
 
 import pytest
 from flint import fmpq
 from helpers import DIMENSION
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from search_helpers import map_file, system
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps import QQ, Certainty, KahanMap, Laboratory, darboux_polynomials, load, names
 from kahanmaps.algebra.modular_matrices import combine, rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as module
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -28,10 +23,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     determinant_polynomial,
 )
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 SMALL = 101
 
@@ -84,23 +76,14 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     assert all(not any(monomial[: map_.dim]) for monomial in others.monoms())
 
 
-def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:
-    """Cofactors and polynomials as text."""
-    search = darboux_polynomials(load(name), degree, **options)
-    assert not search.reason
-    return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in search.spaces}
-
-
-def test_the_coordinates_of_lotka_volterra_and_nothing_else() -> None:
-    """Origin: x' = x(...), y' = y(...), and the map has no integral; products are not listed."""
-    assert listed("lotka_volterra", 4) == {"C[x]": ["x"], "C[y]": ["y"]}
-
-
-def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
-    """Origin: petrera-pfadler-suris-2011, integrals x1 x3/(1 - eps^2 (x2 - x4)^2) and its shift."""
-    result = listed("volterra_periodic_4", 2)
-    assert result["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
-    assert result["1"][0] == "x1 + x2 + x3 + x4"
+def test_darboux_polynomials_of_the_literature():
+    """Two lines that are kept, and no integral; the pencils of two integrals (petrera-pfadler-suris-2011)."""
+    searches = darboux_polynomials(load("lotka_volterra"), 4), darboux_polynomials(load("volterra_periodic_4"), 2)
+    assert [search.reason for search in searches] == ["", ""]
+    lines, pencils = ({one.cofactor: [*map(str, one.polynomials)] for one in search.spaces} for search in searches)
+    assert lines == {"C[x]": ["x"], "C[y]": ["y"]}  # products are not listed
+    assert pencils["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
+    assert pencils["1"][0] == "x1 + x2 + x3 + x4"
 
 
 @pytest.mark.parametrize("name", ["nahm_octahedral", "dressing_chain_3"])
@@ -121,10 +104,10 @@ def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None
     assert seen > 0
 
 
-@pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "y"], 1)])
-def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
+@pytest.mark.parametrize("eps", [-1, 1])
+def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(eps):
     # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
-    search = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
+    search = darboux_polynomials(system("x y", "x", "y"), 2, eps=eps)
     assert search.spaces == ()
     assert f"at eps = {eps} the map" in search.reason
 
@@ -132,7 +115,7 @@ def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynom
 @pytest.mark.parametrize(("symbols", "cofactor"), [((), "1/5*(y + 1)*1/(x)^2"), (("a",), "(1/a)*(y + 1)*1/(x)^2")])
 def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
     """Lyness' map x_{n+1} x_{n-1} = a + x_n for a multiples of the x_n: factors of det dPhi are right up to numbers."""
-    file = parse_system("variables = ['x', 'y']\nparameters.a = 5\n[map]\nimage = ['y', '(y + 1)/(a*x)']")
+    file = map_file("x y", "y", "(y + 1)/(a*x)", a=5)
     search = darboux_polynomials(file, 3, symbols=symbols)
     [space] = search.spaces
     assert (space.cofactor, space.verdict, search.reason) == (cofactor, Certainty.PROVED, "")
@@ -142,14 +125,13 @@ def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
 
 def test_polynomials_whose_cofactors_differ_by_a_number_come_apart():
     """x + y goes to itself, and x - y to its negative."""
-    file = parse_system("variables = ['x', 'y', 'z']\n[map]\nimage = ['y', 'x', '3*z/(1 + z)']")
-    spaces = {entry.cofactor: list(map(str, entry.polynomials)) for entry in darboux_polynomials(file, 1).spaces}
+    search = darboux_polynomials(map_file("x y z", "y", "x", "3*z/(1 + z)"), 1)
+    spaces = {entry.cofactor: list(map(str, entry.polynomials)) for entry in search.spaces}
     assert spaces["1"] == ["x + y"]
     assert spaces["-1"] == ["x - y"]
 
 
 def test_a_wrong_number_in_front_is_refuted(monkeypatch):
-    file = parse_system("variables = ['x', 'y']\n[map]\nimage = ['y', '(y + 1)/(5*x)']")
     right = module.constants_of
 
     def doubled(*arguments):
@@ -157,6 +139,6 @@ def test_a_wrong_number_in_front_is_refuted(monkeypatch):
         return [RationalFunction(c.numerator * 2, c.denominator)]
 
     monkeypatch.setattr(module, "constants_of", doubled)
-    search = darboux_polynomials(file, 3)
+    search = darboux_polynomials(map_file("x y", "y", "(y + 1)/(5*x)"), 3)
     assert search.spaces == ()
     assert "did not pass as an identity" in search.reason

@@ -8,7 +8,7 @@ from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import GF
+from kahanmaps import GF, QuadraticSystem, degree_growth
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduce_map
 from kahanmaps.laboratory.growth.degree_bounds import (
@@ -18,17 +18,16 @@ from kahanmaps.laboratory.growth.degree_bounds import (
     lower_bound,
     round_up,
 )
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
 PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]
-POSITIVE = ["lotka_volterra", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 INTEGRABLE = [name for name in PLANAR if load(name).catalog["verdict"] != "not integrable"]
+POSITIVE = ["lotka_volterra", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 
 # of the standard quadratic transformation, on the class of a line and of 11 points
-QUADRATIC = fmpz_mat(12, 12, [int(i == j) for i in range(12) for j in range(12)])
+UNIT = fmpz_mat(12, 12, [int(i == j) for i in range(12) for j in range(12)])
+QUADRATIC = fmpz_mat(UNIT)
 for i, row in enumerate([[2, 1, 1, 1], [-1, 0, -1, -1], [-1, -1, 0, -1], [-1, -1, -1, 0]]):
     for j, entry in enumerate(row):
         QUADRATIC[i, j] = entry
@@ -78,14 +77,10 @@ def test_the_bound_holds_for_compositions_of_quadratic_transformations(permutati
     A composition of s: (d; m) -> (2 d - m1 - m2 - m3; ...), with permutations between. By the triangle inequality its
     translation length is at most arccosh(D_n)/n for every n, in any of the three kinds of isometries.
     """
-    word = fmpz_mat(12, 12, [int(i == j) for i in range(12) for j in range(12)])
+    word = UNIT
     for permutation in permutations:
-        moved = fmpz_mat(
-            12,
-            12,
-            [int(i == j == 0 or (i and j and permutation[i - 1] == j - 1)) for i in range(12) for j in range(12)],
-        )
-        word = QUADRATIC * moved * word
+        rows = UNIT.tolist()
+        word = QUADRATIC * fmpz_mat([rows[0], *(rows[k + 1] for k in permutation)]) * word
     degrees = [int((word**n)[0, 0]) for n in range(17)]
     above = min((d.acosh() / n).exp().upper() for n, d in enumerate(map(arb, degrees)) if n)
     for n in range(1, 9):

@@ -11,14 +11,10 @@ import pytest
 from helpers import DIMENSION, quick
 from search_helpers import polynomial_degrees
 
-from kahanmaps.algebra.work import Budget
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.hard_stop import TimeLimit
+from kahanmaps import Budget, DegreeGrowth, QuadraticSystem, TimeLimit, degree_growth, load, names
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.singularities import Patterns
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
 OPEN = Patterns((), None, False, "not looked at")
@@ -68,16 +64,12 @@ def with_degrees(*degrees):
 
 
 @pytest.mark.parametrize("n", [6, 30])
-@pytest.mark.parametrize("power", [1, 3, 9])
-def test_polynomial_growth_does_not_look_exponential(power, n):
-    assert not with_degrees(*(1 + k**power for k in range(n + 1))).looks_exponential
-    assert not with_degrees(*(1 + -(-(k**power) * 3 // 4) for k in range(n + 1))).looks_exponential
-
-
-@pytest.mark.parametrize("n", [6, 30])
-@pytest.mark.parametrize("rate", [1.5, 2, 6])
-def test_exponential_growth_does(rate, n):
-    assert with_degrees(*(1 + round(10 * rate**k) for k in range(n + 1))).looks_exponential
+def test_exponential_growth_looks_exponential_and_polynomial_growth_does_not(n):
+    for rate in (1.5, 2, 6):
+        assert with_degrees(*(1 + round(10 * rate**k) for k in range(n + 1))).looks_exponential
+    for power in (1, 3, 9):
+        assert not with_degrees(*(1 + k**power for k in range(n + 1))).looks_exponential
+        assert not with_degrees(*(1 + -(-(k**power) * 3 // 4) for k in range(n + 1))).looks_exponential
 
 
 @pytest.mark.parametrize("largest", [0, 5])
@@ -88,14 +80,7 @@ def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, 
     assert degree_growth(system, max_terms=3, max_degree=17, patterns=OPEN).degrees == (1, 3, 7, 17)
     growth = degree_growth(system, max_terms=3, max_degree=16, patterns=OPEN)
     assert (growth.degrees, growth.ended) == ((1, 3, 7), "degree")
-
-
-def test_a_single_eps_may_be_special():
-    """q'' = -q + 2 q^2 at eps = 1: the fourth iterate is the identity, but not for generic eps."""
-    system = QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"])
-    at_one = degree_growth(system, 1)
-    assert (at_one.degrees[4], at_one.growth) == (1, Growth.BOUNDED)
-    assert degree_growth(system).growth is Growth.QUADRATIC
+    assert growth.message == "the degree of iterate 3 is above 16"
 
 
 @pytest.mark.parametrize(
@@ -114,9 +99,8 @@ def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
     assert growth.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
 
 
-def test_the_budget_and_the_degree_are_limits():
-    henon_heiles = load("henon_heiles").system
-    growth = degree_growth(henon_heiles, effort=Budget(100_000))
+def test_the_budget_is_a_limit():
+    growth = degree_growth(load("henon_heiles").system, effort=Budget(100_000))
     assert (growth.ended, growth.degrees, growth.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
     assert growth.message == "work limit reached at iterate 8; raise --effort"
     known = degree_growth(load("lotka_volterra").system).patterns
@@ -125,9 +109,6 @@ def test_the_budget_and_the_degree_are_limits():
     assert growth.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
     growth = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (growth.ended, growth.growth) == ("budget", Growth.BOUNDED)
-    growth = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
-    assert (growth.ended, growth.message) == ("degree", "the degree of iterate 5 is above 50")
-    assert growth.degrees == (1, 3, 7, 17, 39)
 
 
 def test_a_time_limit_keeps_the_degrees_that_were_measured():

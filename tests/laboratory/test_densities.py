@@ -1,25 +1,16 @@
 """Invariant measures found from the right-hand sides alone: those of the literature up to integrals, and no others."""
 
-from fractions import Fraction
-from functools import cache, partial
-from itertools import islice
+from functools import partial
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq
 from helpers import DIMENSION, quick
-from search_helpers import random_system, system, value_of
+from search_helpers import is_density, random_system, system
 
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.inline import System
+from kahanmaps import Certainty, KahanMap, System, find_densities, load, names, parse_rational_function
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
 from kahanmaps.laboratory.preserve import densities as module
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.maps.kahan import KahanMap
 
 density_verdict = partial(verdict_on, is_density=True)
 
@@ -28,38 +19,15 @@ WITHOUT = ("lorenz", "kirchhoff_generic")
 SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4 and name not in WITHOUT]
 
 
-@cache
-def searched(name):
-    return find_densities(load(name))
-
-
-def holds_exactly(file, formula, eps, starts=2, **more):
-    """phi(x~) = det dPhi(x) phi(x) at rational points, the derivative of the map computed from its definition."""
-    kahan = KahanMap(file.system, eps)
-    tried = 0
-    for x in islice(random_starts(file.system.dim, 3), 4 * starts):
-        try:
-            image = kahan.step(x)
-            slope = Fraction(str(fmpq_mat(kahan.jacobian(x)).det()))
-            after = value_of(formula, file.variables, image, eps, **more)
-            before = value_of(formula, file.variables, x, eps, **more)
-        except (SingularStep, ZeroDivisionError):
-            continue
-        tried += 1
-        if after != slope * before:
-            return False
-    return tried >= starts
-
-
 @pytest.mark.parametrize("name", quick(SMALL_ONES, SMALL_ONES[::3]))
 def test_densities_satisfy_the_definition_exactly(name):
     file = load(name)
-    result = searched(name)
+    result = find_densities(file)
     assert result.densities
     assert result.reason == result.note == ""
     for density in result.densities:
         assert density.verdict is Certainty.PROVED
-        assert all(holds_exactly(file, density.text, eps) for eps in ("1/10", "-2/3"))
+        assert all(is_density(file, density.text, eps) for eps in ("1/10", "-2/3"))
 
 
 def test_of_hamiltonian_systems_the_determinant_is_taken():
@@ -85,7 +53,7 @@ def test_maps_that_are_not_invertible_have_no_density():
 
 
 def test_the_check_by_definition_refutes_a_wrong_density():
-    assert not holds_exactly(load("lotka_volterra"), "x*y + x", "1/10")
+    assert not is_density(load("lotka_volterra"), "x*y + x", "1/10")
 
 
 def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypatch):
@@ -93,9 +61,9 @@ def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypa
     assert module._find_hamiltonian_density(Laboratory(saddle, (), fmpq(1))) is None
     result = module._find_hamiltonian_density(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
     assert (result.verdict, result.function.denominator) == (Certainty.PROVED, 1)
-    point = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7))
-    determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in (point, (fmpq(0),) * 4)]
-    values = [result.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
+    points = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7)), (fmpq(0),) * 4
+    determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in points]
+    values = [result.function.numerator(*x, fmpq(1, 2)) for x in points]
     assert values[0] * determinants[1] == values[1] * determinants[0] != 0
     assert module._find_hamiltonian_density(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
     monkeypatch.setattr(module, "determinant_polynomial", lambda _: None)

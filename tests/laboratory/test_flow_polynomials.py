@@ -3,18 +3,15 @@
 import random
 
 import pytest
+from search_helpers import system
 
-from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps import find_integrals, flow_and_map, load, parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import flow_preserves
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
-from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField
 
 
@@ -26,8 +23,10 @@ def lorenz(s, r, b):
     return load("lorenz", {"s": s, "r": r, "b": b})
 
 
-def found_in(given, degree=None):
-    return [format_polynomial(P) for P in flow_polynomials(given, degree).functions]
+def found_in(given, degree, seed=0):
+    """The polynomials, and the degree up to which these are all."""
+    polynomials = flow_polynomials(given, degree, seed=seed)
+    return [format_polynomial(P) for P in polynomials.functions], polynomials.degree
 
 
 @pytest.mark.parametrize(
@@ -41,7 +40,7 @@ def found_in(given, degree=None):
 )
 def test_the_quadrics_of_the_lorenz_system_are_found(s, r, b, known):
     """The classical cases with an integral that depends on time, and parameters beside them."""
-    assert found_in(lorenz(s, r, b).system, 2) == known
+    assert found_in(lorenz(s, r, b).system, 2) == (known, 2)
 
 
 def test_affine_integrals_do_not_hide_quadrics():
@@ -52,21 +51,20 @@ def test_affine_integrals_do_not_hide_quadrics():
     made = PolynomialField(rhs)
     assert darboux_cofactor(made, P) is not None
     assert (rhs[0] + rhs[1]).is_zero()
-    assert found_in(made, 2) == [format_polynomial(P)]
+    assert found_in(made, 2) == ([format_polynomial(P)], 2)
 
 
 def test_a_polynomial_that_does_not_divide_its_derivative_is_none(monkeypatch):
     """Whatever the points modulo a prime say, it is put to the proof."""
     monkeypatch.setattr(searched._Line, "spaces", lambda line: [[[0, 1, *[0] * (line.count - 2)]]])
-    assert flow_polynomials(field("x y", "y + x^2", "x*y + 1"), 2, seed=5).functions == ()
-    assert found_in(field("x y", "x*y + x^2", "x*y + 1"), 2) == ["x"]
+    assert found_in(field("x y", "y + x^2", "x*y + 1"), 2, 5)[0] == []
+    assert found_in(field("x y", "x*y + x^2", "x*y + 1"), 2)[0] == ["x"]
 
 
 def test_where_solutions_are_algebraic_one_point_is_not_enough():
     """18 of 35 quartics vanish along the solution from a point of P = 0; K = -4/3."""
-    polynomials = flow_polynomials(lorenz("1/3", "2", "0").system, 4, seed=1)
     known = ["9*x^4 - 12*x^2*z + 24*x^2 - 8*x*y - 4*y^2"]
-    assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (known, 4)
+    assert found_in(lorenz("1/3", "2", "0").system, 4, 1) == (known, 4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -80,25 +78,22 @@ def test_what_a_field_was_made_to_keep_is_found(seed):
 
     P, a = drawn(1 + seed % 4), drawn(seed % 2)
     made = PolynomialField((P.derivative(1) * a + P * drawn(0), -P.derivative(0) * a + P * drawn(1)))
-    polynomials = flow_polynomials(made, 4, seed=seed)
-    assert {format_polynomial(primitive_part(factor)[1]) for factor, _ in P.factor()[1]} <= set(
-        map(format_polynomial, polynomials.functions)
-    )
-    assert polynomials.degree == 4
+    found, known_degree = found_in(made, 4, seed)
+    assert {format_polynomial(primitive_part(factor)[1]) for factor, _ in P.factor()[1]} <= {*found}
+    assert known_degree == 4
 
 
 def test_nothing_moves_on_a_common_factor():
     """Where it is 0 every polynomial that vanishes at the point does so along its solution."""
     rhs = ["y*(x^2 + y - 1)", "(x + y^2)*(x^2 + y - 1)"]
-    assert found_in(field("x y", *rhs), 3) == ["x^2 + y - 1", "2*y^2 + 2*x + 1"]
+    assert found_in(field("x y", *rhs), 3)[0] == ["x^2 + y - 1", "2*y^2 + 2*x + 1"]
 
 
 def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
     """x^2 + y^2 - 1 + c y for every c: that of c = 2 i is a product of lines, and 2 i is a residue modulo primes."""
     known = ["x^2 + y^2 + 2*x + 1", "x^2 + y^2 - 2*x + 1", "y"]  # z = x + i y has z' = z^2 - 1
     for seed in range(3):
-        result = flow_polynomials(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed=seed).functions
-        assert sorted(map(format_polynomial, result)) == known
+        assert sorted(found_in(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed)[0]) == known
 
 
 def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
@@ -109,11 +104,8 @@ def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
     beside = flow_and_map(find_integrals(file, max_degree=2))
     assert ("proved", "Darboux polynomials of the flow, apart from affine ones: x^2 - 20*z") in beside.lines()
     assert ("proved", "T1 = exp(20*t)*(x^2 - 20*z) is a time-dependent integral of the flow") in beside.lines()
-    [messages] = [text for _, text in beside.lines() if text.startswith("no other Darboux")]
-    assert (
-        messages
-        == "no other Darboux polynomials of the flow of degree <= 3 were found except factors of known integrals"
-    )
+    no_other = "no other Darboux polynomials of the flow of degree <= 3 were found except factors of known integrals"
+    assert [text for _, text in beside.lines() if text.startswith("no other Darboux")] == [no_other]
 
 
 @pytest.mark.parametrize(("factor", "kept"), [("-20", True), ("20", False), ("-19", False), ("0", False)])
@@ -127,21 +119,19 @@ def test_the_rate_of_what_depends_on_time_is_decided_by_multiplying_out(factor, 
 def test_long_coefficients_are_lifted(scale):
     """The Lorenz system with b = 2 s and z = scale w: x^2 - 20 scale w."""
     rhs = ["10*y - 10*x", f"28*x - y - {scale}*x*w", f"x*y/{scale} - 20*w"]
-    polynomials = flow_polynomials(field("x y w", *rhs), 2)
-    assert [format_polynomial(P) for P in polynomials.functions] == [f"x^2 - {20 * scale}*w"]
-    assert (polynomials.degree, polynomials.reason) == (2, "")
+    assert found_in(field("x y w", *rhs), 2) == ([f"x^2 - {20 * scale}*w"], 2)
+    assert flow_polynomials(field("x y w", *rhs), 2).reason == ""
 
 
 def test_a_degree_is_not_settled_where_something_is_not_lifted(monkeypatch):
     """Two primes, and two digits in their bases, are not enough for 80 digits: the degree is left open."""
     monkeypatch.setattr(searched, "_PRIMES", 2)
     monkeypatch.setattr(searched, "_PRECISION", 2)
-    made = field("x y w", "10*y - 10*x", f"28*x - y - {10**80}*x*w", f"x*y/{10**80} - 20*w")
-    polynomials = flow_polynomials(made, 2)
+    rhs = "10*y - 10*x", f"28*x - y - {10**80}*x*w", f"x*y/{10**80} - 20*w"
+    polynomials = flow_polynomials(field("x y w", *rhs), 2)
     assert (polynomials.functions, polynomials.degree) == ((), 1)
     assert polynomials.reason == "1 polynomial of degree 2 modulo a prime not lifted to Q (limit: 2 primes)"
-    text = f"variables = ['x', 'y', 'w']\n[system]\nrhs = {[str(f) for f in made.rhs]}"
-    beside = flow_and_map(find_integrals(parse_system(text), max_degree=1))
+    beside = flow_and_map(find_integrals(system("x y w", *rhs), max_degree=1))
     assert beside.polynomials_degree == 1
     messages = [text for known, text in beside.lines() if known == "undecided" and "Darboux" in text]
     assert messages == [f"Darboux polynomials of the flow of degree 2: {beside.polynomials_reason}"]
@@ -149,12 +139,9 @@ def test_a_degree_is_not_settled_where_something_is_not_lifted(monkeypatch):
 
 
 def test_conjugate_lines_leave_no_degree_open():
-    """y^2 + z^2 has factors modulo half of the primes; the 9 lines of paper_m3 but one are those of three cubics."""
-    assert flow_polynomials(lorenz("10", "0", "1").system, 2).degree == 2
+    """The 9 lines of paper_m3 but one are those of three cubics."""
     cubic = parse_polynomial("x^3 - 2*y^3", ["x", "y"])
     made = PolynomialField((cubic.derivative(1) - cubic, -cubic.derivative(0) - 3 * cubic))
     for seed in range(2):
-        polynomials = flow_polynomials(made, 3, seed=seed)
-        assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (["x^3 - 2*y^3"], 3)
-    polynomials = flow_polynomials(load("paper_m3").system, 1)
-    assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (["x1 - x5"], 1)
+        assert found_in(made, 3, seed) == (["x^3 - 2*y^3"], 3)
+    assert found_in(load("paper_m3").system, 1) == (["x1 - x5"], 1)

@@ -2,7 +2,7 @@
 close; relations with few terms hold on exact orbits, and tell numbers, eps and integrals apart."""
 
 from fractions import Fraction
-from itertools import islice
+from itertools import islice, product
 
 import pytest
 from check_helpers import kahan_step
@@ -10,10 +10,9 @@ from flint import fmpq, fmpq_mat
 from helpers import fraction, quick
 from search_helpers import file_of, system, value_of
 
+from kahanmaps import Laboratory, load, names
 from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.structured_facts import relation_functions, relations
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import (
     SparseRelation,
     hirota_kimura_basis,
@@ -29,14 +28,10 @@ RELATIONS = [
     for k, known in enumerate(relations(load(name).catalog, load(name).system.variables))
     if len(known.functions) <= 300
 ]
-# The degree in which all integrals show, where all degrees would take long.
-SHOWS = {"clebsch_first_flow": 2, "kirchhoff_case": 2, "lagrange_top": 2, "so4_euler_manakov": 2, "three_wave": 3}
-SHOWS |= {"henon_heiles": 4, "paper_m2": 4, "zhukovski_volterra_2": 4, "lorenz": 6}
-SHOWS |= {"paper_m3": 3, "paper_m3_irreducible": 3, "kirchhoff_generic": 3, "volterra_periodic_5": 3}
 
 
-def maps(file, eps=None, seed=0):
-    return Laboratory(file, (), eps, seed).maps
+def maps(file):
+    return Laboratory(file).maps
 
 
 @pytest.mark.parametrize(("name", "k"), quick(RELATIONS, RELATIONS[::3]))
@@ -95,9 +90,8 @@ WRITTEN = [
 ]
 
 
-def relations_of(name, degree, eps=None, **more):
-    file = file_of(name) if isinstance(name, str) else name
-    return sparse_relations(Laboratory(file, (), eps).maps, degree, file.variables, **more)
+def relations_of(name, degree):
+    return sparse_relations(maps(file_of(name)), degree, file_of(name).variables)
 
 
 def exact_orbit(file, eps, length, seed=1):
@@ -118,11 +112,8 @@ def unknowns_on(relation, file, eps, points):
     for x in points:
         row = dict.fromkeys((*names, ""), Fraction(0))
         for monomial, text in relation.terms:
-            value = value_of(monomial, file.variables, x, eps)
-            if text in relation.names:
-                row[text] += value
-            else:
-                row[""] += value * value_of(text, (), (), eps)
+            factor = 1 if text in relation.names else value_of(text, (), (), eps)
+            row[text if text in relation.names else ""] += factor * value_of(monomial, file.variables, x, eps)
         rows.append([fmpq(row[name].numerator, row[name].denominator) for name in (*names, "")])
     echelon, rank = fmpq_mat(rows).rref()
     if rank != len(names) or any(echelon[k, k] != 1 for k in range(rank)):
@@ -131,20 +122,14 @@ def unknowns_on(relation, file, eps, points):
 
 
 @pytest.mark.parametrize(("name", "degree", "texts"), WRITTEN)
-def test_the_relations_of_the_literature(name, degree, texts):
-    assert [one.text for one in relations_of(name, degree)] == texts
-
-
-@pytest.mark.parametrize(("name", "degree"), [(name, degree) for name, degree, texts in WRITTEN if texts])
-def test_relations_hold_on_exact_orbits(name, degree):
-    file = file_of(name)
-    for relation in relations_of(name, degree):
-        for text in ("1/3", "-2/7"):
-            eps = Fraction(text)
-            values = [unknowns_on(relation, file, eps, exact_orbit(file, eps, 7, seed)) for seed in (1, 2, 3, 4)]
-            assert None not in values
-            for c in relation.integrals:  # they are no constants
-                assert len({each[c] for each in values}) > 1
+def test_the_relations_of_the_literature_are_found_and_hold_on_exact_orbits(name, degree, texts):
+    file, found = file_of(name), relations_of(name, degree)
+    assert [one.text for one in found] == texts
+    for relation, eps in product(found, (Fraction(1, 3), Fraction(-2, 7))):
+        values = [unknowns_on(relation, file, eps, exact_orbit(file, eps, 7, seed)) for seed in (1, 2, 3, 4)]
+        assert None not in values
+        for c in relation.integrals:  # they are no constants
+            assert len({each[c] for each in values}) > 1
 
 
 def test_a_wrong_relation_does_not_hold_on_exact_orbits():

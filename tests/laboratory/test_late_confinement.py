@@ -9,18 +9,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from check_helpers import system_of
 from flint import fmpq
 from helpers import quick
 from search_helpers import analysis_of, polynomial_degrees
 from search_helpers import system as file_from
 
+from kahanmaps import Budget, DegreeGrowth, QuadraticSystem, analyze, degree_growth, load
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.work import Budget
-from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.following import StepLimits
 from kahanmaps.laboratory.singular.outcomes import (
     BUDGET_SPENT,
@@ -32,30 +30,25 @@ from kahanmaps.laboratory.singular.outcomes import (
     outcome_of,
 )
 from kahanmaps.laboratory.singular.singularities import Patterns, _merge_patterns, patterns_of, singularities
-from kahanmaps.systems.quadratic import QuadraticSystem
-
-
-def planar(*rhs: str) -> QuadraticSystem:
-    return QuadraticSystem.from_text(["x", "y"], rhs)
 
 
 def resonant(k: object) -> QuadraticSystem:
     """x' = x^2, y' = k x y: 1/x moves by -2 eps, and the poles of y are cancelled after k steps for integers k."""
-    return planar("x^2", f"{k}*x*y")
+    return system_of("x y", "x^2", f"{k}*x*y")
 
 
 def three_lines(*exponents: int) -> QuadraticSystem:
     """x' = l1^(1-g1) l2^(1-g2) l3^(1-g3) J grad l1^g1 l2^g2 l3^g3 for the lines x, y, x + 2 y."""
     a, b, c = exponents
-    return planar(f"{b}*x*(x + 2*y) + 2*{c}*x*y", f"-({a}*y*(x + 2*y) + {c}*x*y)")
+    return system_of("x y", f"{b}*x*(x + 2*y) + 2*{c}*x*y", f"-({a}*y*(x + 2*y) + {c}*x*y)")
 
 
 # System, eps, growth and closed form of its degrees, and for how many steps the latter has to be tried.
 SLOW_GROWTH = [
     (resonant(12), None, "bounded", "12 for n >= 11", 20),
     (resonant("41/2"), None, "linear", "n + 1", 60),
-    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 54),
-    (QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]), None, "linear", "12*n - 54 for n >= 10", 30),
+    (system_of("x y", "1", "x*y"), "1/7", "bounded", "51 for n >= 50", 54),
+    (system_of("x y z", "x^2", "12*x*y", "y*z"), None, "linear", "12*n - 54 for n >= 10", 30),
 ]
 # Systems whose first d_n are 2^n, and the first n with fewer.
 THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((2, 5, 3), 3)]
@@ -120,7 +113,7 @@ def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():
-    runs = [singularities(planar("1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
+    runs = [singularities(system_of("x y", "1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
     assert patterns_of(runs).running == "the singularities at the two values of eps differ; choose one with --eps"
     assert patterns_of(runs[:1]).running == ""
     assert "work limit" in patterns_of([replace(runs[0], is_stopped=True)]).running
@@ -170,17 +163,14 @@ def test_what_excludes_each_other_is_undecided():
     analysis = analysis_of("weierstrass")
     exponential = replace(analysis.degrees, degrees=tuple(2**n for n in range(12)), patterns=None)
     both = replace(analysis, degrees=exponential)
-    assert (both.conclusion.kind, contradictions(both)) == (
-        "undecided",
-        ["the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"],
-    )
+    why = "the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"
+    assert (both.conclusion.kind, contradictions(both)) == ("undecided", [why])
     # An estimate gives way to what is proved.
     estimate = replace(analysis, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
     assert estimate.conclusion.kind == "integrable"
     closed = replace(analysis.integrals, profile=replace(analysis.integrals.profile, period=4))
-    assert contradictions(replace(analysis, integrals=closed)) == [
-        "orbits close after 4 steps, but the degrees seem to grow"
-    ]
+    why = "orbits close after 4 steps, but the degrees seem to grow"
+    assert contradictions(replace(analysis, integrals=closed)) == [why]
 
 
 def beside(kind, growth, lengths=None, heights=(21, 5)):
@@ -226,8 +216,7 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
 
 def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
     # At eps = -1 the first coordinate of all images is 0; at eps = 1 det(I - eps f') = 0.
-    system = QuadraticSystem.from_text(["x", "y"], ["x", "y^2"])
-    runs = [singularities(system, eps, steps=3) for eps in (-1, 1)]
+    runs = [singularities(system_of("x y", "x", "y^2"), eps, steps=3) for eps in (-1, 1)]
     assert [(run.is_dominant, run.is_undefined) for run in runs] == [(False, False), (False, True)]
 
 

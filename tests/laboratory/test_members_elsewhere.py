@@ -11,19 +11,13 @@ import pytest
 from flint import fmpq, fmpq_poly
 from planar_helpers import invertible, moved
 
-from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile
+from kahanmaps import QuadraticSystem, SystemFile, analyze, constant_structures, degree_growth, load, parse_polynomial
 from kahanmaps.family.cubics import belongs, default_variables
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.recognition import find_family_structure_of
 from kahanmaps.laboratory.analyses.table import ANALYSES
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions
-from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import constant_structures
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
 MEMBERS = {

@@ -9,11 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from search_helpers import PRIME, system
 
-from kahanmaps.algebra.fields import GF
+from kahanmaps import GF, load
 from kahanmaps.algebra.modular_matrices import combine, echelon, null_space, rank
 from kahanmaps.algebra.polynomials import evaluate, ring
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.modular_points import (
     ModularFlow,
@@ -29,13 +27,8 @@ SMALL = 101
 residues = st.integers(0, SMALL - 1)
 
 
-def modular(file, eps=7, prime=PRIME, seed=0):
-    return ModularMap(with_symbols(file), prime, eps, seed=seed)
-
-
-def orbit_from(start, map_, count):
-    map_.random_point = lambda: start
-    return map_.orbit(count)
+def modular(file, eps=7):
+    return ModularMap(with_symbols(file), PRIME, eps, seed=0)
 
 
 @given(st.lists(residues, min_size=3, max_size=3), st.integers(0, 4))
@@ -75,9 +68,9 @@ def test_the_echelon_form_depends_on_the_span_alone(rows, rng):
 
 
 def test_an_orbit_that_closes_has_each_of_its_points_once():
-    # a quarter of a turn
-    result = orbit_from((1, 2), modular(system("x y", "y", "-x"), eps=1), 20)
-    assert result == [(1, 2), (2, PRIME - 1), (PRIME - 1, PRIME - 2), (PRIME - 2, 1)]
+    quarter = modular(system("x y", "y", "-x"), eps=1)
+    quarter.random_point = lambda: (1, 2)
+    assert quarter.orbit(20) == [(1, 2), (2, PRIME - 1), (PRIME - 1, PRIME - 2), (PRIME - 2, 1)]
     assert len(modular(system("x y", "0", "0")).orbit(20)) == 1
     assert len(modular(load("lorenz")).orbit(20)) == 20
 
@@ -92,8 +85,8 @@ def test_a_map_defined_nowhere_is_reported():
 
 @pytest.mark.parametrize("kind", ["map", "flow", "lifted"])
 def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
-    system = load("lotka_volterra").system
-    map_ = ModularFlow(system, PRIME) if kind == "flow" else ModularMap(system, PRIME, 7)
+    f = load("lotka_volterra").system
+    map_ = ModularFlow(f, PRIME) if kind == "flow" else ModularMap(f, PRIME, 7)
     map_ = TwoPointMap(map_, TwoPointBasis(1, 1)) if kind == "lifted" else map_
     ((x, image),) = map_.pairs(1)
     plain, weighed = map_.monomials_at_both(x, image, 2), map_.monomials_at_both(x, image, 2, (3, 5))
@@ -104,7 +97,7 @@ def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
 
 def test_the_series_of_a_solution_solve_the_equation():
     """x' = y, y' = -x from (a, b): x = a cos t + b sin t; and monomials are multiplied as series."""
-    flow = ModularFlow(parse_system('variables = ["x", "y"]\n[system]\nrhs = ["y", "-x"]').system, PRIME)
+    flow = ModularFlow(system("x y", "y", "-x").system, PRIME)
     rows, (a, b), period = flow.along_orbit(2, 8)
     assert period is None
     support = exponents_up_to(2, 2)

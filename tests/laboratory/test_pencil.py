@@ -4,25 +4,17 @@ import random
 from dataclasses import replace
 
 import pytest
-from flint import fmpq
+from check_helpers import claim
 from search_helpers import analysis_of
 
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.preserve.poisson import pencil as module
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 
 
-def integral(text: str) -> RationalFunction:
-    return parse_rational_function(text, ["x", "y", "eps"])
-
-
-def curves(text: str, eps: fmpq | None = None) -> Pencil:
-    pencil = pencil_of("I", integral(text), eps)
-    assert pencil is not None
-    return pencil
+def curves(text: str) -> Pencil | None:
+    return pencil_of("I", claim(text, "x y"), None)
 
 
 def summary(pencil: Pencil) -> tuple[int, int, int, dict[int, tuple[int, int]]]:
@@ -93,7 +85,7 @@ def test_the_genus_stays_under_birational_maps(text):
 
 def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
     monkeypatch.setattr(module._ModularPlane, "_add_simple", lambda *_, **__: None)
-    assert pencil_of("I", integral("x*y"), None) is None
+    assert curves("x*y") is None
 
 
 @pytest.mark.parametrize("name", ["nahm_tetrahedral", "qrt_symmetric"])

@@ -5,50 +5,26 @@ from functools import cache
 
 import pytest
 from helpers import random_point
-from search_helpers import random_system, system
+from search_helpers import TODD, map_file, random_system, system
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps import QQ, Certainty, find_integrals, find_poisson, load, parse_rational_function
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
-PROVED, REFUTED = Certainty.PROVED, Certainty.REFUTED
-
-
-def a_map(variables, image, inverse, **parameters):
-    lines = [f"variables = {variables.split()}", "[parameters]", *(f'{k} = "{v}"' for k, v in parameters.items())]
-    return parse_system("\n".join([*lines, "[map]", f"image = {image}", f"inverse = {inverse}"]))
+PROVED = Certainty.PROVED
 
 
-LYNESS = a_map("x y", ["y", "(a + y)/x"], ["(a + x)/y", "x"], a="2/3")
-# x_{n+4} x_n = x_{n+3} x_{n+1} + x_{n+2}^2 and x_{n+5} x_n = x_{n+4} x_{n+1} + x_{n+3} x_{n+2}
-SOMOS_4 = a_map("x y z w", ["y", "z", "w", "(y*w + z^2)/x"], ["(x*z + y^2)/w", "x", "y", "z"])
-HENON = a_map("x y", ["y + 1 - 2*x^2", "x/3"], ["3*y", "x - 1 + 18*y^2"])  # det dPhi = -1/3
-
-
-def nested(n):
-    """x_i' = x_i (sum of x_j for j > i - sum of x_j for j < i)."""
-    names = [f"x{i}" for i in range(n)]
-    rhs = [f"{x}*(0{''.join('+' + y for y in names[i + 1 :])}{''.join('-' + y for y in names[:i])})"
-           for i, x in enumerate(names)]  # fmt: skip
-    return system(" ".join(names), *rhs)
-
-
-def brackets(result):
-    return [tensor.text for tensor in result.tensors]
+LYNESS = map_file("x y", "y", "(a + y)/x", inverse=["(a + x)/y", "x"], a="2/3")
+# x_{n+4} x_n = x_{n+3} x_{n+1} + x_{n+2}^2
+SOMOS_4 = map_file("x y z w", "y", "z", "w", "(y*w + z^2)/x", inverse=["(x*z + y^2)/w", "x", "y", "z"])
+HENON = map_file("x y", "y + 1 - 2*x^2", "x/3", inverse=["3*y", "x - 1 + 18*y^2"])  # det dPhi = -1/3
 
 
 def holds_exactly(file, first, eps):
     """dPhi P dPhi^T = P(x~) at rational points, computed here."""
-    kahan = file.map.at(eps)
-    for seed in (1, 2):
-        x = random_point(file.dim, seed)
-        slope, image = kahan.jacobian(x), kahan.step(x)
-        here, there = (first.tensor.value(QQ, kahan.eps, point) for point in (x, image))
+    map_ = file.map.at(eps)
+    for x in (random_point(file.dim, seed) for seed in (1, 2)):
+        slope = map_.jacobian(x)
+        here, there = (first.tensor.value(QQ, map_.eps, point) for point in (x, map_.step(x)))
         if slope * here * slope.transpose() != there:
             return False
     return True
@@ -60,20 +36,19 @@ def holds_exactly(file, first, eps):
         (LYNESS, 2, [[0, 1], [-1, 0]]),
         # Gekhtman, Shapiro and Vainshtein; Hone and Fordy: the bracket of the cluster algebra, of rank 2
         (SOMOS_4, 2, [[0, 1, 2, 3], [-1, 0, 1, 2], [-2, -1, 0, 1], [-3, -2, -1, 0]]),
-        (nested(4), 4, [[(j > i) - (j < i) for j in range(4)] for i in range(4)]),
+        (load("lv(4,0)"), 4, [[(j > i) - (j < i) for j in range(4)] for i in range(4)]),
     ],
 )
 def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
     search = find_poisson(file, integrals=())
     names = file.variables
     terms = [
-        f"{{{p},{q}}} = {'' if log_canonical[i][j] == 1 else f'{log_canonical[i][j]}*'}{p}*{q}"
-        for i, p in enumerate(names)
-        for j, q in enumerate(names)
+        f"{{{names[i]},{names[j]}}} = {'' if entry == 1 else f'{entry}*'}{names[i]}*{names[j]}"
+        for i, row in enumerate(log_canonical)
+        for j, entry in enumerate(row)
         if i < j
     ]
-    assert ", ".join(terms) in brackets(search)
-    entry = search.tensors[brackets(search).index(", ".join(terms))]
+    (entry,) = (tensor for tensor in search.tensors if tensor.text == ", ".join(terms))
     assert (entry.verdict, entry.jacobi, entry.rank) == (PROVED, PROVED, rank)
     assert holds_exactly(file, entry, "1/10")
 
@@ -81,9 +56,8 @@ def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
 def test_integrals_and_casimirs_of_the_euler_top():
     # rank 2 in dimension 3: each tensor has one Casimir, a function of the two integrals
     search = find_poisson(load("euler_top"), 3)
-    assert [(tensor.rank, tensor.verdict, tensor.jacobi, tensor.involution) for tensor in search.tensors] == [
-        (2, *[PROVED] * 3)
-    ] * 3
+    assert [tensor.rank for tensor in search.tensors] == [2] * 3
+    assert {verdict for one in search.tensors for verdict in (one.verdict, one.jacobi, one.involution)} == {PROVED}
     assert [tensor.casimirs for tensor in search.tensors] == [("I1",), ("I2",), ("(I1 - 2*I2)/(2*I2*eps^2 - 1)",)]
     assert all(tensor.is_liouville_integrable for tensor in search.tensors)
     assert search.pencil is PROVED  # tri-Hamiltonian
@@ -105,9 +79,8 @@ def casimirs_of_lie_poisson(*texts):
     [model, *_] = integrals_of_rotation()
     names = ["x", "y", "z", "eps"]
     known = [replace(model, name=f"I{k}", function=parse_rational_function(t, names)) for k, t in enumerate(texts, 1)]
-    return next(
-        tensor for tensor in find_poisson(ROTATION, 1, integrals=known).tensors if "{x,y} = z" in tensor.text
-    ).casimirs
+    tensors = find_poisson(ROTATION, 1, integrals=known).tensors
+    return next(tensor for tensor in tensors if "{x,y} = z" in tensor.text).casimirs
 
 
 @pytest.mark.parametrize(
@@ -133,13 +106,12 @@ def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch
 
 
 def test_the_factors_of_a_density_are_tried_as_a_denominator():
-    # both integrals of x_{n+3} x_n = 3 + x_{n+1} + x_{n+2} are N/(x y z), its measure |dx dy dz/(x y z)|
-    todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
-    search = find_poisson(todd, 3)
+    # both integrals are N/(x y z), the measure |dx dy dz/(x y z)|
+    search = find_poisson(TODD, 3)
     assert (len(search.tensors), search.pencil, search.reason) == (2, PROVED, "")
     assert str(search.denominator.numerator) == "x*y*z"
-    assert all(tensor.is_liouville_integrable and holds_exactly(todd, tensor, 1) for tensor in search.tensors)
-    none = find_poisson(todd, 2, integrals=search.integrals)
+    assert all(tensor.is_liouville_integrable and holds_exactly(TODD, tensor, 1) for tensor in search.tensors)
+    none = find_poisson(TODD, 2, integrals=search.integrals)
     assert (none.tensors, none.denominator) == ((), None)
     assert none.reason.endswith(", and none of degree at most 5 over x*y*z")
 

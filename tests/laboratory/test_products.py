@@ -1,21 +1,14 @@
 """Integrals and densities that are products of powers: those of the literature at degrees that no search reaches."""
 
 import random
-from functools import reduce
+from math import prod
 
 import pytest
 from flint import fmpq, fmpz_mat, nmod_poly
-from search_helpers import random_system, system, value_of
+from search_helpers import TODD, is_density, random_system, system
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Certainty
-from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
+from kahanmaps import QQ, Budget, Certainty, find_densities, find_integrals, load, parse_rational_function
 from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import (
     candidates,
     coprime_base,
@@ -27,32 +20,17 @@ from kahanmaps.laboratory.preserve.products import (
 P = 2**61 - 1
 
 
-def volterra(matrix):
-    """x_i' = x_i sum_j a_ij x_j."""
-    names = [f"x{i + 1}" for i in range(len(matrix))]
-    rhs = [f"{x}*({'+'.join(f'({a})*{y}' for a, y in zip(row, names, strict=True))})"
-           for x, row in zip(names, matrix, strict=True)]  # fmt: skip
-    return system(" ".join(names), *rhs)
-
-
-def nested(n):
-    """a_ij = 1 above the diagonal and -1 below it."""
-    return volterra([[(j > i) - (j < i) for j in range(n)] for i in range(n)])
-
-
 def tree(n, edges, seed):
-    """Rows of the matrix differ along an edge (i, k) by a x_i + b x_k, so that this is a Darboux polynomial."""
+    """x_i' = x_i sum_j a_ij x_j; rows differ along an edge (i, k) by a x_i + b x_k, which is a Darboux polynomial."""
     rng = random.Random(seed)
     rows = {0: [rng.randint(-3, 3) for _ in range(n)]}
     for i, k in edges:
         rows[k] = list(rows[i])
         rows[k][i] += rng.choice([1, 2, 3, -1, -2])
         rows[k][k] += rng.choice([1, 2, 3, -1, -2])
-    return volterra([rows[i] for i in range(n)])
-
-
-def a_map(variables, image, inverse):
-    return parse_system(f"variables = {variables.split()}\n[map]\nimage = {image}\ninverse = {inverse}\n")
+    names = [f"x{i + 1}" for i in range(n)]
+    sums = ["+".join(f"({a})*{y}" for a, y in zip(rows[i], names, strict=True)) for i in range(n)]
+    return system(" ".join(names), *(f"{x}*({total})" for x, total in zip(names, sums, strict=True)))
 
 
 def found_in(file, symbols=(), eps=None):
@@ -60,19 +38,10 @@ def found_in(file, symbols=(), eps=None):
     return products_of(laboratory, candidates(laboratory, laboratory.cofactors(), Budget()))
 
 
-def is_density(file, phi, eps):
-    """phi(x~) = det dPhi(x) phi(x) at a rational point, over Q."""
-    kahan, names = file.map.at(eps), file.variables
-    x = kahan.point([f"{2 * k + 3}/{k + 2}" for k in range(file.dim)])
-    det = kahan.jacobian(x).det()
-    after, before = (value_of(phi, names, place, kahan.eps) for place in (kahan.step(x), x))
-    return fmpq(after.numerator, after.denominator) == det * fmpq(before.numerator, before.denominator)
-
-
 @pytest.mark.parametrize(
     ("file", "phi"),
     [
-        (nested(7), "x2^2*x4^2*x6^2"),
+        (load("lv(7,0)"), "x2^2*x4^2*x6^2"),
         (tree(3, [(0, 1), (1, 2)], "path3"), None),
         (tree(6, [(0, 1), (0, 2), (0, 3), (3, 4), (3, 5)], "two stars"), None),
     ],
@@ -80,8 +49,7 @@ def is_density(file, phi, eps):
 def test_the_measures_of_lotka_volterra_systems(file, phi):
     entry = found_in(file).density
     assert phi is None or entry.text == phi
-    assert is_density(file, entry.text, "1/10")
-    assert is_density(file, entry.text, "-3/7")
+    assert all(is_density(file, entry.text, eps) for eps in ("1/10", "-3/7"))
     assert verdict_on(file.map, entry.function, None, is_density=True)[0].holds
 
 
@@ -100,14 +68,13 @@ def test_numbers_other_than_1_make_integrals_that_depend_on_time():
 
 
 def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
-    # x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}: det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
-    todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
-    search = find_densities(todd)
+    # det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
+    search = find_densities(TODD)
     assert (search.anti_invariant.text, search.anti_invariant.verdict) == ("x*y*z", Certainty.PROVED)
     assert search.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
-    kahan = todd.map.at(1)
-    x = kahan.point([1, 2, 5])
-    assert reduce(lambda a, b: a * b, kahan.step(x)) == -kahan.jacobian(x).det() * 10
+    map_ = TODD.map.at(1)
+    x = map_.point([1, 2, 5])
+    assert prod(map_.step(x)) == -map_.jacobian(x).det() * 10
     assert find_densities(load("lotka_volterra")).anti_invariant is None
 
 
@@ -137,15 +104,14 @@ def test_numbers_that_are_products_of_each_other():
     relations = multiplicative_relations(functions)
     assert len(relations) == 6 - 4  # 2, 3, 5, a
     for k in relations:
-        values = [f.value(QQ, [fmpq(7)]) ** e for f, e in zip(functions, k, strict=True)]
-        assert reduce(lambda a, b: a * b, values) == 1
+        assert prod(f.value(QQ, [fmpq(7)]) ** e for f, e in zip(functions, k, strict=True)) == 1
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_coprime_base_makes_the_polynomials_again(seed):
     rng = random.Random(seed)
     primes = [nmod_poly([rng.randrange(P), *([rng.randrange(P)] * (d - 1)), 1], P) for d in (1, 1, 2, 3)]
-    given = [reduce(lambda a, b: a * b, (q ** rng.randint(0, 3) for q in primes)) for _ in range(4)]
+    given = [prod((q ** rng.randint(0, 3) for q in primes), start=primes[0] ** 0) for _ in range(4)]
     base = coprime_base(given)
     for i, a in enumerate(base):
         assert a.degree() > 0

@@ -12,19 +12,14 @@ from flint import fmpq, fmpz_poly
 from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
-from search_helpers import file_of
+from search_helpers import by_formulas, file_of
 
-from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps import Budget, QuadraticSystem, degree_growth, parse_system
 from kahanmaps.documents.catalog import load, map_names, names
-from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth, needed_hypersurfaces
 from kahanmaps.laboratory.singular.following import OrbitData, StepLimits
 from kahanmaps.laboratory.singular.singularities import Patterns, default_eps, patterns
 from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
-from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def settled(*rows, continues_as=None):
@@ -61,15 +56,13 @@ def test_the_degrees_of_the_catalogue_are_derived(name):
 @pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
 def test_hypersurfaces_of_one_form_are_told_apart_and_derive_degrees(name):
     result = patterns(file_of(name).map, fmpq(2, 7))
-    sizes = [h.degree for h in result.exceptional]
-    assert sorted(sizes) == OF_ONE_FORM[name]
+    assert sorted(h.degree for h in result.exceptional) == OF_ONE_FORM[name]
     measured = degree_growth(file_of(name).map, max_terms=6, patterns=result)
     assert measured.derived is not None
     # Each degree counts: with another one in its place the degrees of the map are other ones.
-    every = [h.orbit_data for h in result.exceptional]
-    for k in range(len(sizes)):
-        wrong = [(size + (j == k), orders) for j, (size, orders) in enumerate(zip(sizes, every, strict=True))]
-        costs = any(row[0] for row in every[k].rows)
+    for entry in result.exceptional:
+        wrong = [(h.degree + (h is entry), h.orbit_data) for h in result.exceptional]
+        costs = any(row[0] for row in entry.orbit_data.rows)
         assert (tuple(coefficients(degree_series([measured.degrees[1]], wrong), 7)) != measured.degrees) == costs
 
 
@@ -83,13 +76,10 @@ def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
     assert tuple(coefficients(result.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)
 
 
-@pytest.mark.parametrize(
-    ("m", "name"),
-    quick(
-        [(1, "planar_cubic_hamiltonian"), (2, "paper_m2"), (3, "paper_m3")],
-        [(1, "planar_cubic_hamiltonian"), (2, "paper_m2")],
-    ),
-)
+MEMBERS = [(1, "planar_cubic_hamiltonian"), (2, "paper_m2"), (3, "paper_m3")]
+
+
+@pytest.mark.parametrize(("m", "name"), quick(MEMBERS, MEMBERS[:2]))
 def test_the_degrees_of_the_family_are_those_of_m_planes(m, name):
     """docs/mathematics.md: 3 m n^2/4 + 1 for even n, m (3 n^2 + 5)/4 for odd n, from a recursion in the plane."""
     planar = [1, 2]
@@ -102,18 +92,16 @@ def test_the_degrees_of_the_family_are_those_of_m_planes(m, name):
 
 def test_orders_that_are_wrong_derive_nothing():
     """Each number in the orders of a map counts: changed, the degrees are not those measured."""
-    patterns = derived("euler_top")
-    sizes = [h.degree for h in patterns.exceptional]
-    every = [h.orbit_data for h in patterns.exceptional]
+    pairs = [(h.degree, h.orbit_data) for h in derived("euler_top").exceptional]
     true = degree_growth(load("euler_top").map, max_terms=8).degrees
-    assert tuple(coefficients(degree_series([3], list(zip(sizes, every, strict=True))), 9)) == true
-    for k, orders in enumerate(every):
+    assert tuple(coefficients(degree_series([3], pairs), 9)) == true
+    for k, (size, orders) in enumerate(pairs):
         for t, row in enumerate(orders.rows):
             for column, value in enumerate(row):
                 wrong = (*row[:column], value + 1, *row[column + 1 :])
                 other = replace(orders, rows=(*orders.rows[:t], wrong, *orders.rows[t + 1 :]))
-                changed = [other if j == k else pattern for j, pattern in enumerate(every)]
-                assert tuple(coefficients(degree_series([3], list(zip(sizes, changed, strict=True))), 9)) != true
+                changed = [*pairs[:k], (size, other), *pairs[k + 1 :]]
+                assert tuple(coefficients(degree_series([3], changed), 9)) != true
 
 
 def test_a_hypersurface_that_returns_goes_on_as_the_other():
@@ -123,10 +111,8 @@ def test_a_hypersurface_that_returns_goes_on_as_the_other():
     returning = settled(*rows, continues_as=(2, 0))
     recurring = OrbitData(rows, laws, 100, True)
     written = settled(*(rows * 10))
-    entry, two, three = (
-        coefficients(degree_series([2], [(1, orders)]), 20) for orders in (returning, recurring, written)
-    )
-    assert entry == two == three
+    ways = [coefficients(degree_series([2], [(1, orders)]), 20) for orders in (returning, recurring, written)]
+    assert ways[0] == ways[1] == ways[2]
 
 
 @given(st.integers(2, 5), st.integers(1, 4), st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), max_size=5))
@@ -143,16 +129,11 @@ def test_the_fraction_is_what_the_two_equations_give_step_by_step(degree, size, 
 
 def test_a_superattracting_point_lowers_no_degree():
     """A Henon map: infinity goes to a fixed point on it, with orders 2, 4, 8, ...; the degrees are 2^n."""
-    growth = degree_growth(explicit("y", "x + y^2"), max_degree=500)
+    growth = degree_growth(by_formulas("x,y", "y; x + y^2"), max_degree=500)
     assert growth.patterns.series == ((1,), (1, -2))
     (infinity,) = growth.patterns.exceptional
     assert [row[1] for row in infinity.orbit_data.rows] == [2**t for t in range(1, len(infinity.orbit_data.rows) + 1)]
     assert growth.dynamical_degree.text == "2"
-
-
-def explicit(*image):
-    names = ["x", "y", "z"][: len(image)]
-    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
 
 
 def test_unknown_orders_that_are_needed_derive_nothing():
@@ -169,9 +150,8 @@ def test_unknown_orders_that_are_needed_derive_nothing():
     with pytest.raises(ValueError, match="expected known multiplicities"):
         degree_series([2], [(1, costly), (1, replace(attracted, eventually_in=(0,)))])
     # What is not needed does not count.
-    assert degree_series([2], [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
-        [2], [(1, settled((1, 0)))]
-    )
+    more = degree_series([2], [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))])
+    assert more == degree_series([2], [(1, settled((1, 0)))])
 
 
 def word(*letters, power=1):
@@ -186,12 +166,12 @@ def word(*letters, power=1):
     return parse_system(f"[composition]\nof = [{', '.join(entries * power)}]").map
 
 
-def followed(map_, terms, eps=None):
+def followed(map_, terms, stage_of=lambda h: h.stage):
     """The word of a composition, and its degrees as its maps give them, followed one by one."""
     limits = StepLimits(12, 60, 40, Budget(), 40)
-    result, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
+    result, hypersurfaces = followed_map_by_map(map_, fmpq(3, 11), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
-    series = degree_series(result.degrees, pairs, [h.stage for h in hypersurfaces])
+    series = degree_series(result.degrees, pairs, [stage_of(h) for h in hypersurfaces])
     return result, coefficients(every_nth(series, result.length), terms + 1)
 
 
@@ -210,24 +190,15 @@ def test_words_give_the_measured_degrees(letters, power, terms, expected):
     map_ = word(*letters, power=power)
     found, degrees = followed(map_, terms)
     assert found == expected
-    measured = degree_growth(
-        map_, "3/11" if map_.has_eps else None, max_terms=terms, patterns=Patterns((), None, False)
-    )
-    assert tuple(degrees) == measured.degrees
+    eps = "3/11" if map_.has_eps else None
+    assert tuple(degrees) == degree_growth(map_, eps, max_terms=terms, patterns=Patterns((), None, False)).degrees
 
 
 def test_a_hypersurface_of_another_map_gives_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
-    limits = StepLimits(12, 60, 40, Budget(), 40)
-    result, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
-    right, wrong = (
-        coefficients(every_nth(degree_series(result.degrees, pairs, stages), 2), 6)
-        for stages in ([h.stage for h in hypersurfaces], [1 - h.stage for h in hypersurfaces])
-    )
-    assert right == [1, 4, 13, 43, 141, 463]
-    assert wrong != right
+    right = [1, 4, 13, 43, 141, 463]
+    assert followed(map_, 5)[1] == right != followed(map_, 5, lambda h: 1 - h.stage)[1]
 
 
 @pytest.mark.parametrize(("name", "k", "square"), [("mcmillan", 7, 2), ("euler_top", 2, 2)])
@@ -235,7 +206,7 @@ def test_powers_have_every_kth_degree(name, k, square):
     growth = degree_growth(word(name, power=k))
     assert (growth.ended, growth.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
     assert growth.patterns.word == Word((3,), k)
-    assert f"{k} maps make one iterate" in growth.text
+    assert f"one iterate consists of {k} maps" in growth.text
 
 
 def test_every_nth_coefficient_of_a_fraction():

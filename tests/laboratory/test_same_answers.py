@@ -4,21 +4,13 @@ what was asked before change no byte. An analysis alone finds no less than `anal
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from helpers import quick
 from search_helpers import analysis_of, integrals_of
 
+from kahanmaps import degree_growth, find_commuting, find_densities, find_poisson, height_survey, load, singularities
 from kahanmaps.algebra.work import Budget, count_work, counted
-from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.singular.singularities import singularities
-from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 SYSTEMS = ("riccati",)
@@ -122,7 +114,7 @@ def test_work_that_is_not_the_search_is_not_charged_to_it():
     assert len(less.degrees) < len(complete.degrees)
 
 
-ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
+ALONE = [
     ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
     ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),
     ("poisson", lambda name: find_poisson(load(name)), lambda found: [one.text for one in found.tensors]),
@@ -133,13 +125,10 @@ ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
 
 
 @pytest.mark.parametrize(
-    "name",
-    quick(["euler_top", "lotka_volterra", "volterra_periodic_3", "weierstrass"], ["euler_top"]),
+    "name", quick(["euler_top", "lotka_volterra", "volterra_periodic_3", "weierstrass"], ["euler_top"])
 )
 @pytest.mark.parametrize(("result", "search", "texts"), ALONE, ids=[row[0] for row in ALONE])
-def test_what_analyze_finds_the_command_finds(
-    name: str, result: str, search: Callable[[str], Any], texts: Callable[[Any], list[str]]
-) -> None:
+def test_what_analyze_finds_the_command_finds(name, result, search, texts):
     together = analysis_of(name)[result]
     alone = search(name)
     if together is None:  # tensors of the plane are densities

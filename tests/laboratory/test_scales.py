@@ -12,15 +12,10 @@ from functools import cache
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
+from kahanmaps import Laboratory, commuting_systems, find_densities, find_integrals, find_poisson, linear_symmetries
 from kahanmaps.algebra.polynomials import RationalFunction, primitive_part, ring
 from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.symmetry.commuting import commuting_systems
-from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 FIELDS = {
     "lorenz": ["10*(y - x)", "x*(28 - z) - y", "x*y - 20*z"],  # x^2 - 20 z

@@ -8,11 +8,9 @@ import time
 
 import pytest
 
-from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError
+from kahanmaps import InputError, analyze, load
 from kahanmaps.laboratory import analysis
 from kahanmaps.laboratory.analyses.step import AnalysisStep, MapKinds
-from kahanmaps.laboratory.analysis import analyze
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="a second process is for Linux")
 HERE = os.getpid()

@@ -6,12 +6,9 @@ from typing import Any
 
 from flint import fmpq_poly
 
+from kahanmaps import FamilyMember, Settings, SystemFile, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.algebra.chance import random_prime_field
-from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.paper import specialize
 from kahanmaps.paper.objects import PaperObjects
@@ -47,15 +44,9 @@ LARGE_SPECTRA: dict[str, Any] = {
 @cache
 def member(name: str) -> FamilyMember:
     """The member of one spectrum, one object for all tests."""
-    return fresh(name)
-
-
-def fresh(name: str) -> FamilyMember:
-    """The same member, made anew: nothing has been computed with it yet."""
     spectrum = {**SPECTRA, **LARGE_SPECTRA}[name]
-    if isinstance(spectrum, list):
-        return random_member_with_eigenvalues(spectrum, seed=3)
-    return random_member_with_chi(spectrum, seed=3)
+    draw = random_member_with_eigenvalues if isinstance(spectrum, list) else random_member_with_chi
+    return draw(spectrum, seed=3)
 
 
 def file(name: str) -> SystemFile:

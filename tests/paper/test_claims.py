@@ -51,12 +51,9 @@ def test_the_misprints_are_those_documented():
 
 def compared(claim, o):
     """For every pair of a claim, whether its sides are equal; compared entry by entry."""
-    results = []
-    for left, right in claim.function(o):
-        a, b = values(left), values(right)
-        assert len(a) == len(b)
-        results.append(a == b)
-    return results
+    pairs = [(values(left), values(right)) for left, right in claim.function(o)]
+    assert all(len(a) == len(b) for a, b in pairs)
+    return [a == b for a, b in pairs]
 
 
 def members_of(claim, spectra):
@@ -67,10 +64,8 @@ def failing(claim, spectra):
     """The members on which a claim does not do what it says, and those for which it says nothing."""
     names = members_of(claim, spectra)
     expected = claim.kind is not ClaimKind.DIFFERENT
-    outcomes = {name: compared(claim, point(name)) for name in names}
-    return [
-        name for name, results in outcomes.items() if not results or any(equal is not expected for equal in results)
-    ]
+    outcomes = [(name, compared(claim, point(name))) for name in names]
+    return [name for name, equal in outcomes if not equal or not all(one is expected for one in equal)]
 
 
 spectra = pytest.mark.parametrize("spectra", [QUICK, pytest.param(LARGER, marks=pytest.mark.slow)], ids=len)
@@ -106,23 +101,18 @@ def idle_controls(claim, spectra, first_alone):
     """The controls that a claim names and that do not refute it: on the first member that can show it, or on all."""
     results = []
     for control in claim.controls:
-        able = (
-            n for n in members_of(claim, spectra) if member(n).m >= max(2, CONTROLS[control].least_m) or claim.only_m
-        )
-        names = list(able)[: 1 if first_alone else None]
+        least = max(2, CONTROLS[control].least_m)
+        able = [name for name in members_of(claim, spectra) if member(name).m >= least or claim.only_m]
+        names = able[: 1 if first_alone else None]
         results += [(name, control) for name in names if outcome(claim, name, control) != "fails"]
     return results
 
 
+@spectra
 @together("claim", RIGHT)
-def test_every_control_that_a_claim_names_refutes_it(claim):
-    assert idle_controls(claim, QUICK, first_alone=True) == []
-
-
-@pytest.mark.slow
-@together("claim", RIGHT)
-def test_every_control_that_a_claim_names_refutes_it_on_all_members(claim):
-    assert idle_controls(claim, (*QUICK, *LARGER), first_alone=False) == []
+def test_every_control_that_a_claim_names_refutes_it(claim, spectra):
+    members = QUICK if spectra is QUICK else (*QUICK, *LARGER)
+    assert idle_controls(claim, members, first_alone=spectra is QUICK) == []
 
 
 @together("claim", [entry for entry in RIGHT if entry.makes_sense(1)])

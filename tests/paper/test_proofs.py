@@ -6,6 +6,7 @@ a changed right-hand side, which must be refuted both at random points and in no
 """
 
 from dataclasses import replace
+from math import prod
 
 import pytest
 from helpers import quick, refuses, together
@@ -90,26 +91,20 @@ def test_beyond_the_budget_there_is_no_proof(function, budget, only, monkeypatch
 
 
 def test_a_proof_needs_as_many_indeterminates_as_the_normal_form_has(only):
-    # A root and three coefficients a block, eps, and a vector v of length 4.
     only(fabricated(lambda o: [(o.dot(o.vector("v"), o.fx), o.dot(o.fx, o.vector("v")))]))
     evidence = normal_form_proof("fabricated", 2, 3)
     assert (evidence.method, evidence.data["blocks"]) == ("symbolic, normal form", 2)
-    assert evidence.data["indeterminates"] == 2 * 4 + 1 + 4
+    assert evidence.data["indeterminates"] == 2 * 4 + 1 + 4  # a root and 3 coefficients a block, eps, and v
 
 
 def changed(claim):
     """The claim with something added to the first of its right-hand sides."""
 
     def function(o):
-        first = True
-        for left, right in claim.function(o):
-            if first and hasattr(right, "nrows"):
-                entry = [o.K.one] * (right.nrows() * right.ncols())
-                right = right + o.K.matrix(right.nrows(), right.ncols(), entry)
-            elif first:
-                right = right + o.eps
-            first = False
-            yield left, right
+        (left, right), *others = claim.function(o)
+        shape = (right.nrows(), right.ncols()) if hasattr(right, "nrows") else None
+        yield left, right + (o.K.matrix(*shape, [o.K.one] * prod(shape)) if shape else o.eps)
+        yield from others
 
     function.__doc__ = claim.function.__doc__
     return replace(claim, function=function)
