@@ -139,18 +139,6 @@ def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
         return None
 
 
-def combine(*terms: tuple[Any, Sequence[Any]]) -> tuple[Any, ...]:
-    """The linear combination of vectors: the sum of a v over the pairs (a, v)."""
-    dim = len(terms[0][1])
-    total = []
-    for i in range(dim):
-        entry = terms[0][0] * terms[0][1][i]
-        for factor, vector in terms[1:]:
-            entry = entry + factor * vector[i]
-        total.append(entry)
-    return tuple(total)
-
-
 def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:
     """Whether two vectors are equal: exactly over an exact field, as far as balls can tell over another."""
     return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
