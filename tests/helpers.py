@@ -5,6 +5,8 @@ Strategies draw plain data, so that hypothesis can shrink a failure to something
 
 import ast
 import random
+import shutil
+import subprocess
 from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import cache, wraps
@@ -22,6 +24,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import titles
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SMALLEST_LARGE_PRIME = 2**63 + 29
@@ -137,6 +140,20 @@ def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
         return phi.step(x)
     except SingularStep:
         return None
+
+
+def ended(orbit: Orbit) -> OrbitEnd:
+    """Walks the orbit to its end."""
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+def gp(script: str) -> list[str]:
+    """The words that PARI/GP prints; the test is skipped where that is not installed."""
+    if shutil.which("gp") is None:
+        pytest.skip("PARI/GP (gp) is not installed")
+    return subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
 
 
 def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:

@@ -1,7 +1,8 @@
 """One claim from start to end: what decides where proof, random points and an orbit all have their say.
 
 Proof comes first, and is tried all the same: a proved claim that fails at a random point or on an orbit is an error of
-the library, and is raised as one."""
+the library, and is raised as one.
+"""
 
 from dataclasses import replace
 

@@ -1,6 +1,7 @@
 """Do two Kahan maps commute: proved where a theorem applies, refuted with a witness, supported at random points.
 
-Every witness is computed a second time, by an elimination over Python's Fractions."""
+Every witness is computed a second time, by an elimination over Python's Fractions.
+"""
 
 from fractions import Fraction
 from functools import cache

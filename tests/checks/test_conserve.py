@@ -1,6 +1,7 @@
 """Are integrals conserved: I(x~) = I(x), proved for those that a theorem gives, decided for those that are claimed.
 
-Every witness is computed a second time with Python's Fractions."""
+Every witness is computed a second time with Python's Fractions.
+"""
 
 import pytest
 from check_helpers import (

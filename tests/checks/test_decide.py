@@ -1,6 +1,7 @@
 """Deciding identities at random points over GF(p), p random: supported with a stated error bound, or refuted.
 
-Witnesses are computed a second time."""
+Witnesses are computed a second time.
+"""
 
 import math
 import random

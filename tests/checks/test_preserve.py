@@ -1,6 +1,7 @@
 """Invariant measures dx/phi and the Poisson tensor Pi(x) = J - eps^2 f'(x)^2 J.
 
-Witnesses are computed a second time, det dPhi and dPhi from dual numbers."""
+Witnesses are computed a second time, det dPhi and dPhi from dual numbers.
+"""
 
 from fractions import Fraction
 

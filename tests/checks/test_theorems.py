@@ -1,7 +1,8 @@
 """Proof by hypotheses: a theorem applies when every one of its finite hypotheses holds exactly, and then only.
 
 Where a broken hypothesis breaks the conclusion as well, that is shown by a point at which the independent computation
-fails."""
+fails.
+"""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,6 +1,7 @@
 """The Kahan (Hirota-Kimura) map over any field; the time step is 2 eps.
 
-Its image is that of a second implementation, the defining equation solved in Python's own fractions."""
+Its image is that of a second implementation, the defining equation solved in Python's own fractions.
+"""
 
 from fractions import Fraction
 from itertools import product

@@ -1,6 +1,7 @@
 """Steps by relations along an orbit, Somos sequences or bilinear forms, against single steps by linear systems.
 
-On curves that are made up sections of every degree are found from coordinates that are some of them."""
+On curves that are made up sections of every degree are found from coordinates that are some of them.
+"""
 
 import random
 from io import StringIO
