@@ -11,6 +11,8 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import cache, wraps
 from inspect import signature
+from itertools import permutations
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +161,15 @@ def gp(script: str) -> list[str]:
 def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:
     """Whether two vectors are equal: exactly over an exact field, as far as balls can tell over another."""
     return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
+
+
+def leibniz(field: Any, matrix: Any) -> Any:
+    """The determinant as the sum over all permutations."""
+    n, rows, total = matrix.nrows(), matrix.tolist(), field.zero
+    for permutation in permutations(range(n)):
+        inversions = sum(permutation[i] > permutation[j] for i in range(n) for j in range(i + 1, n))
+        total = total + prod((rows[i][j] for i, j in enumerate(permutation)), start=field.convert((-1) ** inversions))
+    return total
 
 
 def encloses(ball: arb, number: fmpq) -> bool:
