@@ -40,7 +40,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 pytestmark = pytest.mark.usefixtures("at_points_only")
 
-HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
 WEIERSTRASS = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 
 
@@ -114,12 +113,8 @@ def test_a_class_has_modified_h_and_h_and_k_of_every_system_and_those_of_the_com
     results = [integral.name for integral, _, _ in known_integrals(SystemFile.from_member(member))]
     labels = [associate.label for associate in member.associated()][1:]
     assert len(labels) == classes - 1
-    assert results == [
-        "modified H",
-        "H~",
-        *(f"K~_{label}" for label in labels),
-        *(f"H~_{k}" for k in range(1, member.m)),
-    ]
+    chain = [f"H~_{k}" for k in range(1, member.m)]
+    assert results == ["modified H", "H~", *(f"K~_{label}" for label in labels), *chain]
 
 
 @over_family
@@ -206,13 +201,13 @@ def test_an_integral_of_the_commutant_lemma_may_be_0(H, verdict):
     assert report.verdict is PROVED
 
 
-ORIGINAL_VALUE = ModifiedHamiltonian.value
-
-
 def test_one_half_for_one_third_in_modified_h_contradicts_the_theorem(monkeypatch):
+    right = ModifiedHamiltonian.value
+
     def wrong(self, field, eps, point):  # H + grad H . (x~ - x)/2 = (3 (modified H) - H)/2
         H = evaluate(self.hamiltonian.H, field, point)
-        return (ORIGINAL_VALUE(self, field, eps, point) * field.convert(3) - H) / field.convert(2)
+        return (right(self, field, eps, point) * field.convert(3) - H) / field.convert(2)
 
     monkeypatch.setattr(ModifiedHamiltonian, "value", wrong)
-    refuses("modified H is conserved", check_integrals, SystemFile.from_hamiltonian(HENON), QUICK, error=Contradiction)
+    file = SystemFile.from_hamiltonian(WEIERSTRASS)
+    refuses("modified H is conserved", check_integrals, file, QUICK, error=Contradiction)

@@ -267,9 +267,6 @@ def test_an_interrupted_ensemble_stops_between_portions_and_can_go_on():
     assert 3 < orbits.step - reached < 10**6
 
 
-SQUARE = QuadraticSystem.from_text(["x"], ["x^2"])
-
-
 def walk(system, eps, start, steps, method):
     ensemble = MethodEnsemble(system, eps, [start], method, kernel="numpy")
     points = np.concatenate([x[:, 0] for x in ensemble.records(steps, 1)])
@@ -278,7 +275,7 @@ def walk(system, eps, start, steps, method):
 
 def test_a_midpoint_equation_without_solution_ends_the_orbit():
     # y = x + y^2/2 with x = 10 has no real solution.
-    x, end = walk(SQUARE, "1/2", [10], 100, "midpoint")
+    x, end = walk(RICCATI, "1/2", [10], 100, "midpoint")
     assert (end.status, end.steps, len(x)) == ("singular", 0, 1)
     assert "equations of midpoint" in end.message
 
@@ -428,7 +425,7 @@ def test_positions_and_momenta_are_found_in_any_order_and_scale_and_reasons_are_
     assert of("p^2/2 + q^3") == (frozenset({0}), frozenset({1}))
     assert of("p^2/2 + q^3", fmpq_mat([[0, 3], [-3, 0]]), ("p", "q")) == (frozenset({0}), frozenset({1}))
     assert of("p*q + q^3") == "H is not of the form T(p) + V(q): p would be a position and a momentum"
-    assert "no Hamiltonian form" in separated(SQUARE, None)
+    assert "no Hamiltonian form" in separated(RICCATI, None)
 
 
 def test_lines_at_right_angles_are_not_parallel():

@@ -47,19 +47,15 @@ def test_j_invariant_and_height_agree_with_pari(name):
     assert [orbit.bad_primes.minimal_discriminant, len(orbit.bad_primes.bad)] == [int(line) for line in lines[3:]]
 
 
-def j_of_quartic(a, b, c, d, e):
-    """The j-invariant of v^2 = a t^4 + b t^3 + c t^2 + d t + e by its classical invariants."""
-    I, J = 12 * a * e - 3 * b * d + c * c, 72 * a * c * e + 9 * b * c * d - 27 * (a * d * d + b * b * e) - 2 * c**3
-    return 6912 * I**3 / (4 * I**3 - J * J)
-
-
 @pytest.mark.parametrize("start", [START, ["1/2", "-3"]])
 def test_the_j_invariant_is_that_of_the_biquadratic_level_curve(start):
     """McMillan's map with a = 1/2 conserves I = x^2 y^2 - x^2 - y^2 + x y: a double cover of the y-line."""
     x, y = (fmpq(*Fraction(entry).as_integer_ratio()) for entry in start)
     level = x * x * y * y - x * x - y * y + x * y
-    # (y^2 - 1) x^2 + y x - (y^2 + I): the discriminant is y^2 + 4 (y^2 - 1) (y^2 + I).
-    expected = j_of_quartic(fmpq(4), fmpq(0), 1 + 4 * level - 4, fmpq(0), -4 * level)
+    # (y^2 - 1) x^2 + y x - (y^2 + I): the discriminant is y^2 + 4 (y^2 - 1) (y^2 + I) = a y^4 + c y^2 + e.
+    a, c, e = 4, 1 + 4 * level - 4, -4 * level
+    I, J = 12 * a * e + c * c, 72 * a * c * e - 2 * c**3  # the invariants of a quartic
+    expected = 6912 * I**3 / (4 * I**3 - J * J)
     assert km.geometry("mcmillan", start).j == expected
     assert km.geometry("mcmillan", ["1/8", "2/5"]).j != expected
 
@@ -87,11 +83,6 @@ def test_heights_grow_as_the_canonical_height_says(name):
     assert abs(measured / constant - 1) < 1e-3
 
 
-def float_orbit(name, start, eps, steps):
-    ensemble = FloatEnsemble(km.load(name), eps or 1, np.array([[float(Fraction(x)) for x in start]]))
-    return np.concatenate([portion[:, 0] for portion in ensemble.records(steps, 1)])
-
-
 @pytest.mark.parametrize(
     ("name", "axes", "center"),
     [
@@ -105,7 +96,8 @@ def test_the_rotation_number_is_that_of_a_float_orbit(name, axes, center):
     start, eps = (["-1/2", "1/10"], "1/10") if name == "weierstrass" else ORBITS[name]
     start = ["3", "1/7", "1/5"] if name == "euler_top" else start
     orbit = km.geometry(name, start, eps)
-    points = float_orbit(name, start, eps, 60_000)[:, axes]
+    ensemble = FloatEnsemble(km.load(name), eps or 1, np.array([[float(Fraction(x)) for x in start]]))
+    points = np.concatenate([portion[:, 0] for portion in ensemble.records(60_000, 1)])[:, axes]
     points = points - (np.mean(points, axis=0) if center is None else center)
     measured = mean_turn(np.arctan2(points[:, 1], points[:, 0]), 2 * math.pi)
     assert (orbit.iterate, orbit.steps) == (1, 1)

@@ -224,15 +224,12 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
 @pytest.mark.parametrize(
     ("requested", "arithmetic", "normal_form", "at", "expected"),
     [
-        (None, "exact", NONE, None, "generic"),
         (None, "mod", NONE, (10**9,), "generic"),
         ("generic", "exact", SPLIT, (10**9,), "generic"),
-        (None, "exact", SPLIT, None, "normal-form"),
         (None, "exact", UNSPLIT, None, "normal-form"),
         (None, "float", UNSPLIT, None, "normal-form"),
         (None, "float", SPLIT, (10**9,), "normal-form"),
         (None, "ball", UNSPLIT, None, "normal-form"),
-        (None, "mod", SPLIT, None, "generic"),
         ("normal-form", "exact", SPLIT, None, "normal-form"),
         ("normal-form", "ball", UNSPLIT, None, "normal-form"),
         ("doubling", "exact", UNSPLIT, (3,), "doubling"),
@@ -240,7 +237,6 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
         # Iterates wanted alone are reached directly from a certain step on, where they are few.
         (None, "exact", SPLIT, (23,), "normal-form"),
         (None, "exact", SPLIT, (24,), "doubling"),
-        (None, "exact", SPLIT, (1, 2, 40), "doubling"),
         (None, "exact", SPLIT, (1, 2, 3, 4, 5, 40), "normal-form"),
         (None, "exact", SPLIT, (1, 2, 3, 40), "doubling"),
         (None, "exact", UNSPLIT, (24,), "doubling"),

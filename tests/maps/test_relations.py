@@ -11,7 +11,6 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpz, nmod
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
@@ -29,6 +28,32 @@ from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
 BITS = 10_000
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
+
+
+START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
+
+
+def over(name, eps="3/11"):
+    return load(name).map.at(eps)
+
+
+def begin(map_over):
+    """A start without special properties."""
+    return IntegerPoint.from_rationals(START[: map_over.dim])
+
+
+def single_steps(map_over, start, steps):
+    """The points of an orbit, by one linear system each, as far as there are any."""
+    points = [start]
+    while len(points) <= steps and (image := map_over.integer_step(points[-1])) is not None:
+        points.append(image)
+    return points
+
+
+def walked(map_over, start, steps):
+    """The points as orbits have them, and the orbit."""
+    orbit = rational_orbit.RationalOrbit(map_over, start)
+    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit
 
 
 @pytest.fixture(autouse=True)

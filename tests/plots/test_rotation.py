@@ -65,6 +65,7 @@ def test_the_horizontal_axis_may_be_an_integral():
     ("system", "ends", "points", "message"),
     [
         (MEMBER, [[1, 2, 3, 5], [2, 2, 3, 5]], 1, "found 1 points, expected 2 to 10000"),
+        (MEMBER, [[1, 2, 3, 5], [2, 2, 3, 5]], 10**8, "found 100000000 points, expected 2 to 10000"),
         (MEMBER, [[1, 2, 3, 5], [2, 2, 3, 5]], "5", "found points = '5', expected an integer"),
         (MEMBER, [[1, 2, 3, 5], [2, 2, 3]], 5, "found a point with 3 coordinates, expected 4"),
         (MEMBER, [[0, 0, 0, 0], [0, 0, 0, 0]], 3, "no initial point with a rotation number"),  # fixed points

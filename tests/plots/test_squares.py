@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flint import fmpq
+from helpers import refuses
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
@@ -83,9 +84,10 @@ def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     assert (later.g_after_f[3][0], later.closes, bool(later.stopped)) == (None, True, True)
 
 
-def test_numbers_that_grow_too_long_are_left_out(monkeypatch):
+def test_numbers_that_grow_too_long_are_left_out_and_no_step_is_refused(monkeypatch):
     monkeypatch.setattr(module, "MAX_BITS", 40)
     assert "more than 40 bits" in squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2).stopped
+    refuses("expected 1 to 12", squares, plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", 0)
 
 
 def test_the_chosen_signs_are_drawn_and_their_neighbour():
