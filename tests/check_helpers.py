@@ -163,11 +163,8 @@ def polynomial_value(polynomial: fmpq_mpoly, point: Sequence[Any]) -> Any:
     """The value of a polynomial, term by term."""
     total: Any = Fraction(0)
     for monomial, coefficient in polynomial.terms():
-        term: Any = fraction(coefficient)
-        for entry, exponent in zip(point, monomial, strict=True):
-            for _ in range(exponent):
-                term = term * entry
-        total = total + term
+        factors = (entry for entry, exponent in zip(point, monomial, strict=True) for _ in range(exponent))
+        total = total + math.prod(factors, start=fraction(coefficient))
     return total
 
 
@@ -310,21 +307,15 @@ F = FunctionField(["x", "y", "z"], 10**9)
 
 def true_size(polynomial: fmpq_mpoly) -> tuple[int, float]:
     """The degree, and log2 of the sum of the absolute coefficients, of a polynomial with integer coefficients."""
-    total, degree = 0, 0
-    for monomial, coefficient in polynomial.terms():
-        assert coefficient.q == 1
-        total += abs(int(coefficient.p))
-        degree = max(degree, int(sum(monomial)))
-    return degree, math.log2(total) if total else 0.0
+    assert all(coefficient.q == 1 for coefficient in polynomial.coeffs())
+    total = sum(abs(int(coefficient.p)) for coefficient in polynomial.coeffs())
+    return max((int(sum(monomial)) for monomial in polynomial.monoms()), default=0), math.log2(total) if total else 0.0
 
 
 def primitive(polynomial: fmpq_mpoly) -> fmpq_mpoly:
     """The multiple with coprime integer coefficients."""
-    denominator, content = 1, 0
-    for _, coefficient in polynomial.terms():
-        denominator = math.lcm(denominator, int(coefficient.q))
-    for _, coefficient in polynomial.terms():
-        content = math.gcd(content, int(coefficient.p) * (denominator // int(coefficient.q)))
+    denominator = math.lcm(*(int(coefficient.q) for coefficient in polynomial.coeffs()))
+    content = math.gcd(*(int((coefficient * denominator).p) for coefficient in polynomial.coeffs()))
     return polynomial * fmpq(denominator, content or 1)
 
 
@@ -352,11 +343,8 @@ def polynomials(draw):
     terms = draw(st.dictionaries(monomials, st.integers(-9, 9).filter(bool), max_size=4))
     total = F.zero
     for exponents, coefficient in terms.items():
-        term = F.convert(coefficient)
-        for variable, exponent in zip(F.variables, exponents, strict=True):
-            for _ in range(exponent):
-                term = term * variable
-        total = total + term
+        factors = (variable for variable, exponent in zip(F.variables, exponents, strict=True) for _ in range(exponent))
+        total = total + math.prod(factors, start=F.convert(coefficient))
     return total
 
 

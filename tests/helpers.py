@@ -6,10 +6,14 @@ Strategies draw plain data, so that hypothesis can shrink a failure to something
 import ast
 import random
 import re
+import shutil
+import subprocess
 from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import cache, wraps
 from inspect import signature
+from itertools import permutations
+from math import prod
 from operator import add
 from pathlib import Path
 from typing import Any
@@ -24,6 +28,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import titles
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SMALLEST_LARGE_PRIME = 2**63 + 29
@@ -141,21 +146,32 @@ def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
         return None
 
 
-def combine(*terms: tuple[Any, Sequence[Any]]) -> tuple[Any, ...]:
-    """The linear combination of vectors: the sum of a v over the pairs (a, v)."""
-    dim = len(terms[0][1])
-    total = []
-    for i in range(dim):
-        entry = terms[0][0] * terms[0][1][i]
-        for factor, vector in terms[1:]:
-            entry = entry + factor * vector[i]
-        total.append(entry)
-    return tuple(total)
+def ended(orbit: Orbit) -> OrbitEnd:
+    """Walks the orbit to its end."""
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+def gp(script: str) -> list[str]:
+    """The words that PARI/GP prints; the test is skipped where that is not installed."""
+    if shutil.which("gp") is None:
+        pytest.skip("PARI/GP (gp) is not installed")
+    return subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
 
 
 def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:
     """Whether two vectors are equal: exactly over an exact field, as far as balls can tell over another."""
     return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
+
+
+def leibniz(field: Any, matrix: Any) -> Any:
+    """The determinant as the sum over all permutations."""
+    n, rows, total = matrix.nrows(), matrix.tolist(), field.zero
+    for permutation in permutations(range(n)):
+        inversions = sum(permutation[i] > permutation[j] for i in range(n) for j in range(i + 1, n))
+        total = total + prod((rows[i][j] for i, j in enumerate(permutation)), start=field.convert((-1) ** inversions))
+    return total
 
 
 def encloses(ball: arb, number: fmpq) -> bool:

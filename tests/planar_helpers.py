@@ -12,8 +12,6 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly, fq_default_ctx
 from helpers import quick
 
-import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
-from kahanmaps import load
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import linear_combinations, ring
@@ -21,10 +19,8 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
-from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -259,37 +255,6 @@ def diagonal(entries: Sequence[Any]) -> fmpq_mat:
     """The diagonal matrix with these entries."""
     n = len(entries)
     return fmpq_mat(n, n, [fmpq(entries[i]) if i == j else fmpq(0) for i in range(n) for j in range(n)])
-
-
-START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
-
-
-def over(name: str, eps: str = "3/11") -> Map:
-    """The map of a system of the catalogue."""
-    result: Map = load(name).map.at(eps)
-    return result
-
-
-def begin(map_over: Map) -> IntegerPoint:
-    """A start without special properties."""
-    return IntegerPoint.from_rationals(START[: map_over.dim])
-
-
-def single_steps(map_over: Map, start: IntegerPoint, steps: int) -> list[IntegerPoint]:
-    """The points of an orbit, by one linear system each, as far as there are any."""
-    points = [start]
-    for _ in range(steps):
-        image = map_over.integer_step(points[-1])
-        if image is None:
-            break
-        points.append(image)
-    return points
-
-
-def walked(map_over: Map, start: IntegerPoint, steps: int) -> tuple[list[Any], rational_orbit.RationalOrbit]:
-    """The points as orbits have them, and the orbit."""
-    orbit = rational_orbit.RationalOrbit(map_over, start)
-    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit
 
 
 def mean_turn(angles, turn):

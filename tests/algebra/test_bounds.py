@@ -1,7 +1,6 @@
-"""Bounds for degrees and coefficients: never below the truth.
+"""Bounds for degrees and coefficients, compared with the polynomial that they bound: never below the truth.
 
-A bound is compared with the polynomial that it is a bound of: sums, products, determinants and Cramer's rule on random
-polynomials. What is composed of these is bounded by composition; tests/checks and tests/paper look at whole claims.
+What is composed of these is bounded by composition; tests/checks and tests/paper look at whole claims.
 """
 
 import math
@@ -86,15 +85,9 @@ def test_solutions_are_bounded_by_cramers_rule(drawn):
     bound = in_K(K, rows).solve(in_K(K, right)).entry
     assert true_size(numerator(determinant))[0] <= bound.pole_degree
     for entry in matrix.solve(in_F(right)).entries():
-        assert covers_polynomial(bound.numerator, cleared(entry, determinant))
-
-
-def cleared(entry, determinant):
-    """The polynomial entry * determinant."""
-    product = determinant.numerator * entry.numerator
-    quotient = product / entry.denominator
-    assert quotient * entry.denominator == product
-    return quotient
+        product = determinant.numerator * entry.numerator  # over the denominator it is a polynomial
+        assert product / entry.denominator * entry.denominator == product
+        assert covers_polynomial(bound.numerator, product / entry.denominator)
 
 
 def test_what_is_compared_with_zero_must_not_be_zero():

@@ -1,13 +1,11 @@
 """The fields of numbers: one protocol over QQ, GF(p), RR(bits) and CC(bits).
 
-Specified here: what `convert` takes and what it refuses, that it respects sums and products, that text comes back,
-which moduli and precisions are allowed, and what a ball may be said to be. What integers have in common with
-the primes of another one.
+What integers have in common with the primes of another one.
 """
 
 from fractions import Fraction
 from itertools import product
-from math import gcd
+from math import gcd, prod
 
 import numpy as np
 import pytest
@@ -28,8 +26,6 @@ over_balls = pytest.mark.parametrize("balls", [RR, CC], ids=["RR", "CC"])
 
 integers = st.integers(-(10**30), 10**30)
 
-
-# The door: what is an exact number, and what is not.
 
 EXACT = [
     (3, fmpq(3)),
@@ -149,9 +145,7 @@ def test_a_division_that_is_not_exact_raises(quotient, divisor, remainder, sign)
 )
 def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
     assume(any(numbers))
-    product = 1
-    for prime in shared:
-        product *= prime
+    product = prod(shared)
     common = gcd(*(product * number for number in numbers))
     expected = 1
     for prime in (2, 3, 5):

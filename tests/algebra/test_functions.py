@@ -30,11 +30,8 @@ def linear(field: FunctionField, a: int, b: int, c: int) -> Function:
 
 @st.composite
 def functions(draw, field: FunctionField) -> Function:
-    numerator = linear(field, draw(small), draw(small), draw(small)) * linear(
-        field, draw(small), draw(small), draw(small)
-    )
-    denominator = linear(field, draw(small), draw(small), draw(st.integers(1, 4)))
-    return numerator / denominator
+    first, second = (linear(field, draw(small), draw(small), draw(small)) for _ in range(2))
+    return first * second / linear(field, draw(small), draw(small), draw(st.integers(1, 4)))
 
 
 FIELD = FunctionField(NAMES, budget=10**12)
@@ -148,9 +145,8 @@ def test_the_digits_of_the_iterates_of_an_affine_map_grow_linearly():
     right = field.matrix(2, 2, [1, fmpq(1, 10), fmpq(-1, 10), 1])
     for _ in range(40):
         x = matrix.solve(right * x)
-    exact = (
-        fmpq_mat([[1, fmpq(-1, 10)], [fmpq(1, 10), 1]]).inv() * fmpq_mat([[1, fmpq(1, 10)], [fmpq(-1, 10), 1]])
-    ) ** 40
+    step = fmpq_mat([[1, fmpq(-1, 10)], [fmpq(1, 10), 1]]).inv() * fmpq_mat([[1, fmpq(1, 10)], [fmpq(-1, 10), 1]])
+    exact = step**40
     for entry, row in zip(x.entries(), exact.tolist(), strict=True):
         assert value(entry, (fmpq(2), fmpq(3))) == 2 * row[0] + 3 * row[1]
         assert len(str(entry.numerator)) + len(str(entry.denominator)) < 800

@@ -1,11 +1,9 @@
 """Bad primes of elliptic curves over Q against PARI's minimal models, and numbers that are not factored."""
 
 import random
-import shutil
-import subprocess
 
-import pytest
 from flint import fmpq, fmpq_poly, fmpz
+from helpers import gp
 
 from kahanmaps.algebra.elliptic_curves import EllipticCurve
 from kahanmaps.algebra.reduction import bad_primes, bad_primes_of_plane, factor_within_bound, newton_slopes
@@ -23,7 +21,6 @@ def curves():
         )
 
 
-@pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")
 def test_bad_primes_and_minimal_discriminants_agree_with_pari():
     smooth = [curve for curve in curves() if curve.discriminant != 0]
     found = [bad_primes(curve) for curve in smooth]
@@ -35,7 +32,7 @@ def test_bad_primes_and_minimal_discriminants_agree_with_pari():
             smooth.append(EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma**2))
             found.append(bad_primes_of_plane(gamma))
     script = "\n".join(f"print(ellminimalmodel(ellinit([0,{E.a2},0,{E.a4},{E.a6}])).disc)" for E in smooth)
-    lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
+    lines = gp(script)
     assert len(lines) == len(smooth)
     for result, line in zip(found, lines, strict=True):
         assert result.minimal_discriminant == int(line)

@@ -1,6 +1,7 @@
 """Small systems of polynomial equations: every rational solution, and honest words about the rest."""
 
 import itertools
+from math import prod
 
 import pytest
 from flint import Ordering, fmpq, fmpz_mpoly_ctx, fmpz_mpoly_vec
@@ -27,13 +28,7 @@ def points(result):
 def test_all_points_of_a_finite_set_are_found(expected, shear):
     """The ideal of a finite set: all products of one linear form for each point."""
     forms = [[x - a + shear * (y - b), y - b + shear * (z - c), z - c] for a, b, c in expected]
-    equations = []
-    for choice in itertools.product(*forms):
-        total = RING.constant(1)
-        for form in choice:
-            total = total * form
-        equations.append(total)
-    solution = solve(*equations)
+    solution = solve(*(prod(choice, start=RING.constant(1)) for choice in itertools.product(*forms)))
     assert points(solution) == expected
     assert solution.complete
     assert not solution.irrational

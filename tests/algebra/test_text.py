@@ -1,8 +1,6 @@
 """Numbers, points, polynomials and rational functions in text.
 
-Specified here: what each text means, exactly; that what is printed parses back to the same value; where a mistake is
-reported (the column) and in which words; and that no text, however hostile, gets past the limits: each ends in an
-`ExpressionError` while FLINT, which would end the process, is still safe.
+Any text, however hostile, ends in an `ExpressionError` while FLINT, which would end the process, is still safe.
 """
 
 from pathlib import Path

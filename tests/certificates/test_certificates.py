@@ -24,7 +24,6 @@ from kahanmaps.certificates.certificate import (
     _Planes,
     _prepare,
     certificate,
-    certificate_of,
 )
 from kahanmaps.certificates.chains import Chain, periodic
 from kahanmaps.certificates.combinations import (
@@ -36,11 +35,9 @@ from kahanmaps.certificates.combinations import (
     modified_hamiltonian,
 )
 from kahanmaps.certificates.darboux import (
-    ConservedFunction,
     DarbouxPolynomial,
     conserved_function,
     darboux_polynomial,
-    invariant_volume,
 )
 from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
@@ -55,7 +52,6 @@ from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import System
-from kahanmaps.errors import InputError
 from kahanmaps.family.random_members import random_member
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
@@ -104,10 +100,9 @@ def test_a_program_that_is_not_ours_accepts_every_claim_of_a_system(name, checke
 
 
 @pytest.mark.parametrize("checker", PROGRAMS)
-@pytest.mark.parametrize("name", ["weierstrass"])
-def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tmp_path):
+def test_a_certificate_with_one_coefficient_changed_is_refused(checker, tmp_path):
     _, _, where, changed = PROGRAMS[checker]
-    text, count = re.subn(where, changed, certificate(load(name), checker), flags=re.MULTILINE)
+    text, count = re.subn(where, changed, certificate(load("weierstrass"), checker), flags=re.MULTILINE)
     assert count
     assert run(checker, text, tmp_path).returncode != 0
 
@@ -132,22 +127,15 @@ def changed(claim):
     if isinstance(claim, ChangedFunction):
         P, Q = claim.new_function
         return replace(claim, new_function=(P + P.context().gen(0), Q))
-    if isinstance(claim, ConservedFunction):
-        return replace(claim, fraction=changed_products(claim.fraction))
-    if isinstance(claim, DarbouxPolynomial):
-        return replace(claim, product=changed_products(claim.product))
-    if claim.fraction is not None:
-        return replace(claim, fraction=changed_products(claim.fraction))
-    return replace(claim, numerator=claim.numerator + claim.numerator.context().gen(0))
-
-
-def changed_products(fraction):
-    """The products with one coefficient changed."""
+    name = "product" if isinstance(claim, DarbouxPolynomial) else "fraction"
+    fraction = getattr(claim, name)
+    if fraction is None:
+        return replace(claim, numerator=claim.numerator + claim.numerator.context().gen(0))
     first, *others = fraction.products
     P, *rest = first.factors
     other = 1 if P.degree == 1 else P.polynomial.context().gen(0)  # x^2 + y^2 + 1 would be an integral
     factors = (replace(P, polynomial=P.polynomial + other), *rest)
-    return replace(fraction, products=(replace(first, factors=factors), *others))
+    return replace(claim, **{name: replace(fraction, products=(replace(first, factors=factors), *others))})
 
 
 CASES = [("weierstrass", "modified_hamiltonian"), ("lotka_volterra", "poisson"), ("lotka_volterra", "darboux")]
@@ -232,19 +220,6 @@ def test_an_equivalence_by_a_given_map_and_one_that_changes_eps(checker, tmp_pat
         assert run(checker, text, tmp_path).returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("by", "message"),
-    [
-        (["4*x - 8", "4*y"], "equivalence takes the map to another one"),
-        (["4*x - 8"], "weierstrass and 1 polynomial, expected two quadratic systems of the same dimension"),
-        (["x^2", "y"], "found x.2, y, expected polynomials of degree at most 1"),
-        (["0", "0"], "equivalence is not invertible"),
-    ],
-)
-def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
-    refuses(message, certificate, EQUIVALENT, "gp", equivalent=load("weierstrass", {"g2": 64}), by=by)
-
-
 @over(*PROGRAMS)
 def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     file = load("lyness", {"a": 1})
@@ -253,6 +228,17 @@ def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, 
     wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
     values = (*chain.values[:2], wrong, *chain.values[3:])
     assert run(checker, CHECKERS[checker]([replace(chain, values=values)]), tmp_path).returncode != 0
+
+
+def wrong_entropies(claim):
+    """The claim with one number changed."""
+    first, *others = claim.forms[-1]
+    return [
+        replace(claim, lower=claim.lower + Fraction(1, 100)),
+        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
+        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
+        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
+    ]
 
 
 POSITIVE = ["lotka_volterra", "fibonacci", "zander_120", "lotka_volterra_symplectic_euler"]
@@ -266,14 +252,7 @@ def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, 
     (claim,) = claims_of(name, "entropy")
     done = run(checker, CHECKERS[checker]([claim]), tmp_path)
     assert (done.returncode, "FALSE" in done.stdout) == (0, False), done.stdout + done.stderr
-    (_, *others), first = claim.forms[-1], claim.forms[-1][0]
-    for wrong in (
-        replace(claim, line_degree=claim.line_degree + 1),
-        replace(claim, lower=claim.lower + Fraction(1, 100)),
-        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
-        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
-        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
-    ):
+    for wrong in (replace(claim, line_degree=claim.line_degree + 1), *wrong_entropies(claim)):
         assert run(checker, CHECKERS[checker]([wrong]), tmp_path).returncode != 0
     bounds = bound_dynamical_degree(load(name).map, None)
     assert bounds is not None
@@ -301,14 +280,8 @@ def test_coq_refuses_positive_entropy_with_one_number_changed(tmp_path):
     file = load("hietarinta_viallet")
     data = _prepare(file, "rocq")[1]
     claim = positive_entropy(data, data.with_rows(file.map.inverse_rows), is_short=True)
-    text, (first, *others) = CHECKERS["rocq"]([claim]), claim.forms[-1]
-    wrong = [
-        replace(claim, lower=claim.lower + Fraction(1, 100)),
-        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
-        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
-        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
-    ]
-    texts = [CHECKERS["rocq"]([other]) for other in wrong]
+    text = CHECKERS["rocq"]([claim])
+    texts = [CHECKERS["rocq"]([other]) for other in wrong_entropies(claim)]
     for old, new in (("= Some 73%nat", "= Some 74%nat"), ("prime 1009", "prime 1011"), ("1009", "1011")):
         assert old in text
         texts.append(text.replace(old, new))
@@ -316,25 +289,66 @@ def test_coq_refuses_positive_entropy_with_one_number_changed(tmp_path):
         assert run("rocq", other, tmp_path).returncode != 0
 
 
-def test_maps_that_do_not_commute_and_false_periods_have_no_certificate():
-    with pytest.raises(FalseClaim, match="maps_1_and_2_commute: the maps do not commute"):
-        certificate(System("x' = y; y' = -x"), "gp", commute=System("x' = 2*x; y' = x"))
-    false = "iterate 4 is not the identity, as it moves a point modulo 2^61 - 1: x = "
-    refuses(re.escape(false), certificate, load("lyness", {"a": 1}), "gp", period=4, error=FalseClaim)
-    refuses("expected a member of the commuting family", certificate, load("euler_top"), "gp", commute="associates")
-    refuses("same dimension", certificate, load("euler_top"), "gp", commute=load("harmonic"))
+ROTATION, ZERO, FAMILY = System("x' = y; y' = -x"), System("x' = 0; y' = 0"), load("weierstrass", {"g2": 64})
+
+
+@pytest.mark.parametrize(
+    ("system", "options", "message"),
+    [
+        ("euler_top", {"integrals": {"F": "x1^2 + x2^2"}}, "F is not conserved"),
+        ("euler_top", {"integrals": {"F": "(x1^2 + x3^2)/(1 + eps*x2)"}}, "F is not conserved"),
+        ("lotka_volterra", {"integrals": {"F": "x/y"}}, "F is not conserved"),  # Darboux polynomials, other cofactors
+        ("lotka_volterra", {"density": "x"}, "dx/phi is not invariant"),
+        (ROTATION, {"commute": System("x' = 2*x; y' = x")}, "maps_1_and_2_commute: the maps do not commute"),
+        ("lyness", {"period": 4}, "iterate 4 is not the identity, as it moves a point modulo 2^61 - 1: x = "),
+        (EQUIVALENT, {"equivalent": FAMILY, "by": ["4*x - 8", "4*y"]}, "equivalence takes the map to another one"),
+        (EQUIVALENT, {"equivalent": FAMILY, "by": ["0", "0"]}, "equivalence is not invertible"),
+    ],
+)
+def test_what_is_false_has_no_certificate(system, options, message):
+    refuses(re.escape(message), certificate, system, "gp", error=FalseClaim, **options)
+
+
+@pytest.mark.parametrize(
+    ("system", "options", "message"),
+    [
+        (EQUIVALENT, {"equivalent": FAMILY, "by": ["4*x - 8"]}, "weierstrass and 1 polynomial, expected two quadratic"),
+        (
+            EQUIVALENT,
+            {"equivalent": FAMILY, "by": ["x^2", "y"]},
+            "found x^2, y, expected polynomials of degree at most 1",
+        ),
+        (
+            ROTATION,
+            {"commute": ZERO},
+            "one of the maps is the identity, as for the zero field, and commutes with every",
+        ),
+        (ZERO, {"commute": ROTATION}, "one of the maps is the identity"),
+        (ZERO, {"commute": ZERO}, "one of the maps is the identity"),
+        ("euler_top", {"commute": "associates"}, "expected a member of the commuting family"),
+        ("euler_top", {"commute": load("harmonic")}, "same dimension"),
+        ("euler_top", {"commute": "associates", "period": 2}, "cannot be combined with other claims"),
+        ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
+        ("euler_top", {"claims": []}, "found an empty list of claims, expected names"),
+        ("euler_top", {"claims": ["F9"]}, "expected one of F1, F2, volume"),
+        ("euler_top", {"claims": ["entropy"]}, "no claim 'entropy' of euler_top"),
+        ("lyness", {"claims": ["darboux"]}, "the search for 'darboux' proves nothing about lyness"),
+        ("euler_top", {"integrals": {"I": "eps^2 + 3"}}, "I is a constant, which every map conserves"),
+        ("euler_top", {"integrals": {"I": "x1*x1~"}}, "found x1~ in a function, expected x1, x2, x3, eps"),
+        ("euler_top", {"density": "0"}, "found the density 0"),
+        ("euler_top", {"tensor": [["0", "0", "0"]] * 3}, "the tensor P is 0"),
+        ("euler_top", {"period": 0}, "found period = 0, expected a positive integer"),
+        ("euler_top", {"period": 1001}, "found period = 1001, expected at most 1000"),
+        ("euler_top", {"effort": 99}, "found the effort 99, expected an integer from -20 to 40"),
+    ],
+)
+def test_what_holds_for_every_map_or_means_nothing_has_no_certificate(system, options, message):
+    refuses(re.escape(message), certificate, system, **{"checker": "gp", **options})
 
 
 def test_a_period_is_refuted_at_one_point_before_anything_is_multiplied_out(monkeypatch):
     monkeypatch.setattr("kahanmaps.certificates.chains.apply", lambda *_: pytest.fail("multiplied out"))
     refuses("iterate 30 is not the identity", certificate, load("kirchhoff_generic"), "gp", period=30, error=FalseClaim)
-
-
-def test_the_identity_commutes_with_every_map_and_has_no_certificate():
-    rotation, zero = System("x' = y; y' = -x"), System("x' = 0; y' = 0")
-    for first, second in ((rotation, zero), (zero, rotation), (zero, zero)):
-        message = "one of the maps is the identity, as for the zero field, and commutes with every map"
-        refuses(message, certificate, first, "gp", commute=second)
 
 
 @over(*PROGRAMS)
@@ -356,28 +370,15 @@ def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_po
 def test_false_claims_of_each_kind_have_no_certificate():
     _, data = _prepare(load("euler_top"), "gp")
     x = ring(data.names).gens()
-    with pytest.raises(FalseClaim, match="T is no symmetry"):
-        affine_symmetry(data, "T", fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), [fmpq(0)] * 3, False)
-    with pytest.raises(FalseClaim, match="H is not conserved"):
-        modified_hamiltonian(data, "H", ring(data.names[:3]).gens()[0] ** 3)
-    with pytest.raises(FalseClaim, match="B is not conserved"):
-        bilinear_integral(data, "B", fmpq_mat([[0, 1, 0], [-1, 0, 0], [0, 0, 0]]))
-    one = RationalFunction(x[0] ** 0, x[0] ** 0)
-    zero, linear = (RationalFunction(P, x[0] ** 0) for P in (x[0] * 0, x[0] + x[1]))
-    refuses("D is no Darboux polynomial", darboux_polynomial, data, "D", linear, error=FalseClaim)
-    with pytest.raises(FalseClaim, match="the map is not Poisson for P"):
-        invariant_tensor(data, "P", [[zero, one, zero], [one, zero, zero], [zero, zero, zero]])
-
-
-@over(*PROGRAMS)
-def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker, tmp_path):
-    text = certificate(load("lotka_volterra"), checker, ["volume"])  # dx/(x*y)
-    for old, new in (("num_1 x y * num_2 x y.", "num_1 x y ^ 2 * num_2 x y."), ("eP = [1, 1]", "eP = [2, 1]")):
-        wrong = text.replace(old, new)
-        if wrong != text:
-            assert run(checker, wrong, tmp_path).returncode != 0
-            return
-    pytest.fail("no density was changed")
+    zero, one, linear = (RationalFunction(P, x[0] ** 0) for P in (x[0] * 0, x[0] ** 0, x[0] + x[1]))
+    for call, message, *arguments in (
+        (affine_symmetry, "C is no symmetry", fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), [fmpq(0)] * 3, False),
+        (modified_hamiltonian, "C is not conserved", ring(data.names[:3]).gens()[0] ** 3),
+        (bilinear_integral, "C is not conserved", fmpq_mat([[0, 1, 0], [-1, 0, 0], [0, 0, 0]])),
+        (darboux_polynomial, "C is no Darboux polynomial", linear),
+        (invariant_tensor, "not Poisson for C", [[zero, one, zero], [one, zero, zero], [zero, zero, zero]]),
+    ):
+        refuses(message, call, data, "C", *arguments, error=FalseClaim)
 
 
 @pytest.mark.parametrize("name", ["harmonic", "lotka_volterra"])
@@ -415,33 +416,6 @@ def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_pa
     assert run("gp", wrong.replace("default(recover, 0);", ""), tmp_path).returncode == 0
 
 
-@over(*PROGRAMS)
-def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, tmp_path):
-    text = certificate(System("I' = fun; fun' = -I"), checker, integrals={"O": "(I^2 + fun^2)/3"})
-    assert run(checker, text, tmp_path).returncode == 0
-
-
-@over(*PROGRAMS)
-def test_a_variable_h_is_not_the_letter_that_makes_forms_homogeneous(checker, tmp_path):
-    text = certificate(System("h' = k; k' = -h"), checker, integrals={"I": "h^2 + k^2"})
-    assert run(checker, text, tmp_path).returncode == 0
-    if checker == "gp":
-        text = certificate(System("h' = k^2 + 1; k' = h^2 - k"), checker, ["entropy"])
-        assert run(checker, text, tmp_path).returncode == 0
-
-
-@over(*PROGRAMS)
-def test_a_variable_t_is_not_the_step_of_a_derivative(checker, tmp_path):
-    assert run(checker, certificate(System("t' = x; x' = -t"), checker, density="1"), tmp_path).returncode == 0
-
-
-def test_claims_about_one_map_share_its_equation_and_what_they_have_in_common():
-    text = certificate(load("euler_top"), "rocq", ["F1", "F2", "volume", "density"])
-    assert [text.count(f"\n{start}") for start in ("Module Map", "Lemma cramer1", "Definition cofactor :")] == [1, 1, 1]
-    assert text.count("Lemma derivative_e1_1 :") == 1
-    assert re.findall(r"Lemma num_image_claim_2 : (\w+) x1_new", text) == ["num_claim_2"]
-
-
 def test_names_of_factors_and_of_later_claims_differ():
     text = certificate(load("nahm_octahedral"), "rocq", everything=True)
     names = re.findall(r"^(?:Definition|Lemma|Theorem) (\w+)", text[: text.index("End Map1.")], flags=re.MULTILINE)
@@ -449,13 +423,19 @@ def test_names_of_factors_and_of_later_claims_differ():
     assert len(names) == len(set(names))
 
 
-@pytest.mark.parametrize("function", ["x1^2 + x2^2", "(x1^2 + x3^2)/(1 + eps*x2)"])
-def test_a_function_that_is_not_conserved_has_no_certificate(function):
-    refuses("F is not conserved", certificate, load("euler_top"), "gp", integrals={"F": function}, error=FalseClaim)
-
-
-def test_a_quotient_of_darboux_polynomials_with_different_cofactors_has_no_certificate():
-    refuses("F is not conserved", certificate, load("lotka_volterra"), "gp", integrals={"F": "x/y"}, error=FalseClaim)
+@over(*PROGRAMS)
+@pytest.mark.parametrize(
+    ("system", "options"),
+    [
+        ("I' = fun; fun' = -I", {"integrals": {"O": "(I^2 + fun^2)/3"}}),  # words of the programs
+        ("h' = k; k' = -h", {"integrals": {"I": "h^2 + k^2"}}),  # the letter that makes forms homogeneous
+        ("h' = k^2 + 1; k' = h^2 - k", {"claims": ["entropy"]}),
+        ("t' = x; x' = -t", {"density": "1"}),  # the step of a derivative
+    ],
+)
+def test_variables_with_the_names_of_words_of_the_programs_are_renamed(system, options, checker, tmp_path):
+    if checker == "gp" or "claims" not in options:  # the others take long for the entropy
+        assert run(checker, certificate(System(system), checker, **options), tmp_path).returncode == 0
 
 
 @over(*PROGRAMS)
@@ -472,52 +452,6 @@ def test_maps_with_a_constant_determinant_have_certificates(x_dot, options, chec
     assert done.returncode == 0
     assert "false" not in done.stdout
     refuses("not conserved", certificate, System(f"x' = {x_dot}; y' = 0"), checker, integrals="x + y", error=FalseClaim)
-
-
-def test_a_density_that_is_not_invariant_has_no_certificate():
-    _, data = _prepare(load("lotka_volterra"), "gp")
-    with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
-        invariant_volume(data, "volume", parse_rational_function("x", data.names))
-
-
-@pytest.mark.parametrize(
-    ("system", "arguments", "message"),
-    [
-        ("lorenz", {"checker": "gp"}, "no integral or invariant volume form of lorenz is known: give --integral"),
-        ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
-        ("euler_top", {"checker": "gp", "claims": []}, "found an empty list of claims, expected names"),
-        ("euler_top", {"checker": "gp", "claims": ["F9"]}, "expected one of F1, F2, volume"),
-        ("zander_120", {"checker": "gp", "claims": ["F"]}, "no claim 'F' of zander_120"),
-        ("lyness", {"checker": "gp", "claims": ["darboux"]}, "the search for 'darboux' proves nothing about lyness"),
-    ],
-)
-def test_what_cannot_be_certified_is_said_in_one_sentence(system, arguments, message):
-    refuses(re.escape(message), certificate, load(system), **arguments)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"integrals": {"I": "eps^2 + 3"}}, "I is a constant, which every map conserves"),
-        ({"integrals": {"I": "x1*x1~"}}, "found x1~ in a function, expected x1, x2, x3, eps"),
-        ({"density": "0"}, "found the density 0"),
-        ({"tensor": [["0", "0", "0"]] * 3}, "the tensor P is 0"),
-        ({"period": 0}, "found period = 0, expected a positive integer"),
-        ({"period": 1001}, "found period = 1001, expected at most 1000"),
-        ({"commute": "associates", "period": 2}, "cannot be combined with other claims"),
-        ({"claims": ["entropy"]}, "no claim 'entropy' of euler_top"),
-    ],
-)
-def test_what_holds_for_every_map_or_means_nothing_has_no_certificate(options, message):
-    refuses(re.escape(message), certificate, load("euler_top"), "gp", **options)
-
-
-def test_results_about_one_eps_or_the_flow_have_no_certificate():
-    with pytest.raises(InputError, match="for every eps: found a result for eps = 1/2"):
-        certificate_of(find_densities("lotka_volterra", eps="1/2"), "gp")
-    with pytest.raises(InputError, match="for every eps: found a result for the flow"):
-        certificate_of(find_densities("lotka_volterra", flow=True), "gp")
-    refuses("a str has no certificate: it proves nothing about a map", certificate_of, "lotka_volterra", "gp")
 
 
 @over(*PROGRAMS)
@@ -539,19 +473,10 @@ def test_findings_and_results_write_certificates_of_what_they_prove(checker, tmp
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
     monkeypatch.setattr("kahanmaps.certificates.identities.MAX_PRODUCTS", 10)
-    refuses(
-        "more than 10 products of terms to multiply out; raise --effort", certificate, load("euler_top"), "gp", ["F1"]
-    )
+    refuses("more than 10 products of terms to multiply out", certificate, load("euler_top"), "gp", ["F1"])
     text = certificate(load("weierstrass"), "gp")
     assert "Not in this certificate: modified_H: the identities of the certificate take more than 10 products" in text
     assert "dx/phi is invariant" in text
-
-
-def test_the_limit_of_the_length_doubles_with_the_effort():
-    file = load("repaired_icosahedral")
-    refuses("have more than 625 terms when multiplied out", certificate, file, "gp", ["F"], effort=-4)
-    assert "F: P/Q is an integral" in certificate(file, "gp", ["F"], effort=1)
-    refuses("found the effort 99, expected an integer from -20 to 40", certificate, file, "gp", ["F"], effort=99)
 
 
 # Seconds of processor time that Coq took, of which it takes 2 to start.
@@ -573,13 +498,6 @@ def test_an_integral_is_split_into_the_lines_that_the_map_multiplies():
     lines, curve = conserved_function(data, "F", formulas.integrals["F"]).fraction.products
     assert [(factor.degree, factor.exponent) for factor in lines.factors] == [(1, 1), (1, 2), (1, 3)]
     assert [(factor.degree, factor.exponent) for factor in curve.factors] == [(6, 1)]
-
-
-def test_rows_of_the_equation_have_no_common_factor():
-    # The second row of this composition of two involutions has one, which makes its determinant larger.
-    formulas, data = _prepare(load("qrt_asymmetric"), "gp")
-    assert [len(entry) for row in formulas.equation for entry in row] == [4, 0, 4, 0, 46, 54]
-    assert [len(entry) for row in data.rows for entry in row] == [4, 0, 4, 0, 20, 27]
 
 
 def test_the_certificate_of_a_finding_is_about_its_claim():
@@ -618,6 +536,7 @@ def test_a_member_with_one_associated_system_has_the_certificate_that_its_map_an
         (lambda: degree_growth("euler_top"), "a DegreeGrowth has no certificate"),
         (lambda: find_integrals("euler_top")[0], "a FoundIntegral has no certificate: .* a part of a result; type"),
         (lambda: analyze("lotka_volterra", eps="1/3"), "for every eps: found a result for eps = 1/3"),
+        (lambda: find_densities("lotka_volterra", flow=True), "for every eps: found a result for the flow"),
     ],
 )
 def test_what_has_no_certificate_says_why_in_one_sentence(result, message):

@@ -1,8 +1,6 @@
 """Deciding identities at random points over GF(p), p random: supported with a stated error bound, or refuted.
 
-A true identity is supported with as many trials as its degree and coefficients ask for. A false one is refuted, however
-little its sides differ; the witness is a small rational point, or where none shows it a point over GF(p), and both are
-computed a second time here. What is defined nowhere, or too large to decide, is undecided.
+Witnesses are computed a second time.
 """
 
 import math
@@ -78,7 +76,6 @@ def square_right(x: Any, e: Any, K: Field) -> Any:
 
 
 TRUE = identity_of(square_left, square_right)
-# True identities
 
 
 @pytest.mark.parametrize("error_bits", [1, 100, 300])

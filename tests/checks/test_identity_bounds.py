@@ -78,9 +78,7 @@ def test_a_smaller_size_would_not_bound_the_difference():
     assert not covers_polynomial(CoefficientSize(identity.bound[0].degree, bits - 0.01), above)
 
 
-# Integrals and densities: of another system, so that the two sides differ
-
-
+# Of another system, so that the two sides differ.
 CLAIMS = ["x^2/3 + eps*y", "x*y/(2*x - 3/5*y) + eps/7", "1/(x^3 + eps^4*y)"]
 
 
@@ -124,16 +122,6 @@ BROKEN = [
 ]
 
 
-def difference_sizes(claim, o):
-    """The numerators and denominators in lowest terms of the differences of all pairs of a claim."""
-    results = []
-    for left, right in claim.function(o):
-        difference = left - right
-        entries = difference.entries() if hasattr(difference, "entries") else [difference]
-        results += [lowest(entry) for entry in entries if not entry.numerator.is_zero()]
-    return results
-
-
 # What the Hesse cubics amount to is long.
 @pytest.mark.parametrize("is_long", quick([False, True], [False]))
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(is_long, monkeypatch):
@@ -147,7 +135,9 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(is_long, monkeyp
         statement = ClaimAtPoints(examined, broken_claim)
         needs, (equation, poles) = statement.used_names, statement.bound
         functions = specialize.member_functions(result, sorted(needs - {"roots"}), None, 10**9, 3)
-        for above, below in difference_sizes(broken_claim, broken(control, functions)):
+        pairs = (left - right for left, right in broken_claim.function(broken(control, functions)))
+        entries = [x for pair in pairs for x in (pair.entries() if hasattr(pair, "entries") else [pair])]
+        for above, below in (lowest(entry) for entry in entries if not entry.numerator.is_zero()):
             assert true_size(above)[0] <= equation.degree, (broken_claim.key, control)
             # A denominator that occurs to some power must not be zero once.
             assert sum(true_size(factor)[0] for factor, _ in below.factor_squarefree()[1]) <= poles, broken_claim.key

@@ -10,6 +10,7 @@ from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import SingularStep
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.maps.composed import composed_map
@@ -21,13 +22,12 @@ from kahanmaps.maps.orbits.orbit import orbit
 F = load("lotka_volterra").map
 G = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y - y", "x^2 - x*y"]').map
 H = parse_system('variables = ["x", "y"]\n[bilinear]\nequations = ["X - x = 2*eps*X*(1 - y)", "Y - y = 2*eps*y*X"]').map
-LYNESS = load("lyness").map
+LYNESS, SYMBOLIC = load("lyness").map, map_with_symbols(load("lyness"), ["a"])
 WORDS = {
     "Kahan": composed_map(F, (G, -1)),
     "three kinds": composed_map(F, (H, -1), LYNESS),
     "a power": composed_map((LYNESS, 3)),
 }
-every_word = pytest.mark.parametrize("name", WORDS)
 START, EPS = (fmpq(1, 2), fmpq(2, 3)), "1/10"
 
 
@@ -38,7 +38,7 @@ def out(name):
                                                                            for p in word.parts])).image)  # fmt: skip
 
 
-@every_word
+@pytest.mark.parametrize("name", WORDS)
 @pytest.mark.parametrize("field", [QQ, GF(10007), GF(2**61 - 1), RR(200), DualField(QQ)], ids=str)
 def test_a_step_and_its_derivatives_are_those_of_the_formula(name, field):
     word, formula = WORDS[name].at(EPS, field), out(name).at(EPS, field)
@@ -76,18 +76,11 @@ def test_long_words_are_stepped_and_refused_where_formulas_are_asked_for():
     assert str(word).startswith("4 maps one after the other, too large to be multiplied out:\nthe Kahan map in q1")
     assert len(word.to_record()["composition"]) == 4
     assert "4 maps one after the other" in word._repr_latex_()
-    refuses("found a map with the symbol a", composed_map, parse_symbolic(), symbols=())
-
-
-def parse_symbolic():
-    from kahanmaps.documents.symbols import map_with_symbols
-
-    return map_with_symbols(load("lyness"), ["a"])
+    refuses("found a map with the symbol a", composed_map, SYMBOLIC, symbols=())
 
 
 def test_maps_that_share_a_symbol_are_joined_by_its_name():
-    entry = parse_symbolic()
-    word = composed_map(entry, (F, -1), entry)
+    word = composed_map(SYMBOLIC, (F, -1), SYMBOLIC)
     assert (word.symbols, word.names) == (("a",), ("x", "y", "a", "eps"))
     step = load("lyness", {"a": fmpq(2, 5)}).map.at(EPS).step
     assert word.at(EPS, values=[fmpq(2, 5)]).step(START) == step(F.at(EPS).inverse.step(step(START)))

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from flint import fmpq
-from helpers import quick, refuses, together
+from helpers import quick, refuses
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
@@ -30,11 +30,6 @@ SQUARE = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["x^2"]), "squa
 
 def survey(file, start, steps, requests, methods=("kahan",), eps=EPS, **how):
     return compare(file, start, eps, steps, methods=methods, integrals=requests, orders=False, **how)
-
-
-def only(result):
-    [curve] = result.curves
-    return curve
 
 
 TODA = System("a1' = a1*(b2-b1); a2' = a2*(b3-b2); b1' = 2*a1^2; b2' = 2*a2^2 - 2*a1^2; b3' = -2*a2^2")
@@ -75,14 +70,9 @@ def kahan(f, x, h):
 
 
 def gauss(f, x, h):
-    r = np.sqrt(3)
-
-    def stages(k):
-        return np.array(
-            [f(x + h * (k[0] / 4 + (1 / 4 - r / 6) * k[1])), f(x + h * ((1 / 4 + r / 6) * k[0] + k[1] / 4))]
-        )
-
-    return x + h / 2 * fixed_point(stages, np.array([f(x), f(x)])).sum(axis=0)
+    A = np.array([[1 / 4, 1 / 4 - np.sqrt(3) / 6], [1 / 4 + np.sqrt(3) / 6, 1 / 4]])
+    k = fixed_point(lambda k: np.array([f(x + h * row @ k) for row in A]), np.array([f(x), f(x)]))
+    return x + h / 2 * k.sum(axis=0)
 
 
 def symplectic_euler(f, x, h):
@@ -112,9 +102,7 @@ def test_the_table_of_drift_agrees_with_independent_code():
     def value(x):
         return (x @ x) / 2 + x[0] ** 2 * x[1] - x[1] ** 3 / 3
 
-    result = compare(
-        "henon_heiles", start.tolist(), EPS, 100, methods=[*BY_HAND], integrals=[("E", energy)], orders=False
-    )
+    result = survey("henon_heiles", start.tolist(), 100, [("E", energy)], [*BY_HAND])
     for method, step in BY_HAND.items():
         x, errors = start, []
         for _ in range(100):
@@ -155,9 +143,9 @@ def test_points_and_functions_may_be_text_and_others_are_refused():
         (1, "found the initial point 1"),
         ([float("nan"), 0], "found the floating-point number nan"),
         ("x=0:1:2,y=0:1:100000", "found 200000 initial points, expected at most 100000"),
-        ([[1, 0], [1]], "found an initial point with 1 coordinate, expected 2"),
     ):
         refuses(message, compare, CIRCLE, start, **how)
+    refuses("found 10000000000 steps", compare, CIRCLE, [1, 0], **{**how, "steps": 10**10})
     refuses("found no method, expected some of", compare, CIRCLE, [1, 0], **{**how, "methods": []})
 
 
@@ -256,36 +244,20 @@ def test_expressions_may_contain_eps_and_have_a_name_each():
 def test_errors_are_relative_and_absolute_where_the_function_is_0_at_the_start(text, k, scale):
     result = survey(CIRCLE, [2, 0], 50, [("E", text)])
     values = np.array([x[k] for _, x in FloatOrbit(CIRCLE.system, EPS, [2, 0], 50)])
-    assert only(result).steps.tolist() == list(range(1, 51))
-    assert only(result).errors.tolist() == (abs(values[1:] - values[0]) / (scale or 1)).tolist()
+    [curve] = result.curves
+    assert curve.steps.tolist() == list(range(1, 51))
+    assert curve.errors.tolist() == (abs(values[1:] - values[0]) / (scale or 1)).tolist()
     assert result.relative == {"E": scale is not None}
     # 1/10 + 1/5 - 3/10 is 0, and 5.6e-17 in doubles: whether the function is 0 is decided exactly.
     assert survey(CIRCLE, ["1/10", "1/5"], 5, [("E", "x + y - 3/10")]).relative == {"E": False}
-
-
-@together(
-    "start, steps, eps, methods",
-    [
-        ([1], 10, "1/2", ("kahan",)),
-        ([1, 2], 0, "1/2", ("kahan",)),
-        ([1, 2], 10**10, "1/2", ("kahan",)),
-        ([1, 2], 10, 0, ("kahan",)),
-        ([1, 2], 10, "1/2", ("adams",)),
-        ([1, 2], 10, "1/2", ("normal-form",)),
-        ([1, 2], 10, "1/2", ("stormer-verlet",)),
-    ],
-)
-def test_wrong_values_are_refused(start, steps, eps, methods):
-    with pytest.raises(InputError, match=r"expected|not available"):
-        survey(CIRCLE, start, steps, [("E", "x")], methods, eps)
 
 
 def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted():
     refuses("E is not defined in floating point at the initial point", survey, CIRCLE, [1, 0], 10, [("E", "1/(x - 1)")])
     file = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["1"]), "shift")
     result = survey(file, [0], 10, [("E", "1/(x - 1)")], eps=fmpq(1, 2))  # x_n = n
-    assert only(result).undefined == 1
-    assert only(result).steps.tolist() == list(range(2, 11))
+    [curve] = result.curves
+    assert (curve.undefined, curve.steps.tolist()) == (1, list(range(2, 11)))
 
 
 @pytest.mark.parametrize("linear", [False, True])

@@ -5,6 +5,7 @@ import pytest
 from flint import fmpq
 from helpers import refuses
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import KahanmapsError
@@ -21,10 +22,7 @@ def test_times_and_directions_are_those_of_exact_orbits(name):
     phi = file.map.at("1/4")
     for row in range(cells):
         for column in range(cells):
-            x = [
-                fmpq(entry) if isinstance(entry, int) else fmpq(*map(int, (entry + "/1").split("/")[:2]))
-                for entry in at
-            ]
+            x = [QQ.convert(entry) for entry in at]
             x[1], x[0] = fmpq(2 * column + 1, 2) - 2, fmpq(2 * row + 1, 4) - 1
             time, direction = -1, STAYS
             for step in range(steps + 1):

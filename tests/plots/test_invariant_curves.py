@@ -12,8 +12,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.maps.floats.float_orbit import to_floats
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.plots.curves.invariant_curves import MAX_POINTS, find_invariant_curves
+from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.curves.plane_cubics import ONE_LINE, THREE_LINES, ZERO
 from kahanmaps.plots.curves.plot_invariant_curves import Disc, panels_of, plot_invariant_curves, view_of
 from kahanmaps.plots.style import Style
@@ -92,12 +93,8 @@ def test_the_planes_together_are_the_exact_orbit(curves, name):
     phi, point = KahanMap(file.system, "1/20"), START[file.system.dim]
     for k in range(8):
         # The planes are added up in doubles: a few roundings of numbers as large as the orbit's.
-        assert result.originals[0][k] == pytest.approx(rounded(phi.point(point)), rel=1e-10, abs=1e-10)
+        assert result.originals[0][k] == pytest.approx(to_floats(phi.point(point)), rel=1e-10, abs=1e-10)
         point = phi.step(point)
-
-
-def rounded(point):
-    return [int(entry.p) / int(entry.q) for entry in point]
 
 
 def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
@@ -106,7 +103,7 @@ def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
     levels = sorted(abs(p.orbits[0].cubic.numerator / p.orbits[0].cubic.denominator) for p in result.planes)
     point = [QQ.convert(entry) for entry in (*START[4], "1/20")]
     claimed = [f.numerator(*point) / f.denominator(*point) for f in file.integrals.values()]
-    assert levels == pytest.approx(sorted(map(abs, rounded(claimed))))
+    assert levels == pytest.approx(sorted(map(abs, to_floats(claimed))))
 
 
 def test_roots_are_named_exactly_where_they_are_rational(curves):
@@ -148,9 +145,6 @@ def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be
         ([], 5, "found 0 initial points"),
         ([START[4]] * 8, 5, "found 8 initial points"),
         ([START[4]], -1, "found -1 steps"),
-        ([START[4]], MAX_POINTS, "expected 0 or more steps and at most 1000000 points"),
-        ([[1, 2]], 5, "found a point with 2 coordinates, expected 4"),
-        ([[10**200, 0, 0, 0]], 5, "scale the initial point"),
     ],
 )
 def test_wrong_sizes_are_refused(starts, steps, message):
@@ -158,13 +152,8 @@ def test_wrong_sizes_are_refused(starts, steps, message):
 
 
 def test_a_system_without_normal_form_is_refused_with_the_reason():
-    repeated = SystemFile.from_member(random_member_with_eigenvalues([1, 1], seed=7))
-    for file, reason in (
-        (load("euler_top"), "x' is not J grad H"),
-        (load("planar_cubic_hamiltonian"), "not a homogeneous cubic"),
-        (repeated, "chi has a repeated root"),
-    ):
-        refuses(reason, find_invariant_curves, file, [[1] * file.dim], "1/20", 5, error=HypothesisError)
+    file = SystemFile.from_member(random_member_with_eigenvalues([1, 1], seed=7))
+    refuses("chi has a repeated root", find_invariant_curves, file, [START[4]], "1/20", 5, error=HypothesisError)
 
 
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):

@@ -1,7 +1,4 @@
-"""Level curves: their vertices lie on the level, poles make no curves, orbits of the map lie on those of integrals.
-
-Functions of points in doubles: many points at a time, NaN at poles.
-"""
+"""Level curves: their vertices lie on the level, poles make no curves, orbits of the map lie on those of integrals."""
 
 import numpy as np
 import pytest
@@ -10,7 +7,7 @@ from helpers import refuses
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import ExpressionError, InputError
+from kahanmaps.errors import ExpressionError
 from kahanmaps.plots.curves.level_sets import level_curves, levels_through
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.trajectories import ensemble_for, follow_orbits
@@ -70,9 +67,7 @@ def test_the_plane_may_be_one_of_many_variables():
     np.testing.assert_allclose(z - x, 1.0)
 
 
-def test_functions_of_other_variables_and_too_many_levels_are_refused():
-    with pytest.raises(InputError, match="found y in it, expected a function of x and z alone"):
-        level_curves(point_function("x + y", ["x", "y", "z"]), (0, 2), 3, [1.0], SQUARE)
+def test_too_many_levels_are_refused():
     refuses("found 201 levels", level_curves, point_function("x", ["x", "y"]), (0, 1), 2, range(201), SQUARE)
 
 
@@ -101,13 +96,12 @@ def test_a_value_beyond_the_range_of_doubles_is_missing_without_a_warning():
 def test_a_name_is_that_of_an_integral_or_unknown():
     named = {"I1": parse_rational_function("x*y/eps", ["x", "y", "eps"])}
     assert point_function("I1", ["x", "y"], fmpq(1, 2), known_functions=named)(np.array([2.0, 3.0])) == 12
-    with pytest.raises(InputError, match=r"found the name H, expected one of x, y, eps; integrals are named I1"):
-        point_function("H", ["x", "y"], known_functions=named)
+    message = "found the name H, expected one of x, y, eps; integrals are named I1"
+    refuses(message, point_function, "H", ["x", "y"], known_functions=named)
 
 
 def test_text_is_parsed_and_nothing_else_and_eps_needs_a_value():
-    with pytest.raises(ExpressionError):
-        point_function("__import__('os')", ["x"])
+    refuses("a function call", point_function, "__import__('os')", ["x"], error=ExpressionError)
     refuses("no value of eps", point_function, "eps*x", ["x"])
 
 

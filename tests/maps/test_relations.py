@@ -1,18 +1,16 @@
-"""Steps by Somos sequences along an orbit on elliptic curves, against single steps by linear systems.
+"""Steps by relations along an orbit, Somos sequences or bilinear forms, against single steps by linear systems.
 
-Specified here: every point is the one that single steps give, in lowest terms as well; sequences are found wherever
-orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted. On
-curves that are made up sections of every degree are found from coordinates that are some of them, and bases are bases.
+On curves that are made up sections of every degree are found from coordinates that are some of them.
 """
 
 import random
 from io import StringIO
+from math import prod
 
 import pytest
-from flint import fmpq, fmpq_mat, nmod
+from flint import fmpq, fmpq_mat, fmpz, nmod
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
@@ -24,11 +22,38 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
+from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.sections import _sections_of_multiples, forms
-from kahanmaps.maps.somos import around, first_terms
+from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
 BITS = 10_000
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
+
+
+START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
+
+
+def over(name, eps="3/11"):
+    return load(name).map.at(eps)
+
+
+def begin(map_over):
+    """A start without special properties."""
+    return IntegerPoint.from_rationals(START[: map_over.dim])
+
+
+def single_steps(map_over, start, steps):
+    """The points of an orbit, by one linear system each, as far as there are any."""
+    points = [start]
+    while len(points) <= steps and (image := map_over.integer_step(points[-1])) is not None:
+        points.append(image)
+    return points
+
+
+def walked(map_over, start, steps):
+    """The points as orbits have them, and the orbit."""
+    orbit = rational_orbit.RationalOrbit(map_over, start)
+    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit
 
 
 @pytest.fixture(autouse=True)
@@ -39,6 +64,12 @@ def early(monkeypatch):
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: None)
     monkeypatch.setattr(elliptic, "_BITS_PER_PRIME", 1)
+
+
+@pytest.fixture
+def no_curves(monkeypatch):
+    monkeypatch.setattr(elliptic, "elliptic_steps", lambda *_: None)
+    monkeypatch.setattr(bilinear, "bilinear_forms", bilinear_forms)
 
 
 # Origin of the degrees: orbits of Kahan's discretization in the plane lie on cubics, those of the Euler top on
@@ -264,3 +295,82 @@ def test_sections_of_multiples_are_a_basis_and_belong_to_their_degree(degree):
     assert len(rows[0]) == 2 * degree + 1
     assert fmpq_mat(rows).rank() == degree + 1
     assert fmpq_mat([row[degree + 1 :] for row in rows]).rank() == degree
+
+
+def test_the_elliptic_divisibility_sequence_of_ward():
+    # 0, 1, 1, -1, 1, 2, -1, -3, -5, 7, -4, -23, 29, 59, 129, ...: y^2 + y = x^3 - x with (0, 0), OEIS A006769.
+    expected = [1, 1, -1, 1, 2, -1, -3, -5, 7, -4, -23, 29, 59, 129, -314]
+    terms = Terms([fmpq(x) for x in expected[:4]], Integers(fmpz(1)))
+    with pytest.raises(ArithmeticError):
+        Terms([fmpq(x) for x in (1, 0, -1, 1)], Integers(fmpz(1)))
+    with pytest.raises(ArithmeticError):
+        Terms([fmpq(1), fmpq(1, 3), fmpq(1), fmpq(1)], Integers(fmpz(2)))
+    assert [terms.integer(n) for n in range(1, 16)] == expected
+    assert terms.pair(9) == (expected[8] ** 2, expected[7] * expected[9])
+
+
+# By bilinear forms, without curves.
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "lag"),
+    [
+        ("euler_top", 40, 1),
+        ("volterra_periodic_4", 30, 1),  # in a hyperplane
+        ("weierstrass", 60, 1),
+        ("discrete_painleve_1", 60, 1),
+        ("lagrange_top", 18, 1),
+        ("three_wave", 18, 1),
+        ("clebsch_first_flow", 16, 2),  # Abelian surfaces, one section more than coordinates
+    ],
+)
+def test_points_by_bilinear_forms_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_curves):
+    map_over = over(name)
+    expected = single_steps(map_over, begin(map_over), steps)
+    points, orbit = walked(map_over, expected[0], steps)
+    assert points == expected
+    assert orbit.since is not None
+    assert orbit.since < steps
+    forms = bilinear_forms(map_over, points[-1])
+    assert forms is not None
+    assert forms.lag == lag
+    assert [forms.step(expected[k - 3 : k], k) for k in range(3, steps + 1)] == expected[3:]  # of the whole orbit
+
+
+@pytest.mark.parametrize("name", ["lorenz", "henon_heiles", "kirchhoff_generic", "hietarinta_viallet"])
+def test_there_are_no_forms_where_there_is_no_abelian_variety(name):
+    map_over = over(name)
+    assert bilinear_forms(map_over, begin(map_over)) is None
+
+
+def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves):
+    map_over = over("euler_top")
+    expected = single_steps(map_over, begin(map_over), 25)
+    right = bilinear_forms(map_over, expected[0])
+    for k in range(4):
+        changed = bilinear_forms(map_over, expected[0])
+        changed.coefficients[k, 0] += 1
+        assert changed.step(expected[10:13], 13) is None
+        assert right.step(expected[10:13], 13) == expected[13]
+    monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: changed)
+    assert walked(map_over, begin(map_over), 25)[0] == expected
+
+
+def test_points_by_bilinear_forms_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_step(monkeypatch):
+    monkeypatch.setattr(bilinear, "bilinear_forms", bilinear_forms)
+    # z -> z / (1 + z) is 1/Z, 1/(Z + 1), ..., and y is 0 but where Z + k is none of the zeros of p.
+    field = ring(["z", "y", "u", "eps"])
+    z, y, u, _ = field.gens()
+    entry, last, Z = field.constant(1), 32, fmpz(2) ** 360
+    p = prod((1 - z * (Z + k) for k in range(last + 1) if k != last - 1), start=entry)
+    images = [
+        RationalFunction(z, 1 + z),
+        RationalFunction(p + u, entry),
+        RationalFunction(y * (1 - z * (Z + last)), entry),
+    ]
+    map_over = explicit_map(["z", "y", "u"], images).at(1)
+    start = IntegerPoint.from_rationals((fmpq(1, Z), fmpq(0), fmpq(0)))
+    points, orbit = walked(map_over, start, last + 3)
+    assert points == single_steps(map_over, start, last + 3)
+    assert orbit.since < last - 1
+    assert any(point.numerators[1] for point in points)
