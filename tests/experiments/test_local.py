@@ -1,8 +1,7 @@
 """Worker processes: whatever a task does to its worker, the others are done and it gets the right record.
 
-Whose doing a death is decides what becomes of the task: a fault of its own (SIGSEGV, SIGABRT, ...) is recorded, a kill
-from outside (SIGTERM, SIGKILL, ...) is tried again, and at last lost, which is no result. The tasks are those of
-fault_tasks.py. Negative controls: even seeds, which are done.
+A fault of its own (SIGSEGV, SIGABRT, ...) is recorded, a kill from outside (SIGTERM, SIGKILL, ...) is tried again, and
+at last lost, which is no result. The tasks are those of fault_tasks.py; those of even seeds are done.
 """
 
 import errno
@@ -19,6 +18,7 @@ from signal import Signals
 from typing import Any
 
 import pytest
+from cli_helpers import COMMAND
 from helpers import quick, refuses
 from small_databases import exported, recorded, until
 
@@ -64,8 +64,8 @@ def fault(order: int, seed: int = 1, limits: TaskLimits | None = None) -> Job:
     return Job(Task("fault", None, {"order": order, "seed": seed}), limits or TaskLimits(100.0, 400_000_000))
 
 
-def pause(milliseconds: int, seed: int = 0, limits: TaskLimits | None = None) -> Job:
-    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or TaskLimits(100.0))
+def pause(milliseconds: int, seed: int = 0, seconds: float = 100.0) -> Job:
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), TaskLimits(seconds))
 
 
 def signalled(number: int, times: int) -> Job:
@@ -99,10 +99,6 @@ def is_running(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def wait_until_gone(pids: Sequence[int]) -> None:
-    until(lambda: not any(map(is_running, pids)))
 
 
 @pytest.fixture(scope="module")
@@ -166,8 +162,7 @@ def test_answers_of_megabytes_come_whole_with_where_and_how_they_came_about(faul
 
 
 def test_what_a_task_has_started_ends_with_its_worker(faulty):
-    assert faulty[STARTER].result is not None
-    wait_until_gone([faulty[STARTER].result["pid"]])
+    until(lambda: not is_running(faulty[STARTER].result["pid"]))
 
 
 def test_a_task_that_hangs_is_killed_at_its_time_limit_and_keeps_no_earlier_output():
@@ -204,15 +199,13 @@ def test_an_error_caused_by_lack_of_memory_is_reported_as_such(error, is_memory)
 
 
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
-    records = done([pause(150, seed, TaskLimits(time=1.5)) for seed in range(11)], workers=1)
+    records = done([pause(150, seed, 1.5) for seed in range(11)], workers=1)
     assert all(record.is_ok for record in records.values())  # 1.65 seconds in one worker
 
 
 def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
-    jobs = [
-        Job(Task("use", None, {"steps": steps, "seed": seed}), TaskLimits(100.0, 60_000_000))
-        for seed, steps in enumerate((40, 54, 72))
-    ]
+    limits = TaskLimits(100.0, 60_000_000)
+    jobs = [Job(Task("use", None, {"steps": s, "seed": k}), limits) for k, s in enumerate((40, 54, 72))]
     among, alone = done(jobs, workers=1), done(jobs, workers=1, group_seconds=0.0)
     assert {key: record.outcome for key, record in among.items()} == {key: r.outcome for key, r in alone.items()}
     assert {record.outcome for record in alone.values()} == {Outcome.OK, Outcome.OUT_OF_MEMORY}
@@ -317,7 +310,7 @@ def test_no_worker_outlives_a_parent_that_is_killed():
     pids = [int(word) for word in parent.stdout.readline().split()]
     assert [is_running(pid) for pid in pids] == [True, True]
     parent.kill()
-    wait_until_gone(pids)
+    until(lambda: not any(map(is_running, pids)))
     parent.communicate()
 
 
@@ -330,10 +323,9 @@ def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(t
 
 
 def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path: Path):
-    jobs = [signalled(signal.SIGTERM, ALWAYS), signalled(signal.SIGTERM, 0)]
-    limits = {"time": 20, "memory": None}
-    text = json.dumps({"documents": {}, "jobs": [{"task": job.task.text, "limits": limits} for job in jobs]})
-    said = io.StringIO()
+    jobs = [signalled(signal.SIGTERM, times).task.text for times in (ALWAYS, 0)]
+    limits, said = {"time": 20, "memory": None}, io.StringIO()
+    text = json.dumps({"documents": {}, "jobs": [{"task": task, "limits": limits} for task in jobs]})
     run_group(io.StringIO(text), said)
     assert [json.loads(line)["outcome"] for line in said.getvalue().splitlines()] == ["lost", "ok"]
     assert tries(tmp_path, signal.SIGTERM, ALWAYS) == 1
@@ -341,17 +333,13 @@ def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_mac
 
 def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path):
     db, spec = tmp_path / "results.db", '[experiments.a]\ntask = "signalled"\naxes = { order = [15], seed = [0, 99] }\n'
-    records = list(run(spec, db))
-    assert sorted(str(record.outcome) for record in records) == ["lost", "ok"]
+    records = {str(record.outcome): record for record in run(spec, db)}
+    assert set(records) == {"lost", "ok"}
     with Store.open(db, readonly=True) as store:
-        (status,) = store.status()
-        assert (status.missing, status.outcomes) == (1, {Outcome.OK: 1})
-        assert [row.record is None for row in store.rows(missing=True)] == [False, True]
-        lost = [store.find(record.key)[0] for record in records if record.outcome is Outcome.LOST]
-        assert [(entry.record, entry.attempts) for entry in lost] == [(None, 0)]
+        (entry,) = store.find(records["lost"].key)
+    assert (entry.record, entry.attempts) == (None, 0)
     (tmp_path / "tries" / "15-99").write_text("x" * 99)  # from here on it lives
-    again = list(run(spec, db))
-    assert [str(record.outcome) for record in again] == ["ok"]
+    assert [str(record.outcome) for record in run(spec, db)] == ["ok"]
     list(run(spec, tmp_path / "calm.db"))
     assert exported(db) == exported(tmp_path / "calm.db")
 
@@ -360,10 +348,9 @@ def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path
 def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: Path, number: Signals, first: str):
     text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..14" }\n'
     (tmp_path / "spec.toml").write_text(text)
-    command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
-    process = subprocess.Popen(
-        [*command, "-q"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    command = [*COMMAND, "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2", "-q"]
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, cwd=tmp_path, text=True, **pipes)
     until(lambda: recorded(tmp_path / "wild.db"))
     # Two workers, and the process with which Python keeps account of semaphores.
     threads = Path(f"/proc/{process.pid}/task")
@@ -373,7 +360,7 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
         os.kill(pid, number)
     _, err = process.communicate(timeout=100)
     assert process.returncode == (130 if number == signal.SIGTERM else -number), err
-    wait_until_gone(children)
+    until(lambda: not any(map(is_running, children)))
     with Store.open(tmp_path / "wild.db", readonly=True) as store:
         (status,) = store.status()
     assert set(status.outcomes) == {Outcome.OK}

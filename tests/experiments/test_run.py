@@ -80,19 +80,11 @@ def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
     assert sorted(record.result["seed_squared"] for record in new if record.result) == [36, 49, 64]
 
 
-@pytest.fixture
-def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Records are handed on as they come."""
-    monkeypatch.setattr("kahanmaps.experiments.running.run._COLLECTION_FACTOR", 0)
-
-
 class Scripted:
     """An executor that hands back what was submitted, one at a time, and writes down what it was asked."""
 
     def __init__(self) -> None:
         self.jobs: list[Job] = []
-        self.most = 0
-        self.closed = 0
 
     @property
     def is_free(self) -> bool:
@@ -104,31 +96,27 @@ class Scripted:
 
     def submit(self, job: Job) -> None:
         self.jobs.append(job)
-        self.most = max(self.most, len(self.jobs))
 
     def wait(self, timeout: float) -> list[Record]:
         return [Record(self.jobs.pop(0).task.key, Outcome.OK)]
 
     def close(self) -> None:
-        self.closed += 1
+        pass
 
 
 def jobs(count: int) -> Iterator[Job]:
     return (Job(Task("pause", None, {"seed": seed})) for seed in range(count))
 
 
-@pytest.mark.usefixtures("_at_once")
-def test_nothing_is_handed_out_after_an_interrupt():
-    executor = Scripted()
-    batch = Batch(jobs(50), executor)
-    seen = 0
+def test_nothing_is_handed_out_after_an_interrupt(monkeypatch):
+    monkeypatch.setattr("kahanmaps.experiments.running.run._COLLECTION_FACTOR", 0)  # records come one at a time
+    batch, seen = Batch(jobs(50), Scripted()), 0
     for records in batch:
         seen += len(records)
         if seen == 10:
             batch.interrupt()
-    assert seen == 13  # the three in flight are done
-    assert batch.was_interrupted
-    assert batch.abandoned == 0
+    # The three in flight are done.
+    assert (seen, batch.was_interrupted, batch.abandoned) == (13, True, 0)
 
 
 def test_what_is_not_done_within_the_grace_is_given_up():
