@@ -12,10 +12,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from signal import Signals
-from typing import Any
 
 import pytest
 from cli_helpers import COMMAND
@@ -35,7 +33,6 @@ KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
 INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE, AWKWARD, TWINS, EXIT_0 = range(8, 17)
 READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER, NOT_LOADED, OPENBLAS, LEAVE = range(17, 24)
 ALWAYS = 99
-Started = Callable[..., LocalWorkers]
 
 
 @pytest.fixture(autouse=True)
@@ -45,11 +42,11 @@ def _tries(monkeypatch, tmp_path):
 
 
 @pytest.fixture
-def start() -> Iterator[Started]:
+def start():
     """An executor that ends with the test, with some jobs begun."""
-    started: list[LocalWorkers] = []
+    started = []
 
-    def make(jobs: int, *begun: Job) -> LocalWorkers:
+    def make(jobs, *begun):
         started.append(LocalWorkers(jobs, {}.__getitem__))
         for job in begun:
             started[-1].submit(job)
@@ -77,7 +74,7 @@ def tries(folder: Path, number: int, times: int) -> int:
     return (folder / "tries" / f"{int(number)}-{times}").stat().st_size
 
 
-def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Record]:
+def done(jobs, workers=2, **settings) -> dict[str, Record]:
     """The records by key; every job has one and only one."""
     results: list[Record] = []
     for records in Batch(jobs, LocalWorkers(workers, {}.__getitem__, **settings)):
@@ -90,7 +87,7 @@ def pids_of(workers: LocalWorkers) -> list[int]:
     """The processes at work, once they wait for tasks or have one."""
     at_work = [worker for worker, _ in workers._running.values()]
     until(lambda: all(worker.is_ready for worker in at_work))
-    return [worker.process.pid for worker in at_work if worker.process is not None and worker.process.pid is not None]
+    return [worker.process.pid for worker in at_work]
 
 
 def is_running(pid: int) -> bool:
@@ -222,7 +219,7 @@ def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits():
     assert not any(map(is_from_outside, (None, 0, 1, 7, 137)))
 
 
-def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path: Path):
+def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path):
     assert TRIES > 3  # which takes longer
     kill, quit_ = signalled(signal.SIGKILL, ALWAYS), signalled(signal.SIGQUIT, 2)
     records = done([kill, quit_], tries=3)
@@ -233,7 +230,7 @@ def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_
     assert tries(tmp_path, signal.SIGKILL, ALWAYS) == tries(tmp_path, signal.SIGQUIT, 2) == 3
 
 
-def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
+def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path):
     once, always = signalled(signal.SIGSEGV, 1), signalled(signal.SIGABRT, ALWAYS)
     records = done([once, always], workers=1)
     assert records[once.task.key].is_ok
@@ -242,7 +239,7 @@ def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
 
 
 @pytest.mark.parametrize("number", quick([signal.SIGKILL, signal.SIGSEGV], [signal.SIGKILL]))
-def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Started, number: int):
+def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start, number):
     workers = start(1, pause(300, 0))
     for seed in (1, 2):
         (pid,) = pids_of(workers)
@@ -259,12 +256,10 @@ def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Start
 
 
 @pytest.mark.parametrize("seconds", quick([0.0, 0.05, 0.15], [0.05]))
-def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: float):
+def test_ctrl_c_does_not_reach_a_worker_that_begins(start, seconds):
     """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
     workers = start(1, pause(1))
     ((worker, _),) = workers._running.values()
-    assert worker.process is not None
-    assert worker.process.pid is not None
     time.sleep(seconds)
     os.kill(worker.process.pid, signal.SIGINT)
     (record,) = workers.wait(100.0)
@@ -272,7 +267,7 @@ def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: flo
     assert workers._idle == [worker]
 
 
-def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_kills_them(start: Started):
+def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_kills_them(start):
     workers = start(2)
     assert workers.is_free
     workers.submit(fault(HANG))
@@ -286,7 +281,7 @@ def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_k
     assert not any(map(is_running, pids))
 
 
-def test_workers_that_cannot_start_are_reported_once(monkeypatch: pytest.MonkeyPatch):
+def test_workers_that_cannot_start_are_reported_once(monkeypatch):
     monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
     refuses("no_such_module_anywhere", done, [pause(1, seed) for seed in range(5)], error=WorkersError)
 
@@ -306,7 +301,6 @@ workers.wait(60)
 def test_no_worker_outlives_a_parent_that_is_killed():
     """One of them hangs as in a long call of FLINT."""
     parent = subprocess.Popen([sys.executable, "-c", PARENT, HERE, HERE.parent], stdout=subprocess.PIPE, text=True)
-    assert parent.stdout is not None
     pids = [int(word) for word in parent.stdout.readline().split()]
     assert [is_running(pid) for pid in pids] == [True, True]
     parent.kill()
@@ -314,7 +308,7 @@ def test_no_worker_outlives_a_parent_that_is_killed():
     parent.communicate()
 
 
-def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(tmp_path: Path):
+def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(tmp_path):
     """multiprocessing would run the script again in each worker, and that one start workers of its own."""
     text = '[experiments.a]\ntask = "pause"\naxes = {seed = "0..3"}'
     (tmp_path / "script.py").write_text(f"import kahanmaps as km\nprint(len(list(km.run({text!r}, jobs=2))))\n")
@@ -322,7 +316,7 @@ def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(t
     assert (ran.stdout, ran.stderr) == ("4\n", "")
 
 
-def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path: Path):
+def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path):
     jobs = [signalled(signal.SIGTERM, times).task.text for times in (ALWAYS, 0)]
     limits, said = {"time": 20, "memory": None}, io.StringIO()
     text = json.dumps({"documents": {}, "jobs": [{"task": task, "limits": limits} for task in jobs]})
@@ -331,7 +325,7 @@ def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_mac
     assert tries(tmp_path, signal.SIGTERM, ALWAYS) == 1
 
 
-def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path):
+def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path):
     db, spec = tmp_path / "results.db", '[experiments.a]\ntask = "signalled"\naxes = { order = [15], seed = [0, 99] }\n'
     records = {str(record.outcome): record for record in run(spec, db)}
     assert set(records) == {"lost", "ok"}
@@ -345,7 +339,7 @@ def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path
 
 
 @pytest.mark.parametrize(("number", "first"), [(Signals.SIGTERM, "workers"), (Signals.SIGKILL, "parent")])
-def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: Path, number: Signals, first: str):
+def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path, number, first):
     text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..14" }\n'
     (tmp_path / "spec.toml").write_text(text)
     command = [*COMMAND, "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2", "-q"]
