@@ -141,14 +141,8 @@ def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
 
 def combine(*terms: tuple[Any, Sequence[Any]]) -> tuple[Any, ...]:
     """The linear combination of vectors: the sum of a v over the pairs (a, v)."""
-    dim = len(terms[0][1])
-    total = []
-    for i in range(dim):
-        entry = terms[0][0] * terms[0][1][i]
-        for factor, vector in terms[1:]:
-            entry = entry + factor * vector[i]
-        total.append(entry)
-    return tuple(total)
+    (first, start), *others = terms
+    return tuple(sum((a * v[i] for a, v in others), first * entry) for i, entry in enumerate(start))
 
 
 def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:
