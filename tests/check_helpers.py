@@ -48,8 +48,7 @@ class Dual:
         return Dual(self.a + other.a, self.b + other.b)
 
     def __sub__(self, other: Any) -> Dual:
-        other = dual(other)
-        return Dual(self.a - other.a, self.b - other.b)
+        return self + -dual(other)
 
     def __mul__(self, other: Any) -> Dual:
         other = dual(other)
@@ -204,23 +203,23 @@ def verify_commute_witness(witness: Witness | None, f: QuadraticSystem, g: Quadr
     """Phi_g(Phi_f(x)) and Phi_f(Phi_g(x)) recomputed, the step of g being `g_step` times that of f."""
     assert witness is not None
     x, (eps,) = exact(*witness.point), exact(witness.eps)
-    eps_g = eps * exact(g_step)[0]
-    after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps_g, x)
-    assert after_f is not None
-    assert after_g is not None
-    left, right = kahan_step(g, eps_g, after_f), kahan_step(f, eps, after_g)
-    assert left is not None
-    assert right is not None
-    verify_witness(witness, left, right)
+    images = _both_ways(f, g, eps, eps * exact(g_step)[0], x)
+    assert images is not None
+    verify_witness(witness, *images)
 
 
 def commute_at(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]) -> bool | None:
     """Whether the two maps commute at one point, None if one of them is not defined there."""
-    after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps, x)
+    images = _both_ways(f, g, eps, eps, x)
+    return None if images is None else images[0] == images[1]
+
+
+def _both_ways(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, eps_g: Fraction, x: Any) -> Any:
+    after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps_g, x)
     if after_f is None or after_g is None:
         return None
-    left, right = kahan_step(g, eps, after_f), kahan_step(f, eps, after_g)
-    return None if left is None or right is None else left == right
+    left, right = kahan_step(g, eps_g, after_f), kahan_step(f, eps, after_g)
+    return None if left is None or right is None else (left, right)
 
 
 ORIGINAL_STEP = KahanMap.step

@@ -4,8 +4,6 @@ degrees computed slowly, answers known from elsewhere.
 Formulas are read here by Python with fractions, not by the library that wrote them.
 """
 
-import ast
-import operator
 import random
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +38,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 PRIME = 2**61 - 1
 FURTHER = table(Path(__file__).parent / "laboratory" / "further_systems.txt")
 DEGENERATE = table(Path(__file__).parent / "laboratory" / "degenerate_systems.txt")
-OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 
 
 @cache
@@ -98,23 +95,8 @@ def value_of(formula: str, names: Sequence[str], point: Sequence[Any], eps: Any,
     """The value of a formula at a rational point."""
     numbers = {name: Fraction(str(value)) for name, value in zip(names, point, strict=True)}
     numbers |= {name: Fraction(str(value)) for name, value in (more | {"eps": eps}).items()}
-    return _number(ast.parse(formula.replace("^", "**"), mode="eval").body, numbers)
-
-
-def _number(node: ast.AST, numbers: Mapping[str, Fraction]) -> Fraction:
-    match node:
-        case ast.Constant(int(value)):
-            return Fraction(value)
-        case ast.Name(name):
-            return numbers[name]
-        case ast.UnaryOp(sign, operand):
-            value = _number(operand, numbers)
-            return -value if isinstance(sign, ast.USub) else value
-        case ast.BinOp(left, ast.Pow(), ast.Constant(int(power))):
-            return _number(left, numbers) ** power
-        case ast.BinOp(left, operation, right):
-            return OPERATIONS[type(operation)](_number(left, numbers), _number(right, numbers))
-    raise AssertionError(f"found {ast.dump(node)} in a formula")
+    text = re.sub(r"(?<!\w)\d+", r"Fraction(\g<0>)", formula.replace("^", "**"))
+    return Fraction(eval(text, {"Fraction": Fraction}, numbers))
 
 
 def values_on_orbits(

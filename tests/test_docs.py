@@ -1,8 +1,4 @@
-"""The documentation is complete and hangs together: pages, commands, names, sources and links. `make docs` builds it.
-
-What is made of the code is looked at as the Markdown that Sphinx is given; one slow test builds the pages.
-Each picture carries its command.
-"""
+"""The documentation hangs together: names, sources and links. `make docs` builds it; each picture has its command."""
 
 import re
 import shlex
@@ -22,42 +18,25 @@ sys.path.insert(0, str(DOCS / "_ext"))
 
 from check_pages import mistakes  # noqa: E402
 from helpers import together  # noqa: E402
-from kahanmaps_docs import expanded, reference  # noqa: E402
+from kahanmaps_docs import expanded  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
 from redraw import command_of  # noqa: E402
 
 from kahanmaps.documents.catalog import names  # noqa: E402
 
-NO_PAGES = {"_build", "_ext"}  # folders of docs, see conf.py
-
 
 def markdown_files() -> list[Path]:
     """All pages, and the Markdown files that are read beside them."""
-    pages = [path for path in DOCS.rglob("*.md") if path.relative_to(DOCS).parts[0] not in NO_PAGES]
+    pages = [path for path in DOCS.rglob("*.md") if not path.relative_to(DOCS).parts[0].startswith("_")]
     return sorted([*pages, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"])
-
-
-def pages() -> dict[str, str]:
-    """The pages as Sphinx is given them, by name."""
-    left_out = set(reference.api_pages_without_names(DOCS))
-    result = {}
-    for path in markdown_files():
-        name = path.relative_to(ROOT).as_posix().removeprefix("docs/")
-        if path.is_relative_to(DOCS) and name not in left_out:
-            name = name.removesuffix(".md")
-            result[name] = expanded(name, path.read_text(encoding="utf-8"))
-    return result
 
 
 def anchors(text: str) -> set[str]:
     """The anchors that a Git host gives the headings of a Markdown text, as MyST does."""
     without_blocks = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
-    results: set[str] = set()
-    for heading in re.findall(r"^#+ (.+)$", without_blocks, re.MULTILINE):
-        anchor = re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
-        results.add(anchor)
-    return results
+    headings = re.findall(r"^#+ (.+)$", without_blocks, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
 
 
 def broken_links(path: Path) -> list[str]:
@@ -75,13 +54,8 @@ def broken_links(path: Path) -> list[str]:
     return results
 
 
-@pytest.fixture(scope="module")
-def built_from() -> dict[str, str]:
-    return pages()
-
-
-def test_every_system_of_the_catalogue_has_its_section_with_its_sources(built_from):
-    text = built_from["reference/catalogue"]
+def test_every_system_of_the_catalogue_has_its_section_with_its_sources():
+    text = expanded("reference/catalogue", (DOCS / "reference" / "catalogue.md").read_text(encoding="utf-8"))
     assert [name for name in names() if f"(system-{name})=" not in text] == []
     top = text.partition("(system-euler_top)=")[2].partition("(system-")[0]
     assert "[`hirota-kimura-2000`](#source-hirota-kimura-2000)" in top
@@ -105,13 +79,11 @@ def test_the_pages_are_built_without_a_warning_and_no_link_is_broken(tmp_path):
     assert set().union(*letters) - letters_of_the_font() == set()
 
 
-AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
-
-
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_the_table_of_the_audit_is_what_verify_prints():
-    assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify(m=3)).strip()
+    audit = (DOCS / "audit.md").read_text(encoding="utf-8")
+    assert audit.split("<!-- table -->\n")[1].strip() == markdown(verify(m=3)).strip()
 
 
 PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix in (".png", ".svg"))
@@ -120,10 +92,7 @@ PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 def test_the_metadata_hold_the_command_and_the_system(tmp_path, kind):
     picture = tmp_path / f"é <&> (1).{kind}"
-    words = [
-        *["plot", "portrait", "harmonic", "--eps", "1/20", "--start", "1,2", "--steps", "3", "-q", "-o"],
-        str(picture),
-    ]
+    words = [*shlex.split("plot portrait harmonic --eps 1/20 --start 1,2 --steps 3 -q -o"), str(picture)]
     assert main(words) == 0
     assert b"[hamiltonian]" in picture.read_bytes()
     if kind != "pdf":

@@ -80,12 +80,10 @@ def test_algebraic_numbers_of_sympy_are_parameters():
     x1, y1 = sympy.symbols("x1 y1")
     law = [(x1 - 1) * 5 - (y1 + 2) / 2, (y1 - 2) * 5 - (sympy.GoldenRatio * (1 + x1) / 2 - x1)]
     by_hand = sympy.solve(law, [x1, y1])
-    root = (1 + sympy.sqrt(5)) / 2
+    values = {t: (1 + sympy.sqrt(5)) / 2, sympy.GoldenRatio: (1 + sympy.sqrt(5)) / 2}
     for text, symbol in zip(step, (x1, y1), strict=True):
-        difference = sympy.sympify(text.replace("^", "**")).subs(t, root) - by_hand[symbol].subs(
-            sympy.GoldenRatio, root
-        )
-        assert sympy.simplify(difference) == 0
+        difference = sympy.sympify(text.replace("^", "**")) - by_hand[symbol]
+        assert sympy.simplify(difference.subs(values)) == 0
     assert km.orbit(km.System({x: y, y: sympy.GoldenRatio * x - x**2}), [1, 2], "1/10", 1)[1].text == step
     for text, number in (("sqrt(2)", sympy.sqrt(2)), ("-sqrt(2/9)", -sympy.sqrt(2) / 3), ("sqrt(-1)", sympy.I)):
         assert km.load("euler_top", a1=text) == km.load("euler_top", a1=number)
@@ -97,10 +95,7 @@ NO_NUMBERS = [
     (np.True_, "found True, expected a number"),
     (np.array([3]), r"found array\(\[3\]\) of numpy, expected one exact number"),
     (np.timedelta64(3, "s"), "of numpy, expected one exact number"),
-    *(
-        (value, "found the floating-point number 3.*expected an exact one")
-        for value in (3.0, np.float32(3), np.array(3.0))
-    ),
+    *((x, "found the floating-point number 3.*expected an exact one") for x in (3.0, np.float32(3), np.array(3.0))),
 ]
 EXACT = {
     "rational numbers": lambda value: km.QQ.convert(value),
@@ -130,9 +125,7 @@ COUNTS = {
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
     "m": lambda value: km.random_member(value, 1).m,
-    "the seed": lambda value: (
-        3 * (km.random_member_with_eigenvalues([1, 2], value) == km.random_member_with_eigenvalues([1, 2], 3))
-    ),
+    "the seed": lambda value: 3 * (km.random_member(2, value) == km.random_member(2, 3)),
     "an entry": lambda value: 3 if km.find_recurrence([value, 6, 12, 24, 48, 96]).rate.text == "2" else 0,
 }
 
@@ -200,7 +193,6 @@ def test_orbits_go_over_every_field_that_has_numbers_to_print():
 
 # What a user of Python writes without having read much.
 EXPRESSIONS = """
-km.period("x' = 2*x*y; y' = -x^2 - y^2", [1, 2], "1/10").status
 km.period("paper_m2", [1, 2, 0, 1], time_step="1/5", prime=10007).period
 km.period("paper_m2", "1, 2, 0, 1", "1/10^2").status, km.map("euler_top", "1/10^6")("1, 2, 1/3^2")
 km.ensemble("henon_heiles", np.full((5, 4), 0.1), "1/20", 50, kernel="numpy").x
@@ -208,7 +200,6 @@ km.ensemble(system="euler_top", starts=[[1, 2, 3]], eps="1/10", steps=3, kernel=
 km.load("euler_top").save("top.toml")
 km.orbit("euler_top", np.array([1, 2, 3]), "1/10", 3, arithmetic="mod:101")
 km.orbit("euler_top", start=[1, 2, 3], eps="1/10", steps=3).to_csv("o.csv")
-str(km.find_integrals("weierstrass")), km.find_integrals("weierstrass").rows()
 km.load("euler_top").at("1/10")([1, 2, 3]) == km.load("euler_top")("1/10")([1, 2, 3])
 km.degrees(km.map("weierstrass", "1/10"), max_terms=3).degrees, km.analyze(km.map("harmonic", "1/10") ** 2).integrable
 km.plot.degrees(km.degrees("euler_top", max_terms=4))
@@ -260,10 +251,7 @@ def test_what_one_writes_works(expression, tmp_path, monkeypatch):
 REFUSED = [
     *((f"km.{name}(3)", "found a int, expected a name of the catalogue") for name in ("analyze", "find_symmetry")),
     ("km.degrees(None)", "found a NoneType, expected a name"),
-    ('km.degrees("nosuch")', "found the unknown system 'nosuch'"),
-    ("km.degrees(\"x' = y^3; y' = x\")", "degree 3"),
     ("km.degrees(km.System(FISH).map.at(1, km.GF(101)))", "expected a map over the rational numbers"),
-    ("km.degrees(FISH, effort=99)", "found the effort 99, expected an integer from -20 to 40"),
     ('km.orbit("euler_top", [1, 2, 3], 0.1, 5)', 'e.g. "0.1"'),
     ('km.orbit("euler_top", [1, 2, 3], "1/10")', "expected either steps="),
     ('km.orbit(FISH, [1, 2], "1/10", at=3)', r"found at = 3, expected a sequence of steps, at=\[3\]"),
@@ -276,7 +264,6 @@ REFUSED = [
     ('km.orbit(phi, [1, 2], "1/5", 3)', "has a fixed eps and field"),
     ('km.load("euler_top")()', 'found no eps, expected an exact number such as "1/10"'),
     ("km.load(None)", "found a NoneType, expected the name"),
-    ('km.load("euler_top", a1="sqrt(4)")', "expected an irreducible"),
     ('km.load("euler_top", a1=sympy.pi)', "found pi, expected"),
     ('km.map("euler_top")', "euler_top depends on it"),
     ("phi(None)", "expected 2: q, p"),
@@ -289,13 +276,13 @@ REFUSED = [
     ('km.lyapunov(FISH, ["a", 1], "1/5", 9)', "found 'a'"),
     ('km.lyapunov(FISH, [[1, 2], [1]], "1/5", 9)', "different lengths"),
     ("km.report_html(km.degrees(FISH, max_terms=2))", "found DegreeGrowth, expected an Analysis"),
+    ("km.report_html('text')", "expected an Analysis"),
     ("km.normal_form(FISH)", "expected a member of the family"),
     ('km.orbit_period(FISH, "1/10", [1, 0], 101)', "expected a normal form"),
     ('km.period("lorenz", [1, 2, 3], "1/10")', "found no normal form"),
     ("km.flow_and_map(FISH)", "km.find_integrals"),
     ("km.height(5)", "expected the coordinates"),
     ('km.System("x\' = a*x", a=sympy.pi)', "found pi, expected a rational or an algebraic number"),
-    ("km.System(\"x' = a*x\", a='1 + sqrt(2)')", r"root of t\^2 - 2"),
     ('km.System("x\' = a*x")', r"System\(..., NAME=VALUE\)"),
     ("km.System({x: sympy.sqrt(3) * y, y: sympy.sqrt(2) * x})", "found sqrt.* is the value of a parameter"),
     ("km.System([sympy.Eq(X, Y)])", "expected a first derivative on the left"),
@@ -337,6 +324,28 @@ REFUSED = [
     ("km.cycles(FISH, prime=101)", 'found None, expected an exact number, e.g. eps="1/10"'),
     ("km.compare(FISH, x0=[1, 2])", "expected eps= or h="),
     ("km.load('lyness').kahan('1/10')", "expected a quadratic vector field"),
+    ("km.orbit(FISH, [1, 2], '1/10', 4).plot(ax=1)", "km.plot.orbit has no argument ax=.*it has trajectory, x, y"),
+    ("km.System(FISH).plot(eps='1/10', figsize=3)", "km.portrait has no argument figsize=.*axes are returned"),
+    ('km.plot.portrait("euler_top", dt=1)', "h= is the time step"),
+    ("km.certificate(FISH)", 'checker= is "sympy", "gp" or "rocq"'),
+    ("km.fixed_points(FISH, eps=1)", "leave it out"),
+    ('km.check_integrals(FISH, integral="q")', "extra= is the claim"),
+    ('km.orbit(FISH, [1, 2], "1/10", 4, kernel="cuda")', "found the kernel 'cuda', expected numpy or numba"),
+    ("km.catalogue()[:3]", "found slice.*expected a name"),
+    ("phi({2, 1})", r"found the point \{1, 2\}, expected a sequence of 2 numbers"),
+    ("km.explicit_map([], [])", "found no variables"),
+    ('km.composed_map([km.load("lyness").map])', "expected maps for every eps"),
+    ('km.composed_map(km.load("lyness").map, 5)', "found '5', expected maps for every eps"),
+    ('km.composed_map(km.load("lyness").map, (km.load("lyness").map, 2.5))', "the power"),
+    ('km.compare(FISH, eps="1/20", methods=5, steps=10)', "found methods = 5, expected a list such as"),
+    ('km.compare(FISH, eps="1/20", methods="kahan", steps=10)', "found methods = 'kahan', expected a list"),
+    ('km.certificate(FISH, "gp", claims="volume")', r"expected a list: claims=\['volume'\]"),
+    ('km.plot.escape("riccati", eps="1/10")', "found 1 variable, expected at least 2"),
+    ('km.orbit(FISH, [1, 2], "1/10", 3, max_digits=0)', "found a budget of 0 digits"),
+    ('km.heights("mcmillan", "1,2")', "found '1,2', expected an integer, p/q or a decimal"),
+    ('km.geometry("paper_m2", [1, 2, 3, 4], 0)', "found eps = 0, expected a nonzero number"),
+    ('km.geometry("lyness", [0, 0])', "the map is not defined at step 0"),
+    ("km.geometry(\"x' = 1 + x^2\", [0], '1/2')", "the map is not defined at step"),
 ]
 
 

@@ -367,24 +367,6 @@ def test_an_explicit_map_is_made_from_a_dictionary_called_and_composed():
         lyness @ 3
 
 
-def test_methods_and_plots_name_their_arguments():
-    walk = km.orbit(FISH, [1, 2], "1/10", 4)
-    for call, words in [
-        (lambda: walk.plot(ax=1), r"km.plot.orbit has no argument ax=.*it has trajectory, x, y"),
-        (
-            lambda: km.System(FISH).plot(eps="1/10", figsize=3),
-            "km.portrait has no argument figsize=.*axes are returned",
-        ),
-        (lambda: km.plot.portrait("euler_top", dt=1), "h= is the time step"),
-        (lambda: km.certificate(FISH), 'checker= is "sympy", "gp" or "rocq"'),
-        (lambda: km.fixed_points(FISH, eps=1), "leave it out"),
-        (lambda: km.check_integrals(FISH, integral="q"), "extra= is the claim"),
-        (lambda: km.orbit(FISH, [1, 2], "1/10", 4, kernel="cuda"), "found the kernel 'cuda', expected numpy or numba"),
-        (lambda: km.catalogue()[:3], "found slice.*expected a name"),
-    ]:
-        refuses(words, call)
-
-
 def test_a_function_is_called_with_its_arguments_in_any_form():
     I = km.find_integrals(FISH)[0]
     value = I([1, 2], "1/10")
@@ -443,26 +425,3 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
         assert np.asarray(walk, dtype=float).tolist() == rows
     else:
         refuses(f"rounds residues modulo {prime}, expected dtype=int or dtype=object", np.asarray, walk, dtype=float)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: km.map(FISH, "1/10")({2, 1}), r"found the point \{1, 2\}, expected a sequence of 2 numbers"),
-        (lambda: km.explicit_map([], []), "found no variables"),
-        (lambda: km.composed_map([km.load("lyness").map]), "expected maps for every eps"),
-        (lambda: km.composed_map(km.load("lyness").map, 5), "found '5', expected maps for every eps"),
-        (lambda: km.composed_map(km.load("lyness").map, (km.load("lyness").map, 2.5)), "the power"),
-        (lambda: km.compare(FISH, eps="1/20", methods=5, steps=10), r"found methods = 5, expected a list such as"),
-        (lambda: km.compare(FISH, eps="1/20", methods="kahan", steps=10), "found methods = 'kahan', expected a list"),
-        (lambda: km.certificate(FISH, "gp", claims="volume"), r"expected a list: claims=\['volume'\]"),
-        (lambda: km.plot.escape("riccati", eps="1/10"), "found 1 variable, expected at least 2"),
-        (lambda: km.orbit(FISH, [1, 2], "1/10", 3, max_digits=0), "found a budget of 0 digits"),
-        (lambda: km.heights("mcmillan", "1,2"), "found '1,2', expected an integer, p/q or a decimal"),
-        (lambda: km.geometry("paper_m2", [1, 2, 3, 4], 0), "found eps = 0, expected a nonzero number"),
-        (lambda: km.geometry("lyness", [0, 0]), "the map is not defined at step 0"),
-        (lambda: km.geometry("x' = 1 + x^2", [0], "1/2"), "the map is not defined at step"),
-    ],
-)
-def test_wrong_values_are_named_and_so_is_what_is_expected(call, words):
-    refuses(words, call)

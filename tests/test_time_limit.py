@@ -23,13 +23,6 @@ def busy():
         math.sqrt(2)
 
 
-def test_a_busy_loop_is_stopped():
-    began = time.monotonic()
-    with pytest.raises(TimeLimit, match=r"the time limit of 0.05 s is over"), time_limit(0.05):
-        busy()
-    assert time.monotonic() - began < 10
-
-
 def test_what_is_done_in_time_is_not_disturbed_and_all_is_as_before():
     before, timer = signal.getsignal(signal.SIGALRM), signal.getitimer(signal.ITIMER_REAL)[0]  # pytest may have one
     with time_limit(20):
@@ -45,8 +38,10 @@ def test_what_is_done_in_time_is_not_disturbed_and_all_is_as_before():
 
 @pytest.mark.parametrize(("outer", "inner", "which"), [(60, 0.02, "0.02"), (0.02, 60, "0.02")])
 def test_the_shorter_of_two_limits_stops(outer, inner, which):
-    with pytest.raises(TimeLimit, match=f"of {which} s"), time_limit(outer), time_limit(inner):
+    began = time.monotonic()
+    with pytest.raises(TimeLimit, match=f"the time limit of {which} s is over"), time_limit(outer), time_limit(inner):
         busy()
+    assert time.monotonic() - began < 10
 
 
 def test_the_outer_limit_goes_on_after_the_inner_one():

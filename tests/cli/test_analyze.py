@@ -1,9 +1,8 @@
-"""kahanmaps analyze: the report in three forms, what it says of one eps, how it ends, and exit statuses."""
+"""kahanmaps analyze: the report in three forms and how it ends; what it says is in answers.txt and said.txt."""
 
 import json
 import os
 import pty
-import re
 import signal
 import subprocess
 
@@ -13,57 +12,22 @@ from cli_helpers import COMMAND, Outcome, time_is_over
 from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.laboratory import Laboratory
 
-TOP = "analyze euler_top"
-STATUSES = {"proved", "supported", "derived", "measured", "undecided", "note"}
-
 
 def report(out):
-    """The title, (section, status, text) of every line, and the verdict."""
+    """(section, status, text) of every line, and the verdict."""
     blocks = [block.splitlines() for block in out.strip().split("\n\n")]
-    assert blocks[-1][0] == "verdict"
     lines = [(block[0], *line.split("\t")) for block in blocks[1:-1] for line in block[1:]]
-    assert re.fullmatch(r"effort 1, [0-9]+\.[0-9] million units", blocks[-1][2])
-    return blocks[0][0], lines, tuple(blocks[-1][1].split("\t"))
-
-
-def test_the_report_as_text(kahanmaps):
-    outcome = kahanmaps(TOP)
-    title, lines, verdict = report(outcome.out)
-    assert (outcome.status, outcome.err) == (0, "")
-    equations = outcome.out.splitlines()[1:5]
-    assert equations[:3] == ["x1' = x2*x3", "x2' = -2*x1*x3", "x3' = x1*x2"]
-    assert equations[3].startswith("proved: an identity of rational functions, or a theorem; supported: ")
-    assert title == "analyze: euler_top, dimension 3, a1 = 1, a2 = -2, a3 = 1, every eps (the time step is 2 eps)"
-    assert {status for _, status, _ in lines} <= STATUSES
-    I1 = "I1 = (2*x1^2 + x2^2)/(2*x1^2*eps^2 + 1)  [relations of degree 2 along orbits]"
-    assert ("integrals", "proved", I1) in lines
-    assert ("integrals", "measured", "along orbits x1^2 + c1*x3^2 + c2 = 0") in lines
-    assert ("growth", "derived", "d_n = 2*n^2 + 1") in lines
-    assert ", ".join(dict.fromkeys(section for section, _, _ in lines)) == (
-        "vector field, integrals, measure, the flow, Poisson tensors, growth, singularities, symmetry, structure, "
-        "commuting systems"
-    )
-    assert verdict == (
-        "integrable",
-        "Superintegrable (proved): 2 independent integrals in dimension 3, so that orbits lie on curves; quadratic "
-        "growth, dynamical degree 1 (derived). It is Liouville integrable, with the Poisson tensor P1 (proved).",
-    )
+    assert (blocks[-1][0], blocks[-1][2][-14:]) == ("verdict", " million units")
+    return lines, tuple(blocks[-1][1].split("\t"))
 
 
 def test_text_json_and_markdown_say_the_same(once):
-    _, lines, verdict = report(once("analyze nahm_tetrahedral").out)
+    lines, verdict = report(once("analyze nahm_tetrahedral").out)
     result = once("analyze nahm_tetrahedral --json").json
     markdown = once("analyze nahm_tetrahedral --markdown").out
     assert [(line["section"], line["status"], line["text"]) for line in result["statements"]] == lines
     assert (result["verdict"]["integrability"], result["verdict"]["sentence"]) == verdict
     assert all(text in markdown.replace("\\", "") for _, _, text in lines)
-
-
-@pytest.mark.parametrize("form", ["", "--json", "--markdown"])
-def test_undecided_gives_3(kahanmaps, form):
-    outcome = kahanmaps(f"analyze clebsch_first_flow --effort -20 {form}")
-    assert outcome.status == 3
-    assert "The growth is undecided" in outcome.out
 
 
 @pytest.fixture
@@ -78,21 +42,18 @@ def interrupted(*_, **__):
 @pytest.mark.parametrize(
     ("part", "sections"),
     [
-        ("constant_structures", ["not done"]),
-        (
-            "linear_symmetries",
-            ["vector field", "integrals", "measure", "the flow", "growth", "singularities", "structure", "not done"],
-        ),
+        ("constant_structures", "not done"),
+        ("linear_symmetries", "vector field, integrals, measure, the flow, growth, singularities, structure, not done"),
     ],
 )
 @pytest.mark.usefixtures("one_process")
 def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, part, sections):
     monkeypatch.setattr(f"kahanmaps.laboratory.analyses.table.{part}", interrupted)
     outcome = kahanmaps("analyze weierstrass")
-    _, lines, verdict = report(outcome.out)
+    lines, verdict = report(outcome.out)
     assert outcome.status == 130
     assert "interrupted: the verdict rests on the results so far" in outcome.err
-    assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
+    assert ", ".join(dict.fromkeys(section for section, _, _ in lines)) == sections
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"
     assert (verdict[0] == "undecided") is (part == "constant_structures")
@@ -109,9 +70,8 @@ def test_seconds_end_an_analysis_and_what_is_complete_is_printed_unchanged(kahan
     assert outcome.status == 3
     assert outcome.err == "stopped after 1000 s (--seconds): symmetries\n"
     assert (len(sections), [section for section in sections if section not in complete]) == (8, [])
-    assert skipped.splitlines()[1:] == [
-        f"note\t{part}: stopped (--seconds)" for part in ("symmetries", "commuting systems")
-    ]
+    parts = ("symmetries", "commuting systems")
+    assert skipped.splitlines()[1:] == [f"note\t{part}: stopped (--seconds)" for part in parts]
     assert verdict.startswith("verdict\nintegrable\t")
     as_json = kahanmaps("analyze weierstrass --seconds 1000 --json -q")
     assert (as_json.status, as_json.err, as_json.json["interrupted"]) == (3, "", True)

@@ -1,6 +1,6 @@
 """`kahanmaps batch`: what it prints, what it says on standard error, its exit statuses, and that it can be interrupted.
 
-The tasks that go wrong are those of tests/experiments/fault_tasks.py.
+Tasks that go wrong are those of tests/experiments/fault_tasks.py; more of what it prints is in docs/howto/run-a-batch.
 """
 
 import json
@@ -16,9 +16,12 @@ from pathlib import Path
 import pytest
 from cli_helpers import COMMAND, environment, shell
 from helpers import quick
-from small_databases import recorded, until
+from small_databases import ok, planned, recorded, task, until
 
 import kahanmaps as km
+from kahanmaps.experiments.registry import task_kind
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.experiments.running.local import LocalWorkers
 
 FAULTS = Path(__file__).parent.parent / "experiments"
@@ -111,15 +114,6 @@ def test_refuted_claims_are_results_like_others(batch):
     assert done.rows[1][4:6] == ["4", "2"]
 
 
-def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
-    done = batch("run", SPACE, "--dry-run")
-    assert done.status == 0
-    assert done.rows[0] == ["space", "family-space", "6 tasks", "2 m x 3 seed"]
-    assert done.rows[1][2].endswith("m=2 seed=0")
-    assert done.out.endswith("6 tasks\n")
-    assert not Path("study.db").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -158,9 +152,6 @@ def test_show_has_all_that_is_known_of_a_task(batch, space):
 
 
 def test_a_task_can_be_redone_from_what_show_prints(batch):
-    from kahanmaps.experiments.registry import task_kind
-    from kahanmaps.experiments.results.system_spec import system_from
-
     batch("run", '[experiments.top]\ntask = "check-integrals"\nsystem = "euler_top"\noptions.eps = "1/7"\n', "-q")
     key = batch("export --db study.db --jsonl").records[1]["key"]
     data = batch(f"show {key} --db study.db --json").json
@@ -171,24 +162,17 @@ def test_a_task_can_be_redone_from_what_show_prints(batch):
 
 
 def test_different_results_of_one_task_are_reported_and_those_of_the_target_are_kept(batch):
-    from kahanmaps.experiments.results.records import Outcome as Word
-    from kahanmaps.experiments.results.records import Record, Task, TaskLimits
-    from kahanmaps.experiments.results.store import Store
-
-    task = Task("pause", None, {"seed": 1})
     for name, value in (("one.db", 1), ("two.db", 2)):
-        with Store.open(name, create=True) as store:
-            store.plan("a", "1", TaskLimits(), [task], {})
-            store.add([Record(task.key, Word.OK, {"value": value})])
+        planned(name, 1, records=[ok(1, value)])
     with Store.open("two.db"):  # nothing is written to what another process may be writing to
         done = batch("merge one.db two.db")
     assert done.status == 3
     assert done.rows == [["two.db", "new results: 0", "failures replaced: 0", "conflicts: 1"]]
     assert "1 task with different results in two databases, those of one.db were kept" in done.err
-    assert task.key in done.err
+    assert task(1).key in done.err
     assert batch("export --db one.db --jsonl").records[1]["result"] == {"value": 1}
     (messages,) = batch("merge one.db two.db --json -q").json["merged"]
-    assert (messages["conflicts"], messages["conflicting"]) == (1, [task.key])
+    assert (messages["conflicts"], messages["conflicting"]) == (1, [task(1).key])
     assert batch("merge one.db one.db").status == 2
 
 
@@ -288,12 +272,12 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
 
 
-def test_bad_files_are_skipped_with_a_list(kahanmaps, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_bad_files_are_skipped_with_a_list(kahanmaps):
     for name, rhs in (("a", "x' = x"), ("b", "x' = z"), ("c", "x' =")):
-        (tmp_path / f"{name}.toml").write_text(f'[system]\nrhs = "{rhs}"\n')
-    (tmp_path / "spec").write_text('[experiments.o]\ntask = "orbit"\nsystem = "*.toml"\noptions = {eps = 1}\n')
-    assert "skipped\tb.toml" in kahanmaps("batch run spec --dry-run --skip-bad").out
+        Path(f"{name}.toml").write_text(f'[system]\nrhs = "{rhs}"\n')
+    Path("spec").write_text('[experiments.o]\ntask = "orbit"\nsystem = "*.toml"\noptions = {eps = 1}\n')
+    assert "skipped\tb.toml" in kahanmaps("batch run spec --dry-run --skip-bad --db o.db").out
+    assert not Path("o.db").exists()
     assert kahanmaps("batch run spec --skip-bad -j 1 --db o.db").status == 0
     [entry] = kahanmaps("batch status --db o.db --json").json["experiments"]
     assert (entry["tasks"], [skipped["system"] for skipped in entry["skipped"]]) == (1, ["b.toml", "c.toml"])

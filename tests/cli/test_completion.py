@@ -4,11 +4,10 @@ import os
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cli_helpers import COMMAND, Outcome, environment, shell
+from cli_helpers import COMMAND, environment, shell
 
 from kahanmaps.documents.catalog import names
 from kahanmaps_cli.main import COMMANDS
@@ -22,41 +21,18 @@ def question(line: str) -> dict[str, str]:
 
 
 @pytest.fixture
-def ask(kahanmaps, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
-    """Ask at the end of a line, in a folder."""
+def offered(kahanmaps, monkeypatch):
+    """What is offered for the last word of a line."""
 
-    def ask(line: str, folder: Path | None = None) -> Outcome:
+    def offer(line):
         with monkeypatch.context() as here:
             for name, value in question(line).items():
                 here.setenv(name, value)
-            if folder is not None:
-                here.chdir(folder)
-            outcome: Outcome = kahanmaps("")
-        return outcome
-
-    return ask
-
-
-@pytest.fixture
-def offered(ask: Callable[..., Outcome]) -> Callable[..., list[str]]:
-    """What is offered for the last word of a line."""
-
-    def offer(line: str, folder: Path | None = None) -> list[str]:
-        outcome = ask(line, folder)
+            outcome = kahanmaps("")
         assert outcome.err == ""
         return [item.partition(",")[2] for item in outcome.out.splitlines() if item]
 
     return offer
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "my-top.toml").write_text('variables = ["x"]\n[system]\nrhs = ["a*x"]\n[parameters]\nalpha = 1\n')
-    (tmp_path / "broken.toml").write_text("[[[")
-    (tmp_path / "notes.txt").touch()
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "other.toml").touch()
-    return tmp_path
 
 
 def test_commands_are_offered(offered):
@@ -64,9 +40,14 @@ def test_commands_are_offered(offered):
     assert offered("kahanmaps check-i") == ["check-integrals"]
 
 
-def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder):
-    assert offered("kahanmaps orbit m", folder) == ["mine/", "my-top.toml"]
-    assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]
+def test_system_files_and_folders_are_offered_and_no_other_file(offered, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my-top.toml").write_text("[[[")
+    Path("notes.txt").touch()
+    Path("mine").mkdir()
+    Path("mine/other.toml").touch()
+    assert offered("kahanmaps orbit m") == ["mine/", "my-top.toml"]
+    assert offered("kahanmaps orbit n") == [name for name in names() if name.startswith("n")]
 
 
 def test_nothing_that_computes_is_loaded():

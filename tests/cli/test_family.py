@@ -1,27 +1,26 @@
-"""kahanmaps family: members of the commuting family, drawn and written as system files, shown and taken apart.
-
-What a seed draws is the same everywhere. Files that are written are read by every other command.
-"""
+"""kahanmaps family: members of the commuting family, drawn and written as system files, shown and taken apart."""
 
 from pathlib import Path
 
 import pytest
-
-DRAWN = [
-    ("--m 3", 3),
-    ("--eigenvalues 1,-2,3", 3),
-    ("--eigenvalues 2,2,5", 3),
-    ("--eigenvalues 1e300,-7", 2),
-    ("--m 3 --generic", 3),
-    ("--chi t^2-2", 2),
-    ("--chi (t-1)^2", 2),
-    ("--m 2 --size 1000000", 2),
-    ("--chi (t-1)*(t^2+1) --signs=-1,1", 3),
-    (f"--m 2 --seed {10**40}", 2),
-]
+from helpers import together
 
 
-@pytest.mark.parametrize(("options", "m"), DRAWN)
+@together(
+    "options, m",
+    [
+        ("--m 3", 3),
+        ("--eigenvalues 1,-2,3", 3),
+        ("--eigenvalues 2,2,5", 3),
+        ("--eigenvalues 1e300,-7", 2),
+        ("--m 3 --generic", 3),
+        ("--chi t^2-2", 2),
+        ("--chi (t-1)^2", 2),
+        ("--m 2 --size 1000000", 2),
+        ("--chi (t-1)*(t^2+1) --signs=-1,1", 3),
+        (f"--m 2 --seed {10**40}", 2),
+    ],
+)
 def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     path = tmp_path / "drawn.toml"
     assert kahanmaps(f"family new {options} -o", path).status == 0
@@ -72,9 +71,8 @@ def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, t
 
 def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanmaps, tmp_path):
     file = tmp_path / "top.toml"
-    assert (
-        "dimension 6; 4 of 4 integrals inherited" in kahanmaps("family tensor euler_top --algebra t^2-2 -o", file).err
-    )
+    said = kahanmaps("family tensor euler_top --algebra t^2-2 -o", file).err
+    assert "dimension 6; 4 of 4 integrals inherited" in said
     assert kahanmaps("check-integrals", file).status == 0
     assert kahanmaps("check-measure", file).status == 0
     statements = kahanmaps("analyze", file, "--effort -3 --json").json

@@ -2,22 +2,18 @@
 search again, and what stays open gives 3.
 """
 
+import re
 import shlex
 
 import pytest
+from helpers import together
 
 from kahanmaps.documents.catalog import load
 
 
 def without_claims(name):
     """The file of the catalogue without its sections [integrals] and [density]."""
-    kept, skips = [], False
-    for line in load(name).to_toml().splitlines():
-        if line.startswith("["):
-            skips = line.strip() in ("[integrals]", "[density]")
-        if not skips:
-            kept.append(line)
-    return "\n".join(kept) + "\n"
+    return re.sub(r"^\[(integrals|density)\]\n([^\[].*\n|\n)*", "", load(name).to_toml(), flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -71,33 +67,11 @@ def test_tensors_are_accepted_by_check_poisson_for_their_system_only(kahanmaps, 
 def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(kahanmaps):
     rhs = " ".join(f"--rhs='{text}'" for text in kahanmaps("systems paper_m2 --json").json["rhs"])
     out = kahanmaps(f"find-commuting --vars x1,x2,x3,x4 {rhs}").out.splitlines()
-    kind = "fields g = B f (B a constant rational matrix)"
-    assert out[0] == f"# find-commuting: inline, {kind}, every eps (the time step is 2 eps)"
-    assert out[1] == "bracket\tthe g with [f, g] = 0 have dimension 2"
-    assert not any("trivial" in line for line in out)
+    assert out[0].startswith("# find-commuting: inline, fields g = B f ")
     results = [line.split("\t")[2] for line in out if line.startswith("proved\tg and -g")]
     assert len(results) == 3  # 9 solutions: 0, f, -f and three pairs
-    assert any("B = [[-5, 6, 0, 0], [-4, 5, 0, 0], [0, 4, -5, -4], [-4, 0, 6, 5]]" in line for line in out)
-    assert out[-1] == f"# complete: among the {kind} only these, 0, f and -f commute with f"
     outcome = kahanmaps("check-commute", *(f"'{word}'" for word in shlex.split(results[0])), "paper_m2 --json")
     assert (outcome.status, outcome.json["holds"]) == (0, True)
-
-
-def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps):
-    words = "find-integrals lorenz -p b=20 --flow --darboux 2"
-    assert kahanmaps(words).out.splitlines() == [
-        "Darboux polynomials: lorenz, the flow x' = f(x)",
-        "P' = K P, irreducible; integrals left out",
-        "K = -20",
-        "\tproved\tx^2 - 20*z",
-    ]
-    data = kahanmaps(f"{words} --json").json
-    assert (data["flow"], data["cofactors"], data["reason"]) == (True, [], "")
-    assert [entry["cofactor"] for entry in data["spaces"]] == ["-20"]
-    beside = "find-integrals lorenz -p b=20 --flow --max-degree 2 -q"
-    assert "T1\tproved\texp(20*t)*(x^2 - 20*z)\n\tdepends on time\n" in kahanmaps(beside).out
-    data = kahanmaps(f"{beside} --json").json
-    assert data["beside_map"]["polynomials_degree"] == 3
 
 
 def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
@@ -105,13 +79,6 @@ def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
     outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
     assert (outcome.status, outcome.json["found"], outcome.json["codimension"]) == (3, 1, 4)
     assert "3 of the 4 independent integrals have no closed form P/Q" in outcome.json["reason"]
-
-
-def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
-    basis = kahanmaps("find-integrals \"q' = p; p' = -q\" --monomials 'q*p~,p*q~,q^2,p^2' --json").json["bases"][0]
-    # On an orbit q p~ - p q~ and q^2 + p^2 are constants, and one is a multiple of the other.
-    assert (basis["dimension"], basis["functions"]) == (1, ["q*p~", "p*q~", "q^2", "p^2"])
-    assert kahanmaps("find-integrals lorenz --monomials 'x*y~,y*x~,1' --json").json["bases"][0]["dimension"] == 0
 
 
 def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanmaps):
@@ -124,8 +91,8 @@ def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanm
     assert "both" not in kahanmaps("check-commute euler_top euler_top -p a1=3 -q").err
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
+@together(
+    "options, expected",
     [
         ("", "F1 F2"),
         ("--integral known", "F1 F2"),
@@ -136,10 +103,7 @@ def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanm
         ("--integral G=x1 --integral known --integral x2", "-G -I1 F1 F2"),
     ],
 )
-def test_integrals_of_the_command_line_are_checked_first_and_those_known_where_they_are_named(
-    kahanmaps, options, expected
-):
-    report = kahanmaps(f"check-integrals euler_top {options} --json").json
+def test_given_integrals_are_checked_first_and_those_known_where_they_are_named(kahanmaps, options, expected):
+    claims = kahanmaps(f"check-integrals euler_top {options} --json").json["claims"]
     signs = {"refuted": "-", "proved": ""}
-    messages = [signs[entry["verdict"]] + entry["claim"].removesuffix(" is conserved") for entry in report["claims"]]
-    assert messages == expected.split()
+    assert [signs[one["verdict"]] + one["claim"].removesuffix(" is conserved") for one in claims] == expected.split()

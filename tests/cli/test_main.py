@@ -1,8 +1,4 @@
-"""The entry point: help with examples, suggestions, errors as messages, and standard streams in any state.
-
-Data goes to standard output, talk to standard error. Whatever happens to these streams, or inside, a user sees
-a sentence and an exit status, never a traceback.
-"""
+"""The entry point: whatever happens inside or to the streams, a user sees a sentence and an exit status."""
 
 import signal
 import subprocess
@@ -10,21 +6,13 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from unittest.mock import Mock
 
 import click
 import pytest
 from cli_helpers import shell
 
 from kahanmaps.errors import InputError, SingularStep
-
-
-def failing_with(monkeypatch, error):
-    """Let `kahanmaps version` end in an error."""
-
-    def fail(_):
-        raise error
-
-    monkeypatch.setattr("kahanmaps_cli.commands.version.version_of", fail)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +37,7 @@ def failing_with(monkeypatch, error):
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
 )
 def test_an_error_becomes_a_message_and_an_exit_status(kahanmaps, monkeypatch, error, status, words):
-    failing_with(monkeypatch, error)
+    monkeypatch.setattr("kahanmaps_cli.commands.version.version_of", Mock(side_effect=error))
     outcome = kahanmaps("version")
     assert outcome.status == status
     assert words in outcome.err
@@ -111,10 +99,8 @@ def test_lack_of_memory_is_reported_and_never_ends_with_the_status_of_a_refuted_
     # OpenBLAS ends the process with 1 where it finds no memory; at 100 MB numpy itself cannot be loaded.
     script = f"ulimit -v {megabytes * 1000}; $KAHANMAPS_PYTHON -m kahanmaps_cli orbit"
     outcome = shell(f"{script} harmonic --start 1,2 --eps 1/10 --steps 1 --arithmetic float", tmp_path)
-    assert (outcome.status, outcome.err.startswith("Error: out of memory (not enough memory to load numpy)")) == (
-        3,
-        True,
-    )
+    assert outcome.status == 3
+    assert outcome.err.startswith("Error: out of memory (not enough memory to load numpy)")
 
 
 def test_nothing_in_a_message_can_steer_a_terminal(kahanmaps):
@@ -134,9 +120,7 @@ def test_a_reader_that_has_seen_enough_changes_no_verdict(tmp_path):
     assert outcome.err == ""
 
 
-PROGRAM = [sys.executable, "-m", "kahanmaps_cli"]
 READY = "import os, sys; from kahanmaps_cli import __main__; os.write(2, b'ready\\n'); sys.exit(__main__.main())"
-SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 
 
 @pytest.mark.parametrize(
@@ -178,9 +162,9 @@ def test_a_signal_at_any_moment_ends_a_command_with_130_and_a_word(number, words
 
 
 def test_output_to_a_closed_stream_is_an_error():
-    done = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *PROGRAM, "version"], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (3, "")
-    assert "standard output is closed" in done.stderr
+    outcome = shell("exec $KAHANMAPS_PYTHON -m kahanmaps_cli version >&-", Path())
+    assert (outcome.status, outcome.out) == (3, "")
+    assert "standard output is closed" in outcome.err
 
 
 IN_FLINT = """
@@ -193,7 +177,7 @@ with interruptible(lambda: os.write(1, b"asked to end\\n")):  # print may be in 
 """
 
 
-@SIGNALS
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_signals_in_a_row_end_a_call_of_flint_that_holds_them_back(number):
     with subprocess.Popen([sys.executable, "-c", IN_FLINT], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"

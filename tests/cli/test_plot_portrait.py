@@ -4,16 +4,18 @@ import io
 import json
 import signal
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from kahanmaps.plots.portraits import portrait as drawing
 from kahanmaps_cli.screen.progress import Progress
 
 PLOT = "plot portrait -o - --format svg"
-LV = f"{PLOT} lotka_volterra --eps 1/20 --start 1,2 --steps 30"
+FISH = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --no-field"
 
 
 @pytest.fixture
@@ -43,11 +45,9 @@ def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn,
 
 
 def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):
-    kahanmaps(LV)
-    kahanmaps(
-        "orbit lotka_volterra --eps 1/20 --start 1,2 --steps 30 --arithmetic float --kernel numpy -o",
-        tmp_path / "o.npy",
-    )
+    line = "lotka_volterra --eps 1/20 --start 1,2 --steps 30"
+    kahanmaps(f"{PLOT} {line}")
+    kahanmaps(f"orbit {line} --arithmetic float --kernel numpy -o", tmp_path / "o.npy")
     np.testing.assert_allclose(drawn[0][0].points[:, 0], np.load(tmp_path / "o.npy"), rtol=1e-13)
 
 
@@ -67,9 +67,7 @@ def test_starts_come_from_a_file_or_at_random(kahanmaps, drawn, tmp_path):
 
 
 def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):
-    command = (
-        f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --no-field --levels modified_H"
-    )
+    command = f"{FISH} --window=-2,2,-2,2 --levels modified_H"
     kahanmaps(command)
     outcome = kahanmaps(command + " --levels-at=-1/2,1000")
     through, at = (portrait.levels for portrait, _ in drawn)
@@ -88,33 +86,24 @@ def test_ctrl_c_ends_a_portrait_without_a_picture(kahanmaps, drawn, monkeypatch,
 
 
 def test_points_are_coloured_by_an_integral_that_a_theorem_gives(kahanmaps, drawn):
-    words = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --no-field --colour-by"
-    kahanmaps(f"{words} 'modified H'")
-    kahanmaps(f"{words} H")  # of the flow, which the map does not conserve
+    kahanmaps(f"{FISH} --colour-by 'modified H'")
+    kahanmaps(f"{FISH} --colour-by H")  # of the flow, which the map does not conserve
     kept, moved = (np.ptp(portrait.values) for portrait, _ in drawn)
     assert kept < 1e-13
     assert moved > 1e-4
 
 
-@pytest.fixture
-def piped(monkeypatch):
-    """Put text on standard input."""
-    return lambda text: monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
-
-
-def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
-    first, second = tmp_path / "a.png", tmp_path / "b.png"
+def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     record = kahanmaps("degrees euler_top --json").out
-    assert kahanmaps("plot degrees euler_top --size 4 -q -o", first).status == 0
-    (tmp_path / "record.json").write_text(record)
-    assert kahanmaps("plot degrees --size 4 -q --from", tmp_path / "record.json", "-o", second).status == 0
-    piped(record)
-    assert kahanmaps("plot degrees --from - --size 4 -q -o", tmp_path / "c.png").status == 0
-    # The metadata tell the two commands; the pixels are the same.
-    import matplotlib.image as image
-
-    assert (image.imread(first) == image.imread(second)).all()
-    assert (image.imread(first) == image.imread(tmp_path / "c.png")).all()
+    Path("record.json").write_text(record)
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(record.encode())))
+    for source, name in (("euler_top", "a"), ("--from record.json", "b"), ("--from -", "c")):
+        assert kahanmaps(f"plot degrees {source} --size 4 -q -o {name}.png").status == 0
+    # The metadata tell the commands; the pixels are the same.
+    first, second, third = (imread(f"{name}.png") for name in "abc")
+    assert (first == second).all()
+    assert (first == third).all()
 
 
 @pytest.mark.usefixtures("unrendered")

@@ -33,8 +33,9 @@ def test_a_refuted_claim_gives_status_1_and_a_page_all_the_same(kahanmaps, tmp_p
     assert "✗ refuted" in require_sound(outcome.out).text
 
 
-def test_what_to_install_is_said_before_the_work(kahanmaps, monkeypatch):
-    monkeypatch.setitem(sys.modules, "jinja2", None)
+@pytest.mark.parametrize("library", ["jinja2", "latex2mathml.converter"])
+def test_what_to_install_is_said_before_the_work(kahanmaps, monkeypatch, library):
+    monkeypatch.setitem(sys.modules, library, None)
     page_template.cache_clear()
     monkeypatch.setattr("kahanmaps.laboratory.analysis.analyze", lambda *_, **__: pytest.fail("it was analysed"))
     outcome = kahanmaps(SMALL, "-o page.html")

@@ -72,16 +72,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def words_of(line: str, folder: Path) -> list[str]:
-    """The words of a command."""
-    key = json.loads((folder / "r.jsonl").read_text().splitlines()[1])["key"]
-    return [key if word == "KEY" else word for word in line.split()]
-
-
 @pytest.mark.parametrize("line", COMMANDS)
 def test_no_text_of_a_file_moves_a_terminal_or_becomes_a_tag(line, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    assert main(words_of(line, folder)) in (0, 1, 3)
+    key = json.loads(Path("r.jsonl").read_text().splitlines()[1])["key"]
+    assert main([key if word == "KEY" else word for word in line.split()]) in (0, 1, 3)
     out, err = capsys.readouterr()
     assert len(out) > 20
     assert OBEYED.findall(out + err) == []

@@ -3,11 +3,7 @@
 The table is tests/cli/said.txt: a command, behind a number where it does not end with 0, and behind each ` => ` words
 of standard output or standard error, blanks for tabs and line breaks; behind ` => not: ` words that are in neither.
 Behind ` <= ` stands what is in the file that the command names, with \\n for a new line. In tests/cli/wrong_use.txt all
-end with 2.
-
-Exit statuses: 0 the claim holds (proved or supported) or the work is done; 1 refuted, and nothing else; 2 wrong use or
-bad input, with what was found and what is expected, and nothing on standard output; 3 undecided or stopped early; 70 an
-internal error; 130 interrupted (test_main.py, test_orbit.py).
+end with 2. Exit statuses are listed in docs/cli.md.
 """
 
 import re
@@ -68,9 +64,6 @@ def test_an_undecided_check_gives_3(kahanmaps, monkeypatch):
     undecided = Report("poisson", report(Certainty.UNDECIDED).findings, context)
     monkeypatch.setattr("kahanmaps.checks.preserve.check_poisson", lambda *_: undecided)
     assert kahanmaps("check-poisson henon_heiles --json").status == 3
-
-
-# 3
 
 
 @pytest.mark.parametrize(("command", "status"), [line.split(" => ") for line in COMMANDS["orbits"]])

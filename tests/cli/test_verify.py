@@ -1,13 +1,10 @@
-"""kahanmaps verify: the paper's statements for people on a terminal, in a pipe, and for scripts.
-
-In a pipe every statement stands with its verdict, formula and evidence; --json is one object with everything, in the
-shape of the other checks and with the place of each statement in the paper. On a terminal there is a table a section.
-"""
+"""kahanmaps verify: the paper's statements for scripts; what it prints for people is in answers.txt."""
 
 import json
 
 import pytest
 
+from kahanmaps.invariants.integrals_and_densities import PaperIntegral
 from kahanmaps.paper.registry import claims
 
 QUICK = "verify --m 2 --section 6"
@@ -49,8 +46,6 @@ def test_controls_are_refuted_and_that_is_success(once):
 
 def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     # H~ with twice its value is not the function that (61) says.
-    from kahanmaps.invariants.integrals_and_densities import PaperIntegral
-
     original = PaperIntegral.value
     monkeypatch.setattr(PaperIntegral, "value", lambda self, K, eps, x: original(self, K, eps, x) * K.convert(2))
     outcome = kahanmaps("verify --m 2 --section 7 --json")

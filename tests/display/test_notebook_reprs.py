@@ -19,7 +19,6 @@ from kahanmaps.display import markup
 EVIL = '<script>alert("x")</script>\x1b[31m'
 LARGEST = 100_000  # characters of any representation
 TOP, MEMBER = km.load("euler_top"), km.random_member_with_eigenvalues([1, -2], seed=7)
-PLANE = km.QuadraticSystem.from_text(["x", "y"], ["x*y - 3*x", "x^2 + 1/2"])
 # Dense, of dimension 20, with numbers of 200 digits.
 NAMES = [f"x{k}" for k in range(20)]
 HUGE = km.QuadraticSystem.from_text(NAMES, [f"{'7' * 200}*({' + '.join(NAMES)})^2"] * 20)
@@ -39,14 +38,11 @@ def text_of(thing):
     return "".join(html_of(thing).itertext())
 
 
-def walked(orbit):
-    """The orbit, all of whose points were computed."""
+def walked(*arguments, **options):
+    """An orbit, all of whose points were computed."""
+    orbit = km.orbit(*arguments, **options)
     list(orbit)
     return orbit
-
-
-def analysis():
-    return analysis_of("lotka_volterra")
 
 
 WRONG = 'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"'
@@ -54,8 +50,7 @@ MANY = [km.parse_rational_function(f"x{k}", [*(f"x{i}" for i in range(30)), "eps
 LATEX = {  # a value, and what its formula contains
     "a system": (
         lambda: TOP.system,
-        r"$\displaystyle \begin{aligned} \dot{x_1} &= x_2 x_3 \\ \dot{x_2} &= -2 x_1 x_3 \\ "
-        r"\dot{x_3} &= x_1 x_2 \end{aligned}$",
+        r"\begin{aligned} \dot{x_1} &= x_2 x_3 \\ \dot{x_2} &= -2 x_1 x_3 \\ \dot{x_3} &=",
     ),
     "a system with long terms": (lambda: HUGE.scaled("7" * 400), "(210 terms, not shown)"),
     "a system with many equations": (lambda: HUGE, "(20 equations)"),
@@ -66,8 +61,7 @@ LATEX = {  # a value, and what its formula contains
     ),
     "a large J": (lambda: km.CubicHamiltonian(ring(NAMES).constant(0), fmpq_mat(20, 20)), "20 rows and 20 columns"),
     "a map": (
-        lambda: km.KahanMap(PLANE, "1/10"),
-        r"$\displaystyle \begin{aligned} "
+        lambda: km.map("x' = x*y - 3*x; y' = x^2 + 1/2", "1/10"),
         r"\frac{\tilde{x} - x}{2 \varepsilon} &= \frac{1}{2} y \tilde{x} + \frac{1}{2} x \tilde{y} "
         r"- \frac{3}{2} x - \frac{3}{2} \tilde{x} \\ "
         r"\frac{\tilde{y} - y}{2 \varepsilon} &= x \tilde{x} + \frac{1}{2} \\ "
@@ -96,25 +90,13 @@ def test_formulas_are_whole_bounded_and_show_what_they_are_of(make, words):
 HTML = {  # a value, and what its text contains
     "a huge file": (lambda: km.SystemFile.from_system(HUGE), ["(20 equations)"]),
     "a hostile name": (lambda: km.SystemFile.from_system(TOP.system, EVIL), [EVIL.replace("\x1b", "\\x1b")]),
-    "a file": (
-        lambda: TOP,
-        [
-            "Euler top",
-            "a1 = 1, a2 = -2, a3 = 1",
-            r"\displaystyle -\frac{\varepsilon^2 x_2^2 - 1}{2 \varepsilon^2 x_3^2 + 1}",
-        ],
-    ),
+    "a file": (lambda: TOP, ["Euler top", "a1 = 1, a2 = -2, a3 = 1", r"-\frac{\varepsilon^2 x_2^2 - 1}{2 \vareps"]),
     "a member": (lambda: MEMBER, ["member of the commuting family, m = 2"]),
     "an associated system": (lambda: MEMBER.associate([1, -1]), ["associated system +-"]),
     "a normal form": (lambda: km.normal_form(MEMBER), ["chi(t)"]),
-    "a singular orbit": (
-        lambda: walked(km.Orbit(km.KahanMap(km.QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), [1], 5)),
-        ["singular"],
-    ),
+    "a singular orbit": (lambda: walked("x' = x^2", [1], "1/2", 5), ["singular"]),
     "an orbit over its budget": (
-        lambda: walked(
-            km.Orbit(km.KahanMap(km.load("henon_heiles").system, "1/10"), ["1/2", "1/3", 1, 1], 50, max_digits=9000)
-        ),
+        lambda: walked("henon_heiles", ["1/2", "1/3", 1, 1], "1/10", 50, max_digits=9000),
         ["(long)", "budget"],
     ),
     "a refutation": (lambda: km.check_integrals(km.parse_system(WRONG, "wrong")), ["✗ refuted", "I(x~) = "]),
@@ -123,13 +105,7 @@ HTML = {  # a value, and what its text contains
         lambda: km.verify(km.SystemFile.from_member(MEMBER), options=km.VerifyOptions(sections=(5, 8))),
         ["Section 8. ", "misprint"],
     ),
-    "integrals": (
-        lambda: km.find_integrals(TOP),
-        [
-            r"\displaystyle I_1 = ",
-            "2 found; there are 2 in all (measured: relations of degree up to 2 along orbits show 2)",
-        ],
-    ),
+    "integrals": (lambda: km.find_integrals(TOP), [r"\displaystyle I_1 = ", "2 found; there are 2 in all (measured: "]),
     "Darboux polynomials": (lambda: km.darboux_polynomials(km.load("lotka_volterra"), 1), ["cofactor"]),
     "a census": (lambda: km.cycle_census(km.load("lotka_volterra").system, "1/10", 31), ["GF(31)"]),
     "a period": (lambda: km.orbit_period(km.normal_form(MEMBER), "1/10", ["1/2", "-1/5", 0, 1], 10007), ["period"]),
@@ -146,11 +122,11 @@ def test_values_say_in_words_what_they_are(make, words):
     "part", ["integrals", "densities", "degrees", "heights", "symmetries", "commuting", "hamiltonian"]
 )
 def test_each_part_of_an_analysis_is_shown_by_itself(part):
-    assert text_of(getattr(analysis(), part)).strip()
+    assert text_of(getattr(analysis_of("lotka_volterra"), part)).strip()
 
 
 def test_an_analysis_shows_the_verdict_before_the_statements():
-    text = text_of(analysis())
+    text = text_of(analysis_of("lotka_volterra"))
     assert text.index("not integrable") < text.index("dx/phi is invariant")
     assert "the time step is 2 eps" in text
 

@@ -4,6 +4,7 @@ meant.
 
 import pytest
 from flint import fmpq
+from helpers import together
 
 import kahanmaps as km
 from kahanmaps.documents.symbols import with_symbols
@@ -96,7 +97,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("text", "words"), REFUSED.items(), ids=lambda text: str(text)[:20])
+@together("text, words", REFUSED.items())
 def test_what_is_no_equation_is_refused_with_what_to_write(text, words):
     with pytest.raises(InputError) as caught:
         km.System(text)

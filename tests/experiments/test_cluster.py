@@ -1,7 +1,7 @@
 """Tasks on a dask cluster: every record comes back exactly once, whatever dies on the way, and nothing hangs.
 
-Schedulers and workers are real ones, on 127.0.0.1. What the workers run is a script that reads and prints what the
-command of a group does, and misbehaves where a task asks it to; batches run the command itself.
+Schedulers and workers are real ones, on 127.0.0.1. The workers run a script that reads and prints what the command of a
+group does, and misbehaves where a task asks it to; batches run the command itself.
 """
 
 import json
@@ -17,10 +17,10 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
+from cli_helpers import COMMAND
 from helpers import refuses
 from small_databases import exported, recorded, until
 
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Outcome, Task, TaskLimits
 from kahanmaps.experiments.running import cluster
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
@@ -61,9 +61,6 @@ for job in read["jobs"]:
 """
 
 
-UNLIMITED = TaskLimits()
-
-
 class Machines:
     """A scheduler and workers, each in a process group of its own, that end with the test."""
 
@@ -87,17 +84,11 @@ class Machines:
         # --no-dashboard alone leaves a server of HTTP on all interfaces.
         here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
         command = [sys.executable, "-m", module, *here, *options]
+        env = {**os.environ, "OF_THE_WORKER": "kept", "PYTHONWARNINGS": "ignore"}
         with (self.folder / "log").open("ab") as log:
-            process = subprocess.Popen(
-                command,
-                stdout=log,
-                stderr=log,
-                cwd=self.folder,
-                start_new_session=True,
-                env={**os.environ, "OF_THE_WORKER": "kept", "PYTHONWARNINGS": "ignore"},
-            )
-        self.running.append(process)
-        return process
+            where = {"stdout": log, "stderr": log, "cwd": self.folder, "env": env}
+            self.running.append(subprocess.Popen(command, start_new_session=True, **where))
+        return self.running[-1]
 
     def worker(self, threads: int = 2, nanny: bool = True) -> subprocess.Popen[bytes]:
         place = ["--scheduler-file", str(self.file), "--local-directory", str(self.folder)]
@@ -114,10 +105,9 @@ class Machines:
         for process in self.running.copy():
             self.kill(process)
 
-    def workers(self, documents=lambda digest: digest, address=None, **options) -> ClusterWorkers:
+    def workers(self, documents=lambda digest: digest, **options) -> ClusterWorkers:
         """An executor on this scheduler, with our script."""
-        options = {"command": self.command, **options}
-        return ClusterWorkers(str(self.file) if address is None else address, documents, **options)
+        return ClusterWorkers(str(self.file), documents, **{"command": self.command, **options})
 
 
 @contextmanager
@@ -146,7 +136,7 @@ def own(tmp_path):
         yield machines
 
 
-def jobs_of(number, limits=UNLIMITED, kind="test", **options):
+def jobs_of(number, limits=TaskLimits(), kind="test", **options):  # noqa: B008
     """Jobs that differ in their number only."""
     return [Job(Task(kind, None, {"number": n, **options}), limits) for n in range(number)]
 
@@ -182,18 +172,13 @@ def test_a_record_that_is_printed_twice_is_handed_back_once(workers):
 
 
 def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
-    texts = {"first": "one = 1", "second": "two = 2", "third": "three = 3"}
     tasks = [Task("test", {"document": name, "parameters": {}}, {}) for name in ("first", "second")]
     tasks.append(Task("test", {"family": {"m": 2}}, {}))
     tasks.append(Task("test", {"document": "first", "parameters": {}}, {"other": {"document": "third"}}))
-    with closing(shared.workers(texts.__getitem__)) as workers:
+    with closing(shared.workers("text of {}".format)) as workers:
         results = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
-    assert [results[task.key] for task in tasks] == [
-        {"first": "one = 1"},
-        {"second": "two = 2"},
-        {},
-        {"first": "one = 1", "third": "three = 3"},
-    ]
+    needed = [["first"], ["second"], [], ["first", "third"]]
+    assert [results[task.key] for task in tasks] == [{name: f"text of {name}" for name in names} for names in needed]
 
 
 def test_a_group_that_is_killed_leaves_only_the_guilty_job_lost(workers):
@@ -301,8 +286,8 @@ def study(monkeypatch, tmp_path):
     Path("study.toml").write_text(STUDY)
 
     def start(machines, number):
-        command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "study.toml", "--db", "away.db", "-q"]
-        command += ["--scheduler", str(machines.file), "--group-seconds", "0.3"]
+        command = [*COMMAND, "batch", "run", "study.toml", "--db", "away.db", "-q", "--group-seconds", "0.3"]
+        command += ["--scheduler", str(machines.file)]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         until(lambda: recorded("away.db") >= number or process.poll() is not None, 60)
         return process
@@ -338,8 +323,8 @@ def test_an_address_where_no_scheduler_answers_is_refused_in_a_sentence():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        with pytest.raises(InputError, match=f"no dask scheduler answers at {address} within 0.3 s"):
-            ClusterWorkers(address, str, connect_seconds=0.3)
+        said = f"no dask scheduler answers at {address} within 0.3 s"
+        refuses(said, ClusterWorkers, address, str, connect_seconds=0.3)
 
 
 @pytest.mark.parametrize(

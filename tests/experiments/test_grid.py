@@ -1,25 +1,19 @@
 """Grids: all combinations of axes, counted without being walked, in an order that is fixed; ranges are exact."""
 
-from fractions import Fraction
+import re
 from itertools import product
-from typing import Any
 
 import pytest
 from helpers import fraction, rationals, refuses
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.grid import Grid, RationalRange
 
 HUGE = 10**18
 
 
-def texts(text: str) -> list[str]:
-    return [str(value) for value in RationalRange.from_text(text)]
-
-
-def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
+def naive(first, last, step):
     """What a range is, value by value."""
     values = []
     while first <= last if step > 0 else first >= last:
@@ -42,7 +36,7 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
     ],
 )
 def test_a_range_is_exact(text, values):
-    assert texts(text) == values
+    assert list(map(str, RationalRange.from_text(text))) == values
 
 
 @pytest.mark.parametrize(
@@ -64,9 +58,7 @@ def test_a_range_is_exact(text, values):
     ],
 )  # fmt: skip
 def test_a_wrong_range_is_refused_in_a_sentence(text, words):
-    with pytest.raises(InputError) as caught:
-        RationalRange.from_text(text)
-    assert words in str(caught.value)
+    refuses(re.escape(words), RationalRange.from_text, text)
 
 
 @given(rationals(12), rationals(12), rationals(6))
@@ -81,7 +73,7 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     assert [fraction(value) for value in result] == expected
 
 
-def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict[str, int]]:
+def combinations(axes, zips):
     """What a grid is: itertools.product of the axes, zipped ones in one."""
     groups: list[list[str]] = []
     for name in axes:
@@ -96,7 +88,7 @@ def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict
 
 
 @st.composite
-def grids(draw: Any) -> tuple[dict[str, list[int]], list[list[str]]]:
+def grids(draw):
     names = draw(st.permutations("abcde"))[: draw(st.integers(0, 5))]
     axes = {name: draw(st.lists(st.integers(0, 9), min_size=1, max_size=3)) for name in names}
     zips: list[list[str]] = []

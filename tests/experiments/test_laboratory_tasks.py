@@ -1,20 +1,14 @@
-"""The tasks of the laboratory: each gives what a direct call gives, in words and numbers that can be grouped by.
-
-Known answers, with their origin, are those of the catalogue: the degrees 2 n^2 + 1 of the Euler top, the dynamical
-degrees 2 and 3 of maps without cancellation, the integrals and densities of the literature that the files name.
-"""
+"""The tasks of the laboratory: each gives what a direct call gives, in words and numbers that can be grouped by."""
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from specs import made, perform
 
 import kahanmaps as km
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.errors import InputError
+from kahanmaps.documents.files import parse_system
 from kahanmaps.experiments.registry import task_kind
 from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.laboratory.preserve import densities
@@ -25,22 +19,17 @@ TASKS = (
     "degrees", "find-integrals", "find-density", "find-poisson", "find-symmetry", "find-commuting", "analyze",
     "singularities", "cycles", "lyapunov",
 )  # fmt: skip
-NEEDED: dict[str, dict[str, Any]] = {"cycles": {"prime": 31}, "lyapunov": {"eps": "1/10", "steps": 40}}
+NEEDED = {"cycles": {"prime": 31}, "lyapunov": {"eps": "1/10", "steps": 40}}
 SURVEY = Path(__file__).parents[2] / "examples" / "growth_survey.toml"
 
 
-def of_catalogue(name: str) -> SystemFile:
-    return made(load(name))
-
-
-def of_rhs(*rhs: str) -> SystemFile:
+def of_rhs(*rhs):
     variables = ["x", "y", "z"][: len(rhs)]
     return made(parse_system(f"variables = {json.dumps(variables)}\n[system]\nrhs = {json.dumps(list(rhs))}"))
 
 
-TOP, LORENZ, RIVALS, WEIERSTRASS, NAHM = map(
-    of_catalogue, ["euler_top", "lorenz", "lotka_volterra", "weierstrass", "nahm_tetrahedral"]
-)
+NAMES = ("euler_top", "lorenz", "lotka_volterra", "weierstrass", "nahm_tetrahedral")
+TOP, LORENZ, RIVALS, WEIERSTRASS, NAHM = (made(load(name)) for name in NAMES)
 ZERO, LINE, OSCILLATOR = of_rhs("0", "0"), of_rhs("x^2"), of_rhs("y", "-x")
 
 
@@ -63,16 +52,12 @@ GROWING = of_rhs("x")  # det(I - eps f') = 1 - eps vanishes identically at eps =
 QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "derived"}
 EXPONENTIAL = {"growth": "exponential", "dynamical_degree": "2", "power": 0, "status": "derived"}
 BOUNDED = {"growth": "bounded", "dynamical_degree": "1", "power": 0, "status": "recurrence"}
-INTEGRABLE = {
-    "status": "complete",
-    "unfinished": [],
-    "integrability": "integrable",
-    "growth": "quadratic",
-    "integrals": 1,
-    "confinement": "confined",
-}
-NOT_INTEGRABLE = {"integrability": "not integrable", "dynamical_degree": "2", "densities": 1, "in_family": False}
 COUNTED = {"status": "complete", "reason": ""}
+INTEGRABLE = {"status": "complete", "unfinished": [], "integrability": "integrable", "growth": "quadratic"}
+INTEGRABLE |= {"integrals": 1, "confinement": "confined"}
+NOT_INTEGRABLE = {"integrability": "not integrable", "dynamical_degree": "2", "densities": 1, "in_family": False}
+LINES = {"status": "complete", "growth": "linear", "integrable": ["-1"], "components": 1, "confirmed": 1}
+LINES |= {"unassigned": 0, "generic": [2, 4]}
 
 
 @pytest.mark.parametrize(
@@ -96,15 +81,9 @@ COUNTED = {"status": "complete", "reason": ""}
         ("analyze", NAHM, {}, INTEGRABLE),
         ("analyze", RIVALS, {}, NOT_INTEGRABLE),
         ("analyze", GROWING, {"eps": 1}, {"integrability": "singular"}),
-        (
-            "scan",
-            RIVALS,
-            {"over": "a", "terms": 2, "primes": "11,13,17"},
-            {"status": "complete", "growth": "linear", "integrable": ["-1"], "components": 1, "confirmed": 1,
-             "unassigned": 0, "generic": [2, 4]},
-        ),
+        ("scan", RIVALS, {"over": "a", "terms": 2, "primes": "11,13,17"}, LINES),
     ],
-)  # fmt: skip
+)
 def test_what_is_known_is_found(name, system, requested, expected):
     record = perform(name, system, **requested)
     assert {key: record[key] for key in expected} == expected
@@ -130,29 +109,9 @@ def test_exponents_are_those_of_the_library():
     assert record["sum"] == pytest.approx(-41 / 3, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("name", "system", "requested", "words"),
-    [
-        ("find-integrals", TOP, {"symbolic": "b"}, "b"),
-        ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
-        ("scan", TOP, {"over": "a1", "by": "integrals"}, "expected one of degrees"),
-        ("scan", TOP, {"over": "a1", "primes": "11,13"}, "expected at least three"),
-        ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
-        ("singularities", TOP, {"steps": 0}, "found 0 steps, expected 1 to 10000"),
-        ("cycles", TOP, {"prime": 2}, "expected an odd prime"),
-        ("cycles", TOP, {"prime": 31, "steps": 5}, "found steps = 5 without samples"),
-        ("cycles", TOP, {"prime": 7, "eps": "1/7"}, "the prime 7 divides the denominator of 1/7"),
-        ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found steps = 1 and transient = 0, expected at least 2"),
-    ],
-)
-def test_an_impossible_task_is_refused_in_a_sentence(name, system, requested, words):
-    with pytest.raises(InputError, match=words):
-        perform(name, system, **requested)
-
-
 @pytest.mark.slow
 def test_the_survey_of_the_catalogue_finds_what_the_catalogue_knows():
-    result: dict[str, list[Any]] = {}
+    result = {}
     spec = km.read_spec(SURVEY)
     tasks = {task.key: (experiment.name, task) for experiment in spec.experiments for task in experiment.tasks()}
     for record in km.run(spec, jobs=2):
@@ -161,9 +120,4 @@ def test_the_survey_of_the_catalogue_finds_what_the_catalogue_knows():
         result.setdefault(experiment, []).append((task, record))
     assert {record.result["growth"] for _, record in result["members"]} == {"quadratic"}
     counts = {task.system["name"]: record.result["codimension"] for task, record in result["integrals"]}
-    assert {name: counts[name] for name in ("euler_top", "lorenz", "clebsch_first_flow", "paper_m3")} == {
-        "euler_top": 2,
-        "lorenz": 0,
-        "clebsch_first_flow": 4,
-        "paper_m3": 3,
-    }
+    assert {"euler_top": 2, "lorenz": 0, "clebsch_first_flow": 4, "paper_m3": 3}.items() <= counts.items()

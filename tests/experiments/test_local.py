@@ -1,8 +1,7 @@
 """Worker processes: whatever a task does to its worker, the others are done and it gets the right record.
 
-Whose doing a death is decides what becomes of the task: a fault of its own (SIGSEGV, SIGABRT, ...) is recorded, a kill
-from outside (SIGTERM, SIGKILL, ...) is tried again, and at last lost, which is no result. The tasks are those of
-fault_tasks.py. Negative controls: even seeds, which are done.
+A fault of its own (SIGSEGV, SIGABRT, ...) is recorded, a kill from outside (SIGTERM, SIGKILL, ...) is tried again, and
+at last lost, which is no result. The tasks are those of fault_tasks.py; those of even seeds are done.
 """
 
 import errno
@@ -13,12 +12,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from signal import Signals
-from typing import Any
 
 import pytest
+from cli_helpers import COMMAND
 from helpers import quick, refuses
 from small_databases import exported, recorded, until
 
@@ -35,7 +33,6 @@ KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
 INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE, AWKWARD, TWINS, EXIT_0 = range(8, 17)
 READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER, NOT_LOADED, OPENBLAS, LEAVE = range(17, 24)
 ALWAYS = 99
-Started = Callable[..., LocalWorkers]
 
 
 @pytest.fixture(autouse=True)
@@ -45,11 +42,11 @@ def _tries(monkeypatch, tmp_path):
 
 
 @pytest.fixture
-def start() -> Iterator[Started]:
+def start():
     """An executor that ends with the test, with some jobs begun."""
-    started: list[LocalWorkers] = []
+    started = []
 
-    def make(jobs: int, *begun: Job) -> LocalWorkers:
+    def make(jobs, *begun):
         started.append(LocalWorkers(jobs, {}.__getitem__))
         for job in begun:
             started[-1].submit(job)
@@ -64,8 +61,8 @@ def fault(order: int, seed: int = 1, limits: TaskLimits | None = None) -> Job:
     return Job(Task("fault", None, {"order": order, "seed": seed}), limits or TaskLimits(100.0, 400_000_000))
 
 
-def pause(milliseconds: int, seed: int = 0, limits: TaskLimits | None = None) -> Job:
-    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or TaskLimits(100.0))
+def pause(milliseconds: int, seed: int = 0, seconds: float = 100.0) -> Job:
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), TaskLimits(seconds))
 
 
 def signalled(number: int, times: int) -> Job:
@@ -77,7 +74,7 @@ def tries(folder: Path, number: int, times: int) -> int:
     return (folder / "tries" / f"{int(number)}-{times}").stat().st_size
 
 
-def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Record]:
+def done(jobs, workers=2, **settings) -> dict[str, Record]:
     """The records by key; every job has one and only one."""
     results: list[Record] = []
     for records in Batch(jobs, LocalWorkers(workers, {}.__getitem__, **settings)):
@@ -90,7 +87,7 @@ def pids_of(workers: LocalWorkers) -> list[int]:
     """The processes at work, once they wait for tasks or have one."""
     at_work = [worker for worker, _ in workers._running.values()]
     until(lambda: all(worker.is_ready for worker in at_work))
-    return [worker.process.pid for worker in at_work if worker.process is not None and worker.process.pid is not None]
+    return [worker.process.pid for worker in at_work]
 
 
 def is_running(pid: int) -> bool:
@@ -99,10 +96,6 @@ def is_running(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def wait_until_gone(pids: Sequence[int]) -> None:
-    until(lambda: not any(map(is_running, pids)))
 
 
 @pytest.fixture(scope="module")
@@ -166,8 +159,7 @@ def test_answers_of_megabytes_come_whole_with_where_and_how_they_came_about(faul
 
 
 def test_what_a_task_has_started_ends_with_its_worker(faulty):
-    assert faulty[STARTER].result is not None
-    wait_until_gone([faulty[STARTER].result["pid"]])
+    until(lambda: not is_running(faulty[STARTER].result["pid"]))
 
 
 def test_a_task_that_hangs_is_killed_at_its_time_limit_and_keeps_no_earlier_output():
@@ -204,15 +196,13 @@ def test_an_error_caused_by_lack_of_memory_is_reported_as_such(error, is_memory)
 
 
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
-    records = done([pause(150, seed, TaskLimits(time=1.5)) for seed in range(11)], workers=1)
+    records = done([pause(150, seed, 1.5) for seed in range(11)], workers=1)
     assert all(record.is_ok for record in records.values())  # 1.65 seconds in one worker
 
 
 def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
-    jobs = [
-        Job(Task("use", None, {"steps": steps, "seed": seed}), TaskLimits(100.0, 60_000_000))
-        for seed, steps in enumerate((40, 54, 72))
-    ]
+    limits = TaskLimits(100.0, 60_000_000)
+    jobs = [Job(Task("use", None, {"steps": s, "seed": k}), limits) for k, s in enumerate((40, 54, 72))]
     among, alone = done(jobs, workers=1), done(jobs, workers=1, group_seconds=0.0)
     assert {key: record.outcome for key, record in among.items()} == {key: r.outcome for key, r in alone.items()}
     assert {record.outcome for record in alone.values()} == {Outcome.OK, Outcome.OUT_OF_MEMORY}
@@ -229,7 +219,7 @@ def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits():
     assert not any(map(is_from_outside, (None, 0, 1, 7, 137)))
 
 
-def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path: Path):
+def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path):
     assert TRIES > 3  # which takes longer
     kill, quit_ = signalled(signal.SIGKILL, ALWAYS), signalled(signal.SIGQUIT, 2)
     records = done([kill, quit_], tries=3)
@@ -240,7 +230,7 @@ def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_
     assert tries(tmp_path, signal.SIGKILL, ALWAYS) == tries(tmp_path, signal.SIGQUIT, 2) == 3
 
 
-def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
+def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path):
     once, always = signalled(signal.SIGSEGV, 1), signalled(signal.SIGABRT, ALWAYS)
     records = done([once, always], workers=1)
     assert records[once.task.key].is_ok
@@ -249,7 +239,7 @@ def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
 
 
 @pytest.mark.parametrize("number", quick([signal.SIGKILL, signal.SIGSEGV], [signal.SIGKILL]))
-def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Started, number: int):
+def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start, number):
     workers = start(1, pause(300, 0))
     for seed in (1, 2):
         (pid,) = pids_of(workers)
@@ -266,12 +256,10 @@ def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Start
 
 
 @pytest.mark.parametrize("seconds", quick([0.0, 0.05, 0.15], [0.05]))
-def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: float):
+def test_ctrl_c_does_not_reach_a_worker_that_begins(start, seconds):
     """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
     workers = start(1, pause(1))
     ((worker, _),) = workers._running.values()
-    assert worker.process is not None
-    assert worker.process.pid is not None
     time.sleep(seconds)
     os.kill(worker.process.pid, signal.SIGINT)
     (record,) = workers.wait(100.0)
@@ -279,7 +267,7 @@ def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: flo
     assert workers._idle == [worker]
 
 
-def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_kills_them(start: Started):
+def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_kills_them(start):
     workers = start(2)
     assert workers.is_free
     workers.submit(fault(HANG))
@@ -293,7 +281,7 @@ def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_k
     assert not any(map(is_running, pids))
 
 
-def test_workers_that_cannot_start_are_reported_once(monkeypatch: pytest.MonkeyPatch):
+def test_workers_that_cannot_start_are_reported_once(monkeypatch):
     monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
     refuses("no_such_module_anywhere", done, [pause(1, seed) for seed in range(5)], error=WorkersError)
 
@@ -313,15 +301,14 @@ workers.wait(60)
 def test_no_worker_outlives_a_parent_that_is_killed():
     """One of them hangs as in a long call of FLINT."""
     parent = subprocess.Popen([sys.executable, "-c", PARENT, HERE, HERE.parent], stdout=subprocess.PIPE, text=True)
-    assert parent.stdout is not None
     pids = [int(word) for word in parent.stdout.readline().split()]
     assert [is_running(pid) for pid in pids] == [True, True]
     parent.kill()
-    wait_until_gone(pids)
+    until(lambda: not any(map(is_running, pids)))
     parent.communicate()
 
 
-def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(tmp_path: Path):
+def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(tmp_path):
     """multiprocessing would run the script again in each worker, and that one start workers of its own."""
     text = '[experiments.a]\ntask = "pause"\naxes = {seed = "0..3"}'
     (tmp_path / "script.py").write_text(f"import kahanmaps as km\nprint(len(list(km.run({text!r}, jobs=2))))\n")
@@ -329,41 +316,35 @@ def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(t
     assert (ran.stdout, ran.stderr) == ("4\n", "")
 
 
-def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path: Path):
-    jobs = [signalled(signal.SIGTERM, ALWAYS), signalled(signal.SIGTERM, 0)]
-    limits = {"time": 20, "memory": None}
-    text = json.dumps({"documents": {}, "jobs": [{"task": job.task.text, "limits": limits} for job in jobs]})
-    said = io.StringIO()
+def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path):
+    jobs = [signalled(signal.SIGTERM, times).task.text for times in (ALWAYS, 0)]
+    limits, said = {"time": 20, "memory": None}, io.StringIO()
+    text = json.dumps({"documents": {}, "jobs": [{"task": task, "limits": limits} for task in jobs]})
     run_group(io.StringIO(text), said)
     assert [json.loads(line)["outcome"] for line in said.getvalue().splitlines()] == ["lost", "ok"]
     assert tries(tmp_path, signal.SIGTERM, ALWAYS) == 1
 
 
-def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path):
+def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path):
     db, spec = tmp_path / "results.db", '[experiments.a]\ntask = "signalled"\naxes = { order = [15], seed = [0, 99] }\n'
-    records = list(run(spec, db))
-    assert sorted(str(record.outcome) for record in records) == ["lost", "ok"]
+    records = {str(record.outcome): record for record in run(spec, db)}
+    assert set(records) == {"lost", "ok"}
     with Store.open(db, readonly=True) as store:
-        (status,) = store.status()
-        assert (status.missing, status.outcomes) == (1, {Outcome.OK: 1})
-        assert [row.record is None for row in store.rows(missing=True)] == [False, True]
-        lost = [store.find(record.key)[0] for record in records if record.outcome is Outcome.LOST]
-        assert [(entry.record, entry.attempts) for entry in lost] == [(None, 0)]
+        (entry,) = store.find(records["lost"].key)
+    assert (entry.record, entry.attempts) == (None, 0)
     (tmp_path / "tries" / "15-99").write_text("x" * 99)  # from here on it lives
-    again = list(run(spec, db))
-    assert [str(record.outcome) for record in again] == ["ok"]
+    assert [str(record.outcome) for record in run(spec, db)] == ["ok"]
     list(run(spec, tmp_path / "calm.db"))
     assert exported(db) == exported(tmp_path / "calm.db")
 
 
 @pytest.mark.parametrize(("number", "first"), [(Signals.SIGTERM, "workers"), (Signals.SIGKILL, "parent")])
-def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: Path, number: Signals, first: str):
+def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path, number, first):
     text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..14" }\n'
     (tmp_path / "spec.toml").write_text(text)
-    command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
-    process = subprocess.Popen(
-        [*command, "-q"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    command = [*COMMAND, "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2", "-q"]
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, cwd=tmp_path, text=True, **pipes)
     until(lambda: recorded(tmp_path / "wild.db"))
     # Two workers, and the process with which Python keeps account of semaphores.
     threads = Path(f"/proc/{process.pid}/task")
@@ -373,7 +354,7 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
         os.kill(pid, number)
     _, err = process.communicate(timeout=100)
     assert process.returncode == (130 if number == signal.SIGTERM else -number), err
-    wait_until_gone(children)
+    until(lambda: not any(map(is_running, children)))
     with Store.open(tmp_path / "wild.db", readonly=True) as store:
         (status,) = store.status()
     assert set(status.outcomes) == {Outcome.OK}

@@ -6,9 +6,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from small_databases import exported
@@ -51,26 +49,24 @@ def undisturbed(fault_tasks, tmp_path_factory) -> str:
     return exported(db)
 
 
-def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(
-    undisturbed: str, tmp_path: Path
-):
+def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(undisturbed, tmp_path):
     outcome = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
     assert len(list(islice(outcome, 1))) == 1
-    outcome.close()  # type: ignore[attr-defined]
+    outcome.close()
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
 
 
-def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
+def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path):
     outcome = run(PAUSES.format(milliseconds=1, last=20), tmp_path / "a.db")
     for record in islice(outcome, 5):
         with Store.open(tmp_path / "a.db", readonly=True) as store:
             ((_, stored, _, _),) = store.find(record.key)
         assert stored == record
-    outcome.close()  # type: ignore[attr-defined]
+    outcome.close()
 
 
-def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
+def test_a_changed_axis_runs_the_new_tasks_only(tmp_path):
     text = PAUSES.format(milliseconds=1, last=5)
     (tmp_path / "spec.toml").write_text(text)
     assert len(list(run(tmp_path / "spec.toml", tmp_path / "a.db"))) == 6
@@ -80,19 +76,11 @@ def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
     assert sorted(record.result["seed_squared"] for record in new if record.result) == [36, 49, 64]
 
 
-@pytest.fixture
-def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Records are handed on as they come."""
-    monkeypatch.setattr("kahanmaps.experiments.running.run._COLLECTION_FACTOR", 0)
-
-
 class Scripted:
     """An executor that hands back what was submitted, one at a time, and writes down what it was asked."""
 
     def __init__(self) -> None:
         self.jobs: list[Job] = []
-        self.most = 0
-        self.closed = 0
 
     @property
     def is_free(self) -> bool:
@@ -104,31 +92,27 @@ class Scripted:
 
     def submit(self, job: Job) -> None:
         self.jobs.append(job)
-        self.most = max(self.most, len(self.jobs))
 
     def wait(self, timeout: float) -> list[Record]:
         return [Record(self.jobs.pop(0).task.key, Outcome.OK)]
 
     def close(self) -> None:
-        self.closed += 1
+        pass
 
 
-def jobs(count: int) -> Iterator[Job]:
+def jobs(count: int):
     return (Job(Task("pause", None, {"seed": seed})) for seed in range(count))
 
 
-@pytest.mark.usefixtures("_at_once")
-def test_nothing_is_handed_out_after_an_interrupt():
-    executor = Scripted()
-    batch = Batch(jobs(50), executor)
-    seen = 0
+def test_nothing_is_handed_out_after_an_interrupt(monkeypatch):
+    monkeypatch.setattr("kahanmaps.experiments.running.run._COLLECTION_FACTOR", 0)  # records come one at a time
+    batch, seen = Batch(jobs(50), Scripted()), 0
     for records in batch:
         seen += len(records)
         if seen == 10:
             batch.interrupt()
-    assert seen == 13  # the three in flight are done
-    assert batch.was_interrupted
-    assert batch.abandoned == 0
+    # The three in flight are done.
+    assert (seen, batch.was_interrupted, batch.abandoned) == (13, True, 0)
 
 
 def test_what_is_not_done_within_the_grace_is_given_up():
@@ -149,7 +133,7 @@ def test_what_is_not_done_within_the_grace_is_given_up():
 
 
 @pytest.mark.parametrize(("kills", "last"), [(1, 40), pytest.param(50, 12_000, marks=pytest.mark.slow)])
-def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path, kills: int, last: int):
+def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path, kills, last):
     text = PAUSES.format(milliseconds=4, last=last)
     (tmp_path / "spec.toml").write_text(text)
     list(run(text, tmp_path / "calm.db", jobs=2))

@@ -1,11 +1,7 @@
-"""Mistakes of specs: every one is told once, at its place, all at once; so are all systems that cannot be read.
+"""Mistakes of specs: every one is told once, at its place, all at once; so are all systems that cannot be read."""
 
-Whatever the bytes are, reading them gives a Spec or raises InputError (SpecError for the contents of the file), and
-nothing else.
-"""
-
+import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from helpers import refuses, table, together
@@ -18,27 +14,10 @@ from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running.run import plan
 from kahanmaps.experiments.spec import Spec, SpecError, parse_spec, read_spec
 
-TEN = """
-name = 5
-[experiments.first]
-task = "orbit"
-system = "lorens"
-colour = "red"
-axes = { eps = [0.1, 0], stpes = 5, steps = -1 }
-zip = [["eps"]]
-limits = { time = "5 minutes" }
-[experiments.second]
-task = "orbot"
-[experiments.third]
-task = "verify-universal"
-"""
-
 
 def test_a_spec_error_counts_its_mistakes_and_shows_them():
-    with pytest.raises(SpecError) as caught:
-        parse_spec(TEN, "study.toml")
-    assert str(caught.value).splitlines()[0] == "study.toml: 10 mistakes"
-    assert "  experiments.second.task: there is no task 'orbot', expected one of" in str(caught.value)
+    said = r"^study.toml: 2 mistakes\n  name: .*\n  experiments.a.task: there is no task 'orbot', expected one of"
+    refuses(said, parse_spec, 'name = 5\n[experiments.a]\ntask = "orbot"', "study.toml", error=SpecError)
 
 
 CASES = {
@@ -102,7 +81,7 @@ LEAVES = st.sampled_from(
 
 
 @st.composite
-def documents(draw: Any) -> str:
+def documents(draw):
     lines = [f"{draw(KEYS)} = {draw(LEAVES)}"] if draw(st.booleans()) else []
     for name in draw(st.lists(st.sampled_from("ab"), unique=True)):
         lines.append(f"[experiments.{name}]")
@@ -145,17 +124,13 @@ def spec(tmp_path):
     return written
 
 
-@pytest.mark.parametrize(
-    "system", ['"members/*.toml"', '["members/a.toml", "members/b.toml", "members/c.toml", "nosuch"]']
-)
+@pytest.mark.parametrize("system", ['"members/*.toml"', '["members/a.toml", "members/b.toml", "members/c.toml", "no"]'])
 def test_all_bad_files_are_named_at_once(spec, system):
     with pytest.raises(SpecError) as caught:
         read_spec(spec(ORBITS.replace('"members/*.toml"', system)))
-    said = str(caught.value)
-    assert "members/b.toml: 1 mistake" in said
-    assert "members/c.toml: 1 mistake" in said
-    assert "a.toml: " not in said
-    assert ("unknown system 'nosuch'" in said) is ("nosuch" in system)
+    said = re.findall(r"members/\w\.toml: \d mistake|unknown system '\w+'", str(caught.value))
+    unknown = ["unknown system 'no'"] if '"no"' in system else []
+    assert said == ["members/b.toml: 1 mistake", "members/c.toml: 1 mistake", *unknown]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """What `convert` writes runs as it stands and gives the values of the library, wherever the program is at hand.
 
-SymPy and GP compute exactly. NumPy, C and Fortran have floats: 1e-9 leaves room for the condition of the linear
-equations in six dimensions, and is far below what a wrong sign or factor changes.
+SymPy and GP compute exactly. NumPy, C and Fortran have floats: 1e-9 is far below what a wrong sign or factor changes.
 """
 
 import re
@@ -126,13 +125,21 @@ def test_a_sum_of_a_thousand_terms_does_not_exhaust_the_parser(printed):
 
 def gp(text, lines, folder):
     """The lines that GP prints after it has read a file."""
-    if shutil.which("gp") is None:
-        pytest.skip("gp, the program of PARI, is not installed")
+    needs("gp")
     (folder / "system.gp").write_text(text)
-    command = ["gp", "-q", "-f", str(folder / "system.gp")]
-    done = subprocess.run(command, input="\n".join(lines) + "\n", capture_output=True, text=True, timeout=60)
-    assert not done.stderr, done.stderr
-    return done.stdout.splitlines()
+    return run(["gp", "-q", "-f", "system.gp"], folder, input="\n".join(lines) + "\n").splitlines()
+
+
+def needs(program):
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+
+
+def run(command, folder, **more):
+    """What a program prints, which has nothing to complain of."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, **more)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -178,12 +185,10 @@ def fortran_answers(text: str, requested: list[Question], folder):
 
 def compiled(command, program, folder):
     """The numbers that a program prints, compiled by the strict standard and without a warning."""
-    if shutil.which(command[0]) is None:
-        pytest.skip(f"{command[0]} is not installed")
+    needs(command[0])
     (folder / next(word for word in command if word.startswith("all."))).write_text(program)
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    return list(map(float, subprocess.run([folder / "all"], capture_output=True, text=True, timeout=60).stdout.split()))
+    run(command, folder)
+    return list(map(float, run([folder / "all"], folder).split()))
 
 
 def floats(values):

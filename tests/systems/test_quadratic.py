@@ -1,24 +1,20 @@
-"""Quadratic systems x' = f(x) = Q(x, x) + B x + c, and the same carried into a field.
-
-Specified here: Q, B, c are what the right-hand sides say (by hand), values and Jacobi matrices obey Taylor's formula,
-which is exact in degree 2, and what is no quadratic system is refused. Of f = J grad H with a cubic H and a constant
-skew J: the canonical equations for the standard J, the point about which H is homogeneous, and the refusals.
-"""
+"""Quadratic systems x' = f(x) = Q(x, x) + B x + c, those with a cubic Hamiltonian, and their solutions in balls."""
 
 from fractions import Fraction
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import arb, fmpq, fmpq_mat
 from helpers import EULER_TOP, agree, over_all_fields, rationals, refuses, some, systems, systems_with_points
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import trace
 from kahanmaps.algebra.polynomials import evaluate, gradient, monomials, ring
 from kahanmaps.errors import BadPrime
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
+from kahanmaps.systems.taylor import solution
 
 integers = st.integers(-9, 9)
 
@@ -72,10 +68,6 @@ def test_there_is_no_polarisation_modulo_two():
     K = GF(2)
     with pytest.raises(BadPrime):
         EULER_TOP.over(K).polarised([K.one] * 3, [K.one] * 3)
-
-
-def test_a_right_hand_side_of_degree_three_is_refused_by_its_variable():
-    refuses("of y' has degree 3, expected at most 2", plane, "x", "x*y^2")
 
 
 def test_a_system_of_too_many_variables_is_refused():
@@ -146,3 +138,30 @@ def test_with_the_standard_structure_the_equations_are_the_canonical_ones(H):
 )
 def test_what_is_no_cubic_or_no_skew_structure_is_refused(H, J, words):
     refuses(words, CubicHamiltonian, H, J)
+
+
+@pytest.mark.parametrize("bits", [64, 200])
+@pytest.mark.parametrize("time", ["3", "-7/2", "1/1000"])
+def test_balls_contain_the_solution_and_are_as_small_as_requested(bits, time):
+    rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+    logistic = QuadraticSystem.from_text(["x"], ["x - x^2"])
+    with RR(3 * bits).working():
+        t = arb(fmpq(*map(int, (time + "/1").split("/")[:2])))
+        growth = (t.exp() / 3) / (1 + (t.exp() - 1) / 3)  # of x' = x - x^2 from 1/3
+        for system, start, exact in ((rotation, [1, 0], [t.cos(), -t.sin()]), (logistic, ["1/3"], [growth])):
+            balls = solution(system, start, time, bits)
+            for ball, value in zip(balls, exact, strict=True):
+                assert ball.contains(value)
+                assert not (ball + arb(2) ** (3 - bits)).contains(value)  # the control: they are no larger
+    assert solution(rotation, [1, 0], time, bits)[0].rad() > 0
+
+
+def test_a_solution_that_does_not_exist_is_none_and_constants_stay():
+    square = QuadraticSystem.from_text(["x"], ["x^2"])
+    assert solution(square, [1], 1) is None
+    assert solution(square, [1], 5) is None
+    assert [ball.contains(0) for ball in solution(square, [0], 5)] == [True]
+    [ball] = solution(QuadraticSystem.from_text(["x"], ["3"]), ["1/7"], 2)
+    with RR(200).working():
+        assert ball.contains(arb(fmpq(43, 7)))
+    refuses("found a point with 2 coordinates, expected 1", solution, square, [1, 2], 1)
