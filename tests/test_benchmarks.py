@@ -1,5 +1,8 @@
 """The benchmarks measure the same thing: all contestants that are present compute the same numbers, on a tiny case."""
 
+import gc
+import importlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -71,6 +74,16 @@ def test_other_programs_get_the_map_and_the_inverse_that_kahanmaps_has():
         for sign in (1, -1):
             *images, last = (form(*point, fmpq(1)) for form in peers.forms(file.system.scaled(sign)))
             assert [image / last for image in images] == list(KahanMap(file.system, fmpq(sign, 10)).step(point))
+
+
+@pytest.mark.parametrize("name", [*sorted(path.stem for path in BENCHMARKS.glob("[!p]*.py")), "peers"])
+def test_a_benchmark_changes_no_setting_of_python_by_being_imported(name):
+    def settings():
+        return sys.get_int_max_str_digits(), sys.getrecursionlimit(), gc.get_threshold(), dict(os.environ)
+
+    before = settings()
+    importlib.import_module(name)
+    assert settings() == before
 
 
 @pytest.mark.slow

@@ -221,7 +221,7 @@ def test_wrong_points_are_refused_in_words():
         ({"q": 1, "x": 2}, "found the coordinates q, x, expected q, p"),
         (walk, r"found 4 points, expected one: type \[f\(x\) for x in points\]"),
         ([[1, 2], [3, 4]], r"km.ensemble\(system, x0, eps, steps\)"),
-        (5, "found the point 5, expected a sequence of 2 numbers"),
+        (5, "found the point 5, expected a sequence of 2 coordinates"),
     ]:
         refuses(words, phi.step, point)
         refuses(words, km.orbit, FISH, point, "1/10", 3)

@@ -340,9 +340,10 @@ def test_fields_that_disagree_would_be_noticed():
 def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrence_confirmed():
     # Degrees of lotka_volterra, whose singularities the budget left out.
     bounds = bound_dynamical_degree(load("lotka_volterra").map, None)
-    for known_bounds, expected in ((bounds, "exponential"), (None, "unknown")):
+    for known_bounds, expected in ((bounds, ("exponential", "proved")), (None, ("unknown", "undecided"))):
         growth = DegreeGrowth((1, 2, 4), None, "budget", "", 0, (), (), dynamical_degree_bounds=known_bounds)
-        assert (str(growth.growth), growth.recurrence) == (expected, None)
+        assert (str(growth.growth), str(growth.known)) == expected
+        assert ("exponential growth" in growth.kind_text, growth.recurrence) == (known_bounds is not None, None)
 
 
 # x' = a y, y' = -a x, z' = a x y has two integrals for generic a; at a = 0 every point is fixed.

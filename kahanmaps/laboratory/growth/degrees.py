@@ -207,6 +207,8 @@ class DegreeGrowth(PrintableResult):
             quotients_text = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}; {reason}"
             proved_text = "" if self.dynamical_degree_bounds is None else " (proved),"
             return f"exponential growth{proved_text} by a factor of about {self.estimate} (estimated: {quotients_text})"
+        if self.dynamical_degree_bounds is not None:
+            return f"exponential growth, no recurrence found in {terms_text}"
         if self.fitted is not None:
             return f"{terms_text} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
         n = len(self.degrees) - 1
@@ -229,7 +231,9 @@ class DegreeGrowth(PrintableResult):
             return Certainty.DERIVED
         if self.recurrence is not None or self.ended == Ended.CONSTANT:
             return Certainty.MEASURED
-        return Certainty.ESTIMATED if self.looks_exponential else Certainty.UNDECIDED
+        if self.looks_exponential:
+            return Certainty.ESTIMATED  # `kind_text` states a factor
+        return Certainty.UNDECIDED if self.dynamical_degree_bounds is None else Certainty.PROVED
 
     @property
     def growth_text(self) -> str:
