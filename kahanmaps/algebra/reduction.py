@@ -79,8 +79,8 @@ def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> 
 
     Source: laska-1982 for minimal models, with the conditions of kraus-1989 at 2 and 3.
 
-    >>> found = bad_primes(EllipticCurve(fmpq(0), fmpq(0), fmpq(16)))
-    >>> found.text, found.minimal_discriminant
+    >>> primes = bad_primes(EllipticCurve(fmpq(0), fmpq(0), fmpq(16)))
+    >>> primes.text, primes.minimal_discriminant
     ('3', -27)
     """
     scale = fmpq(curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q))

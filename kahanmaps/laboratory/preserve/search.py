@@ -275,8 +275,8 @@ def interpolate_bases(
 
     branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, if several spaces have this pattern
     for step_index, group in enumerate(result.spaces):
-        for pattern, found_spaces in group_by_pattern(group).items():
-            if len(found_spaces) == 1:
+        for pattern, spaces in group_by_pattern(group).items():
+            if len(spaces) == 1:
                 continue
 
             def spaces_at(
@@ -285,9 +285,9 @@ def interpolate_bases(
                 repetition = repeat_at(prime, values)
                 return None if repetition is None else group_by_pattern(repetition.spaces[step_index])[pattern]
 
-            found_branches = find_branches(found_spaces, spaces_at, names, laboratory.seed, budget, laboratory.root)
+            found_branches = find_branches(spaces, spaces_at, names, laboratory.seed, budget, laboratory.root)
             if found_branches is None:
-                count, degree = len(found_spaces), found_spaces[0].degree
+                count, degree = len(spaces), spaces[0].degree
                 reason = f"no rational coefficient distinguishes {count} spaces of degree {degree}"
                 reason = SPENT if budget.is_spent else reason
                 return [], f"integrals were found modulo primes, but no closed form: {reason}"
