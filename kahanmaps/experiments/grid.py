@@ -17,7 +17,7 @@ from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import Option
 
-_RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
+_RANGE_FORM = 'expected "FIRST..LAST", "FIRST..LAST:STEP" or "FIRST..LAST step STEP", e.g. "1/10..1/2:1/10"'
 _MAX_VALUES = 2**62  # maximal number of values of an axis: Python's `len` cannot exceed 2^63
 _TOO_MANY = "too many values"  # part of messages
 
@@ -52,7 +52,7 @@ class RationalRange(Sequence[fmpq]):
     def from_text(cls, text: str) -> RationalRange:
         """Return the range that a text such as "2..5" describes. Raises InputError for any other text."""
         first, separator, last_and_step = text.partition("..")
-        words = last_and_step.split()
+        words = last_and_step.replace(":", " step ", 1).split()
         if not separator or not first.strip() or not (len(words) == 1 or (len(words) == 3 and words[1] == "step")):
             raise InputError(f"found {show(text)}, {_RANGE_FORM}")
         return cls(parse_number(first), parse_number(words[0]), parse_number(words[2]) if len(words) > 1 else fmpq(1))

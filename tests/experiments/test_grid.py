@@ -29,6 +29,7 @@ def naive(first, last, step):
         ("0.1..0.3 step 0.1", ["1/10", "1/5", "3/10"]),  # floating-point numbers would end at 0.2
         ("0..1 step 0.3", ["0", "3/10", "3/5", "9/10"]),  # the end is not met
         ("0..1 step 2", ["0"]),
+        ("0..1:1/2", ["0", "1/2", "1"]),
         ("1/2..-1/2 step -1/3", ["1/2", "1/6", "-1/6", "-1/2"]),
         (" 1 .. 2  step  1/2 ", ["1", "3/2", "2"]),
         (".5..1.5", ["1/2", "3/2"]),
@@ -45,10 +46,11 @@ def test_a_range_is_exact(text, values):
         ("1..5 step 0", "found a range of step 0, expected another step"),
         ("5..1", "found a range without values, from 5 to 1 in steps of 1 (for a falling range write a negative step)"),
 
-        ("..", 'found \'..\', expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'),
+        ("..", 'found \'..\', expected "FIRST..LAST", "FIRST..LAST:STEP" or "FIRST..LAST step STEP", e.g. "1'),
         ("1..", "expected \"FIRST..LAST\""),
         ("5", "expected \"FIRST..LAST\""),
         ("1..5 step", "expected \"FIRST..LAST\""),
+        ("1..5:1:2", "found '1:2', expected an integer, p/q or a decimal"),
         ("1..5 step 1 2", "expected \"FIRST..LAST\""),
         ("1..5 Step 2", "expected \"FIRST..LAST\""),
         ("1..3..5", "found '3..5', expected an integer, p/q or a decimal"),

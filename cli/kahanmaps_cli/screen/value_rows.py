@@ -86,12 +86,9 @@ def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[R
         return None
     if system == "-":
         raise click.UsageError("found a range of values and the system on standard input: write it to a file")
-    axes: list[Sequence[Any]] = []
-    for _, value in parameters:
-        text, colon, step = value.partition(":")
-        axes.append(
-            lib.RationalRange.from_text(f"{text} step {step}" if colon else text) if lib.is_range(value) else [value]
-        )
+    axes: list[Sequence[Any]] = [
+        lib.RationalRange.from_text(value) if lib.is_range(value) else [value] for _, value in parameters
+    ]
     if (size := prod(map(len, axes))) > _MAX_ROWS:
         raise click.UsageError(f"found {size} combinations of values, expected at most {_MAX_ROWS}")
     names = [name for name, _ in parameters]
