@@ -159,10 +159,15 @@ class Scan(PrintableResult):
 
     @property
     def coverage(self) -> str:
-        """A sentence on the members that were measured, and on the components that these measurements can detect."""
+        """A text on the members that were measured, and on the components that these measurements can detect."""
+        return "; ".join(text if label == "searched" else f"{label}: {text}" for label, text in self._coverage_lines)
+
+    @property
+    def _coverage_lines(self) -> list[tuple[str, str]]:
         if not self.height:
             primes_text = counted(len(self.sweeps), "prime")
-            return f"conditions need members modulo three primes, and those modulo {primes_text} were tried"
+            text = f"conditions need members modulo three primes, and those modulo {primes_text} were tried"
+            return [("searched", text)]
         complete, lines, planes = (
             _abbreviate([str(sweep.prime) for sweep in sweeps]) for sweeps in self._grouped_sweeps
         )
@@ -192,10 +197,12 @@ class Scan(PrintableResult):
             )
         if len(self.over) > 1:
             number_field_phrases.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
-        return (
-            f"{', and '.join(phrases)}; found are {', and '.join(loci)}, {condition}, over Q with numerators and "
-            f"denominators up to {self.height}; {', and '.join(number_field_phrases)}"
-        )
+        lines = [
+            ("searched", ", and ".join(phrases)),
+            ("special", f"members {condition}"),
+            ("detectable", f"over Q, numerators and denominators up to {self.height}: {', and '.join(loci)}"),
+        ]
+        return [*lines, *(("detectable", phrase) for phrase in number_field_phrases)]
 
     @property
     def text(self) -> str:
@@ -206,7 +213,7 @@ class Scan(PrintableResult):
                 for sweep in self.sweeps
                 for degrees, points in sorted(sweep.classes.items())
             ]
-            lines = [*lines, ("searched", self.coverage), *self._omitted_lines]
+            lines += [*self._coverage_lines, *self._omitted_lines]
             return "\n".join(f"{label}\t{value}" for label, value in lines)
         names_text = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("generic", ", ".join(map(str, self.generic)))]
@@ -239,7 +246,7 @@ class Scan(PrintableResult):
         for images in self.symmetric:
             image_text = f"({', '.join(images)})" if len(images) > 1 else images[0]
             lines.append(("symmetry", f"{names_text} -> {image_text} permutes the special members"))
-        lines.append(("searched", self.coverage))
+        lines += self._coverage_lines
         if any(self.unassigned):
             pairs = list(zip(self.unassigned, self.sweeps, strict=True))
             count_texts = [f"{n} modulo {sweep.prime}" for n, sweep in pairs if n or len(pairs) <= _MAX_LISTED]
