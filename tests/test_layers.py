@@ -205,6 +205,17 @@ def test_a_file_that_breaks_the_rule_is_reported_with_its_line(path, source, sen
 FOLDER = Path(kahanmaps_cli.__file__).parent
 
 
+def test_the_name_of_a_class_has_one_meaning():
+    names = [
+        node.name
+        for path in python_files()
+        for node in parsed(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    assert len(names) > 400
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+
+
 def test_each_name_is_one_of_the_library_and_is_used():
     used = re.findall(r"(?<![\w.])lib\.(\w+)", "\n".join(path.read_text() for path in FOLDER.rglob("*.py")))
     assert sorted(internals.__all__) == sorted(set(used))

@@ -24,8 +24,8 @@ from kahanmaps.certificates.combinations import (
 from kahanmaps.certificates.darboux import conserved_function, darboux_polynomial, invariant_volume
 from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
-    Claim,
     FalseClaim,
+    MapClaim,
     MapData,
     invariant_tensor,
     limited,
@@ -82,7 +82,7 @@ class Certificate(str):
 
     @classmethod
     def of(
-        cls, checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
+        cls, checker: str, claims: Sequence[MapClaim], header: Sequence[str], skipped: Sequence[str], terms: int
     ) -> Certificate:
         """Write the script; `terms` is the number of terms that the program multiplies out."""
         names_and_texts = [(claim.name, getattr(claim, "about", "")) for claim in claims]
@@ -160,7 +160,7 @@ def certificate(
     with limited(effort) as limits:
         file = as_file(system)
         formulas, data = _prepare(file, checker)
-        planes, proved_claims = _Planes(file, data), list[Claim]()
+        planes, proved_claims = _Planes(file, data), list[MapClaim]()
         if commute is not None:
             other_arguments = (claims, integrals, density, tensor, period, equivalent)
             if everything or any(other is not None for other in other_arguments):
@@ -290,7 +290,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         scope_text = "the flow" if is_of_flow else f"eps = {eps}"
         raise InputError(f"a certificate is about a map, for every eps: found a result for {scope_text}")
     formulas, data = _prepare(file, checker, symbols)
-    claims = list[Claim]()
+    claims = list[MapClaim]()
     provers: dict[str, Callable[[], list[Any]]] = {
         type(r).__name__: partial(_claims_of, r, data) for r in sub_results if r is not None
     }
@@ -325,7 +325,7 @@ def _prepare(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tup
     return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
-def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
+def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[MapClaim]:
     """The claims that maps commute, in coordinates that separate the planes if possible; names begin with `label`."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
@@ -340,7 +340,7 @@ def _commuting_claims(file: SystemFile, data: MapData, other: SystemLike, label:
             raise InputError(f"expected two single maps in the same variables, got {file.name} and {other_file.name}")
         maps = [file.map, g]
 
-    claims: list[Claim] = []
+    claims: list[MapClaim] = []
     map_data_list = [data.with_rows(map_.rows) for map_ in maps]
     separation = separate_planes(file.system) if file.is_quadratic else None
     if separation is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
@@ -378,11 +378,11 @@ def _equivalence_claim(file: SystemFile, data: MapData, other: SystemFile, by: S
 
 def _known_claims(
     formulas: Formulas, planes: _Planes, checker: str = ""
-) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
+) -> Iterator[tuple[str, Callable[[], list[MapClaim]]]]:
     """Yield (name, function that returns the claims with this name): claims of the file, then claims of theorems."""
     H, file, data = formulas.H, formulas.file, planes.data
 
-    def single_claim(prove: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
+    def single_claim(prove: Callable[..., MapClaim], *arguments: Any) -> Callable[[], list[MapClaim]]:
         return lambda: [prove(data, *arguments)]
 
     for name, function in formulas.integrals.items():
@@ -423,7 +423,7 @@ class _Planes:
         planar_data = self.data.with_rows(as_map(coordinates.system).rows)
         return coordinates, affine_symmetry(planar_data, "coordinates", coordinates.T, [fmpq(0)] * n, target=self.data)
 
-    def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
+    def claims(self, prove: Callable[..., MapClaim], name: str, function: RationalFunction) -> list[MapClaim]:
         """Return the claim that `prove` returns for a function, in one plane if possible, after the claims it needs."""
         if self.separation is not None:
             coordinates, change = self.separation
@@ -435,7 +435,7 @@ class _Planes:
         return [prove(self.data, name, function)]
 
 
-def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
+def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[MapClaim]:
     """The claims that the result of a search proves about the map; `result` None stands for a search without result."""
     if result is None:
         return []

@@ -16,8 +16,8 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.certificates.identities import (
-    Claim,
     FalseClaim,
+    MapClaim,
     MapData,
     coprime,
     derivative_at_image,
@@ -127,21 +127,21 @@ class DarbouxProducts:
 
 
 @dataclass(frozen=True)
-class ConservedFunction(Claim):
+class ConservedFunction(MapClaim):
     """F = P/Q is conserved, since the two products of Darboux polynomials have the same cofactor."""
 
     fraction: DarbouxProducts
 
 
 @dataclass(frozen=True)
-class DarbouxPolynomial(Claim):
+class DarbouxPolynomial(MapClaim):
     """A Darboux polynomial P of degree k with cofactor C: P(x~) = P C/D^k."""
 
     product: DarbouxProducts
 
 
 @dataclass(frozen=True)
-class InvariantVolume(Claim):
+class InvariantVolume(MapClaim):
     """The volume form dx/phi, phi = P/Q, is invariant: P(x~) Q(x) det M = P(x) Q(x~) det L, with M and L of `data`.
 
     `fraction` contains P and Q as products of Darboux polynomials. It is None if the identity holds for arbitrary

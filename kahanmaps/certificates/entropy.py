@@ -19,7 +19,7 @@ from functools import reduce
 from flint import fmpq_mpoly, nmod_poly
 
 from kahanmaps.algebra.polynomials import common_denominator, degree_in, ring
-from kahanmaps.certificates.identities import Claim, MapData
+from kahanmaps.certificates.identities import MapClaim, MapData
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
 
@@ -32,7 +32,7 @@ _MAX_STEPS = 5  # the largest n
 
 
 @dataclass(frozen=True)
-class PositiveEntropy(Claim):
+class PositiveEntropy(MapClaim):
     """The proof that the dynamical degree is above `lower`; `forms` are F_1, ..., F_n, `inverse` is F_1 for f^-1.
 
     They are forms in the variables and a last, homogenizing variable. c_1 F_1 is (N : D), c_(k+1) F_(k+1) is F_1(F_k),

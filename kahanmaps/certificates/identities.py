@@ -167,7 +167,7 @@ class MapData:
 
 
 @dataclass(frozen=True)
-class Claim:
+class MapClaim:
     """A claim about a map, and its name."""
 
     name: str
@@ -179,14 +179,14 @@ class Claim:
         return not getattr(self, "is_free", False)
 
 
-class EquationClaim(Claim):
+class EquationClaim(MapClaim):
     """A claim that follows from the equation of the map, without solving the equation for x~."""
 
     is_free = True
 
 
 @dataclass(frozen=True)
-class InvariantTensor(Claim):
+class InvariantTensor(MapClaim):
     """A Poisson tensor (P_ij)/Q with Q(x~) L P(x) L^T = Q(x) M P(x~) M^T; P_ij with i < j are stored by (i, j).
 
     `is_free`: whether the identity holds for arbitrary points x and x~.

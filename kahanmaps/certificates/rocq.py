@@ -25,9 +25,9 @@ from kahanmaps.certificates.darboux import (
 )
 from kahanmaps.certificates.entropy import PositiveEntropy
 from kahanmaps.certificates.identities import (
-    Claim,
     EquationClaim,
     InvariantTensor,
+    MapClaim,
     MapData,
     letters_of,
     restrict,
@@ -592,7 +592,7 @@ class _Script:
         ]
 
 
-def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+def rocq_certificate(claims: Sequence[MapClaim], header: Sequence[str] = ()) -> str:
     """Write a script that Coq accepts only if it proves the claims.
 
     Args:
@@ -606,7 +606,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
     lines += [LIBRARY] if any(isinstance(claim, PositiveEntropy) for claim in claims) else []
-    groups: dict[tuple[int, ...], list[Claim]] = {}  # grouped by map: its equation and Cramer's rule are stated once
+    groups: dict[tuple[int, ...], list[MapClaim]] = {}  # grouped by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
         chain_number = k if isinstance(claim, Chain) else 0
         groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), chain_number), []).append(claim)
@@ -631,7 +631,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     return "\n".join(lines) + "\n"
 
 
-_PROOF_METHODS: dict[type[Claim], tuple[Any, str]] = {
+_PROOF_METHODS: dict[type[MapClaim], tuple[Any, str]] = {
     ConservedFunction: (_Script.conserved_function, "conserved"),
     DarbouxPolynomial: (_Script.darboux_polynomial, "darboux"),
     InvariantVolume: (_Script.invariant_volume, "invariant"),

@@ -27,8 +27,8 @@ from kahanmaps.certificates.darboux import (
 )
 from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy, homogenizing
 from kahanmaps.certificates.identities import (
-    Claim,
     InvariantTensor,
+    MapClaim,
     MapData,
     letters_of,
 )
@@ -178,7 +178,7 @@ def line_degree(F, steps, p, residue, start, slope):  # of the image of start + 
         curve = [X.exquo(common) for X in values]  # an error if all three are 0
     return max(X.degree() for X in curve)""",
 }
-_STATEMENTS: dict[type[Claim], str] = {
+_STATEMENTS: dict[type[MapClaim], str] = {
     ConservedFunction: "P/Q is an integral",
     DarbouxPolynomial: "P is a Darboux polynomial, P(x~) = P C/D^k",
     InvariantVolume: "dx/phi is invariant, phi = P/Q",
@@ -263,7 +263,7 @@ class _Script:
         identity = identity.replace("&&", "and") if self.language is PYTHON else identity
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.language is GP))
 
-    def begin(self, claim: Claim, count: int) -> None:
+    def begin(self, claim: MapClaim, count: int) -> None:
         """Append the map of the claim (unless the previous claim has the same map) and the names of `count` points."""
         if claim.data is not self.data or not self.has_points:
             self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
@@ -297,7 +297,7 @@ class _Script:
         self.check("D is not 0", "D != 0")
         self.check("M N = D r", "act(M, N) == scale(D, r)")
 
-    def claim(self, claim: Claim) -> None:
+    def claim(self, claim: MapClaim) -> None:
         """Append the statement of a claim, and its proof."""
         label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
         self.lines.append(f"{self.language.comment}{label}: {_STATEMENTS[type(claim)]}")
@@ -305,7 +305,7 @@ class _Script:
         self.lines.append("")
 
     @singledispatchmethod
-    def prove(self, claim: Claim, label: str) -> None:
+    def prove(self, claim: MapClaim, label: str) -> None:
         """Append the definitions and checks of a claim."""
         raise NotImplementedError(type(claim))
 
@@ -506,7 +506,7 @@ class _Script:
         self.check("Q is not 0", "Q != 0")
 
 
-def script_certificate(language: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+def script_certificate(language: Language, claims: Sequence[MapClaim], header: Sequence[str] = ()) -> str:
     """Write a script that expands the identities of the claims and compares their two sides.
 
     Args:

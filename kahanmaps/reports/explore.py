@@ -20,7 +20,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.maps.floats.float_conversion import to_float, to_floats
 from kahanmaps.plots.portraits.flow import automatic_starts
-from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
+from kahanmaps.reports.page import CHARACTERS, Html, PageSection, system_section
 from kahanmaps.reports.pictures import DEFAULT_EPS
 
 _MIN_SLIDER_END = 0.5  # the slider of eps ends here, or at twice the given eps if this is larger
@@ -29,7 +29,7 @@ _MAX_TERMS = 2000  # maximal number of terms of the polynomials that the browser
 _MAX_VARIABLES = 12  # maximal number of variables, each of which has a slider
 
 
-def explore_sections(analysis: Analysis) -> list[Section]:
+def explore_sections(analysis: Analysis) -> list[PageSection]:
     """Return the sections of a page: an orbit with sliders, the verdict and the integrals of an analysis; the system.
 
     Raises InputError if the map has too many variables or terms for a browser.
@@ -61,7 +61,7 @@ def explore_sections(analysis: Analysis) -> list[Section]:
         # In a script, < could begin a tag. In JSON it can be escaped.
         "data": Html(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
     }
-    return [Section("explore", "An orbit", explore=explore), system_section(analysis.file)]
+    return [PageSection("explore", "An orbit", explore=explore), system_section(analysis.file)]
 
 
 def explore_data(analysis: Analysis) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class Html(str):
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A section of a page: an id, a title, and content of several kinds; a section without content is omitted."""
 
     id: str
@@ -70,7 +70,7 @@ class Section:
 def page(
     title: str,
     lead: str,
-    sections: Sequence[Section],
+    sections: Sequence[PageSection],
     *,
     command: str = "",
     seed: int | None = None,
@@ -165,7 +165,7 @@ def wide(table: str) -> Html:
     return Html(f'<div class="wide">{table}</div>')
 
 
-def system_section(file: SystemFile) -> Section:
+def system_section(file: SystemFile) -> PageSection:
     """Return the section of a page with the equations, parameters and Hamiltonian of a system."""
     if file.is_quadratic:
         pieces = [Html(f"<p>{equations_html(file.system, CHARACTERS, _MAX_EQUATIONS)}</p>")]
@@ -179,4 +179,4 @@ def system_section(file: SystemFile) -> Section:
         H_html = formula(file.hamiltonian.H, "H", CHARACTERS)
         flow = typeset(r"\dot{x} = J \nabla H", False)
         pieces.append(Html(f"<p>{flow} with {kind}, {H_html}</p>"))
-    return Section("system", "The system", pieces=pieces)
+    return PageSection("system", "The system", pieces=pieces)

@@ -26,7 +26,7 @@ from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.plots.growth import plot_degrees, plot_heights
 from kahanmaps.reports.explore import explore_sections
-from kahanmaps.reports.page import CHARACTERS, Html, Section, page, page_template, system_section, text, wide
+from kahanmaps.reports.page import CHARACTERS, Html, PageSection, page, page_template, system_section, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.sources import source
 
@@ -95,7 +95,7 @@ def report_html(
             script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
         else:
             lead += f"; formulas for every {', '.join(results.symbols)}" if results.symbols else ""
-            sections = [*_analysis_sections(results, page_pictures), Section("notes", "Notes", items=left_out)]
+            sections = [*_analysis_sections(results, page_pictures), PageSection("notes", "Notes", items=left_out)]
     elif explore:
         raise InputError(f"found {type(results).__name__}, expected an Analysis: only its page has sliders")
     else:
@@ -110,11 +110,11 @@ def report_html(
         default_title, seed = f"{heading}: {name}", first_report.context.get("seed")
         sections = _claims_sections(reports, file, left_out, page_pictures)
     if page_pictures.note:
-        sections.append(Section("pictures", "Pictures", paragraphs=[page_pictures.note]))
+        sections.append(PageSection("pictures", "Pictures", paragraphs=[page_pictures.note]))
     if certificate:
         link = f'<a href="{text(quote(certificate))}">{text(certificate)}</a>'
         sentence = Html(f"Proofs that another program (Coq, PARI/GP or SymPy) checks: {link}")
-        sections.append(Section("certificate", "Certificate", paragraphs=[sentence]))
+        sections.append(PageSection("certificate", "Certificate", paragraphs=[sentence]))
     title = (title or "").strip() or default_title
     return page(title, lead, sections, command=command, seed=seed, file=file, script=script)
 
@@ -165,7 +165,7 @@ def _title(file: SystemFile) -> str:
 # -- the page of an analysis: the verdict, then the results with their certainty
 
 
-def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
+def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[PageSection]:
     file, conclusion = analysis.file, analysis.conclusion
     arguments = " in x and eps" if file.map.has_eps else ""
     explanation = (
@@ -173,7 +173,11 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
         "which is evidence. The number of integrals and the growth are separate findings."
     )
     heading = Html(f"<strong>{text(conclusion.kind)}</strong>"), conclusion.sentence
-    sections = [Section("verdict", "Verdict", heading, [explanation]), system_section(file), _catalogue_section(file)]
+    sections = [
+        PageSection("verdict", "Verdict", heading, [explanation]),
+        system_section(file),
+        _catalogue_section(file),
+    ]
     formulas = formulas_of(analysis)
     growth, survey, label = analysis.degrees, analysis.heights, file.label
     for name, lines in analysis.sections:
@@ -199,14 +203,14 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
             folded.append(("Orbits whose heights were measured", wide(result_html(survey))))
         pieces = [Html(figure) for figure in figures if figure]
         title = name[0].upper() + name[1:]
-        section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
+        section = PageSection(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
     is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates of the system
     picture = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
-    return [*sections, Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
+    return [*sections, PageSection("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
 
 
-def _catalogue_section(file: SystemFile) -> Section:
+def _catalogue_section(file: SystemFile) -> PageSection:
     claims = [
         formula(function, name or "I", CHARACTERS)
         for name, function in {**file.integrals, **file.integrals_in_iterates}.items()
@@ -219,11 +223,11 @@ def _catalogue_section(file: SystemFile) -> Section:
     pieces = [Html(f"<h3>Sources</h3>\n{sources}")] if file.catalog.get("sources") else []
     title = f"What {'the catalogue' if file.catalog else 'the file'} says"
     if not (facts or claims or convention or pieces):
-        return Section("known", title)
+        return PageSection("known", title)
     remark = Html(
         '<span class="soft">The analysis below has not read this: it was given the right-hand sides only.</span>'
     )
-    return Section(
+    return PageSection(
         "known",
         title,
         paragraphs=[remark, *[f"Step: {convention}"] * bool(convention)],
@@ -293,7 +297,7 @@ def _relation_html(relation: SparseRelation, names: tuple[str, ...]) -> str:
 
 def _claims_sections(
     reports: Sequence[Report], file: SystemFile | None, left_out: Sequence[str], pictures: Pictures
-) -> list[Section]:
+) -> list[PageSection]:
     first_report = reports[0]
     is_paper = len(reports) == 1 and first_report.check == "verify"
     if is_paper:
@@ -310,19 +314,19 @@ def _claims_sections(
     verdict = Html(markup.verdict(combined(report.verdict for report in reports)))
     counts = checks.verdict_counts([finding for report in reports for finding in report.findings])
     table = wide(markup.table(["part", "claims"], rows))
-    sections = [Section("verdict", "Verdict", (verdict, counts), [_LEGEND], pieces=[table])]
+    sections = [PageSection("verdict", "Verdict", (verdict, counts), [_LEGEND], pieces=[table])]
     if file is not None:
         eps = first_report.context.get("eps")
         draw = pictures.portrait if file.member is None else pictures.invariant_curves
         picture = draw(file, None if eps in (None, "every") else str(eps))
-        sections += [system_section(file), Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
+        sections += [system_section(file), PageSection("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
     ids: Counter[str] = Counter()
     for section_id, name, findings in groups:
-        sections.append(Section(section_id, name, claims=[_claim_data(finding, ids) for finding in findings]))
+        sections.append(PageSection(section_id, name, claims=[_claim_data(finding, ids) for finding in findings]))
     notes = [note for report in reports for note in (checks.ending_sentence(report), *report.notes)]
-    sections.append(Section("notes", "Notes", items=[note for note in (*notes, *left_out) if note]))
+    sections.append(PageSection("notes", "Notes", items=[note for note in (*notes, *left_out) if note]))
     paper = [source(_PAPER)] if first_report.check == "verify" else []
-    return [*sections, Section("sources", "Source", paragraphs=paper)]
+    return [*sections, PageSection("sources", "Source", paragraphs=paper)]
 
 
 def _claim_data(finding: Finding, ids: Counter[str]) -> dict[str, Any]:

@@ -197,12 +197,12 @@ class Scan(PrintableResult):
             )
         if len(self.over) > 1:
             number_field_phrases.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
-        lines = [
+        statements = [
             ("searched", ", and ".join(phrases)),
             ("special", f"members {condition}"),
             ("detectable", f"over Q, numerators and denominators up to {self.height}: {', and '.join(loci)}"),
         ]
-        return [*lines, *(("detectable", phrase) for phrase in number_field_phrases)]
+        return [*statements, *(("detectable", phrase) for phrase in number_field_phrases)]
 
     @property
     def text(self) -> str:

@@ -19,7 +19,7 @@ DOUBLING_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
 @dataclass(frozen=True)
-class Method:
+class MethodChoice:
     """The name of a method and the reason for its choice."""
 
     name: str
@@ -33,7 +33,7 @@ class Method:
 
 def choose_method(
     requested: str | None, arithmetic: str, normal_form: SystemNormalForm | NoNormalForm, at: Sequence[int] | None
-) -> Method:
+) -> MethodChoice:
     """Choose the method for an orbit.
 
     Args:
@@ -51,23 +51,23 @@ def choose_method(
     if requested is not None and requested not in METHODS:
         raise InputError(f"found the method {requested!r}, expected one of {', '.join(METHODS)}")
     if requested == "generic":
-        return Method("generic", "as requested")
+        return MethodChoice("generic", "as requested")
     if isinstance(normal_form, NoNormalForm):
         if requested is not None:
             raise InputError(f"the method {requested} needs a normal form, and there is none: {normal_form.reason}")
-        return Method("generic", f"no normal form ({normal_form.reason})")
+        return MethodChoice("generic", f"no normal form ({normal_form.reason})")
     if requested == "doubling" and (at is None or arithmetic == "float"):
         raise InputError("the method doubling is for --at N1,N2,... in exact, mod:P or ball arithmetic")
     if requested == "normal-form" and arithmetic == "mod":
         raise InputError("arithmetic mod:P has the methods generic and doubling only")
     if requested is not None:
-        return Method(requested, normal_form.text)
+        return MethodChoice(requested, normal_form.text)
     if arithmetic == "float":
-        return Method("normal-form", normal_form.text)
+        return MethodChoice("normal-form", normal_form.text)
     if at is not None and max(at, default=0) >= DOUBLING_FROM[arithmetic]:
         is_dense = arithmetic == "exact" and len(at) * 10 > max(at)
         if not is_dense:
-            return Method("doubling", f"{normal_form.text}; each iterate by doublings")
+            return MethodChoice("doubling", f"{normal_form.text}; each iterate by doublings")
     if arithmetic == "mod":
-        return Method("generic", "few steps modulo P")
-    return Method("normal-form", normal_form.text)
+        return MethodChoice("generic", "few steps modulo P")
+    return MethodChoice("normal-form", normal_form.text)

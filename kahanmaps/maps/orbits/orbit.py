@@ -35,7 +35,7 @@ from kahanmaps.maps.orbits.iteration import (
     require_short,
     require_steps,
 )
-from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, MethodChoice, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.maps.values import as_point, is_float_value
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -247,7 +247,7 @@ class Trajectory(HtmlDisplay):
     """
 
     def __init__(
-        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, method: Method, remark: str = ""
+        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, method: MethodChoice, remark: str = ""
     ) -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
@@ -618,7 +618,7 @@ def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
     arithmetic = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact_arithmetic
     points = Orbit(phi, request.start, request.steps, backward=request.backward, max_digits=request.max_digits)
     request = request._replace(start=points.start, eps=phi.eps)
-    return Trajectory(points, request, arithmetic, Method("generic", "it is a map at one eps"))
+    return Trajectory(points, request, arithmetic, MethodChoice("generic", "it is a map at one eps"))
 
 
 def _find_normal_form(
