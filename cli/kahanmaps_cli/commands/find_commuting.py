@@ -27,7 +27,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @certificate_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Find quadratic g over Q whose Kahan map commutes with that of SYSTEM, x' = f(x), for every eps.
+    """Find g over Q, of degree at most 2, whose Kahan map commutes with that of SYSTEM, x' = f(x), for every eps.
 
     \b
       kahanmaps find-commuting paper_m3
