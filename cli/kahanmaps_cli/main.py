@@ -52,7 +52,7 @@ SECTIONS = {
         "find-density": ("find_density", "Search for invariant volume forms dx/phi with phi polynomial."),
         "find-poisson": ("find_poisson", "Search for invariant Poisson tensors with polynomial entries."),
         "find-symmetry": ("find_symmetry", "Find the affine symmetries and reversing symmetries of a map."),
-        "find-commuting": ("find_commuting", "Find all quadratic systems whose Kahan maps commute with this one."),
+        "find-commuting": ("find_commuting", "Find quadratic systems whose Kahan maps commute with this one."),
         "modified": ("modified", "Compute the modified vector field of a Kahan map, as a series in eps."),
         "singularities": ("singularities", "Trace singularities: are they confined, and after how many steps?"),
         "cycles": ("cycles", "Count the cycles of a map over a finite field."),
