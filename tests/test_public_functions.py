@@ -333,6 +333,7 @@ REFUSED = [
     ('km.orbit(FISH, [1, 2], "1/10", 4, kernel="cuda")', "found the kernel 'cuda', expected numpy or numba"),
     ("km.catalogue()[:3]", "found slice.*expected a name"),
     ("phi({2, 1})", r"found the point \{1, 2\}, expected a sequence of 2 coordinates"),
+    ("km.analyze('weierstrass', analyses=['degrees'])", r"found analyses = \['degrees'\], expected steps of kahanmaps"),
     ("km.explicit_map([], [])", "found no variables"),
     ('km.composed_map([km.load("lyness").map])', "expected maps for every eps"),
     ('km.composed_map(km.load("lyness").map, 5)', "found '5', expected maps for every eps"),

@@ -28,6 +28,7 @@ from kahanmaps.errors import KahanmapsError
 DEFAULT_BUDGET = 100_000_000  # products of terms: about a second, for coefficients of a few words
 _MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # number of matrices with cached minors; terms of all minors: 30 MB
 _MAX_ROWS_BY_MINORS = 7  # n <= 7 rows: minors (2^n n/2 products with single entries) are faster than elimination
+_MIN_FORECAST = 10_000_000  # products for the next row of a matrix from which on those of later rows are forecast
 
 _BUDGET_MESSAGE = "expanding the identity would take too many products of terms"
 _Key = bytes | tuple[bytes, int]  # hash of a matrix; after a failure, with the budget that was too small
@@ -389,11 +390,12 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
 
 
 def _products_check(field: FunctionField, rows: Sequence[Sequence[fmpq_mpoly | None]]) -> PairsCheck:
-    """Return the check of `kernel_minors` that raises BudgetExceeded if all further products cost more than the budget.
+    """Return the check of `kernel_minors` that raises BudgetExceeded if the further products will cost too much.
 
-    The products of the next row are counted. Those of later rows are forecast, because the longest minors come last,
-    and a failure there would waste the work done before. The forecast assumes that the terms per minor grow like a
+    The products of the next row are counted. If they are many, those of later rows are forecast, because the longest
+    minors come last, and a failure there would waste seconds. The forecast assumes that the terms per minor grow like a
     power of the number of rows: by 4, 9/4, 16/9, ... for a square, each factor computed from the smallest one so far.
+    It may be too high, for example if the later minors cancel: a computation that would just fit may be refused.
     """
     pair_counts: list[int] = []  # for each row after the first, the number of products if no minor cancels
     patterns = [[None if entry is None else 1 for entry in row] for row in rows]
@@ -405,7 +407,7 @@ def _products_check(field: FunctionField, rows: Sequence[Sequence[fmpq_mpoly | N
         means.append(Fraction(product_count + 1, len(pairs) + 1))
         k = len(means)
         mean, forecast = means[-1], Fraction(product_count)
-        if k > 1:
+        if k > 1 and product_count >= _MIN_FORECAST:
             excess = max(Fraction(0), min(b / a for a, b in pairwise(means)) - 1)
             for row in range(k, len(pair_counts)):
                 excess *= Fraction(row - 1, row + 1)

@@ -23,7 +23,7 @@ from kahanmaps.algebra.work import SPENT, Budget, units_at
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.inline import as_file
-from kahanmaps.errors import KahanmapsError
+from kahanmaps.errors import InputError, KahanmapsError, show
 from kahanmaps.laboratory.analyses.step import AnalysisContext, AnalysisStep
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.analysis_result import AnalysisResult, Statement
@@ -175,7 +175,7 @@ def analyze(
         last then has the results of all completed steps.
 
     Raises:
-        InputError: for eps = 0, unknown symbols, or an effort that is not an integer from -20 to 40.
+        InputError: for eps = 0, unknown symbols, other steps, or an effort that is not an integer from -20 to 40.
 
     >>> from kahanmaps.documents.catalog import load
     >>> analysis = analyze(load("nahm_tetrahedral"))
@@ -185,6 +185,9 @@ def analyze(
     file, eps = as_file(system), resolve_eps(eps, time_step, h)
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # rejects wrong arguments before any work
     units = units_at(effort, _UNITS_BY_DIMENSION.get(file.dim, _MAX_UNITS))
+    if not all(isinstance(step, AnalysisStep) for step in analyses):
+        steps_text = "steps of kahanmaps.laboratory.analyses.table.ANALYSES"
+        raise InputError(f"found analyses = {show(analyses)}, expected {steps_text}")
     analysis = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, analyses=tuple(analyses))
     analysis.defect = laboratory.defect if file.is_quadratic else ""
     context = AnalysisContext(analysis, laboratory, symbols, progress)

@@ -208,7 +208,7 @@ class DegreeGrowth(PrintableResult):
             proved_text = "" if self.dynamical_degree_bounds is None else " (proved),"
             return f"exponential growth{proved_text} by a factor of about {self.estimate} (estimated: {quotients_text})"
         if self.dynamical_degree_bounds is not None:
-            return f"exponential growth, no recurrence found in {terms_text}"
+            return f"exponential growth; {self.unconfirmed or f'no recurrence found in {terms_text}'}"
         if self.fitted is not None:
             return f"{terms_text} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
         n = len(self.degrees) - 1
