@@ -64,3 +64,9 @@ def pytest_collection() -> Iterator[None]:
 def stopped_clock_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands run in this process print no progress: it appears after some seconds, so on a busy machine only."""
     monkeypatch.setattr("kahanmaps_cli.screen.progress.time", SimpleNamespace(monotonic=lambda: 0.0))
+
+
+@pytest.fixture
+def at_points_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_certify.py."""
+    monkeypatch.setattr("kahanmaps.checks.certify.expansion", lambda *_: None)

@@ -67,7 +67,7 @@ def test_systems_maps_and_orbits_are_copied_and_pickled(again):
         km.load("lotka_volterra", a="root of t^2 - 2 near 1.4"),
     ):
         phi = km.map(reference, "1/5")
-        assert (again(phi), again(phi.inverse)) == (phi, phi.inverse)
+        assert (again(phi), again(phi.inverse), again(phi.inverse).inverse) == (phi, phi.inverse, phi)
         assert again(phi.inverse)(phi([2, 3])) == phi.point([2, 3])
     phi = km.map(FISH, "1/5")
     assert again(phi @ phi) == phi**2
