@@ -1,13 +1,9 @@
-"""Fraction-free elimination that takes out what minors share, against FLINT's solver, and inverse maps by elimination.
-
-What the elimination finds is not believed without a proof: it is tried on minors that share everything, something or
-nothing with the number that is offered.
-"""
+"""Fraction-free elimination against FLINT's solver, and inverse maps by elimination."""
 
 import random
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpz_mat
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,18 +18,11 @@ def random_integers(rows: int, columns: int, rng: random.Random, bits: int) -> f
     return fmpz_mat(rows, columns, [rng.randint(-(2**bits), 2**bits) for _ in range(rows * columns)])
 
 
-def divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-    return solve_fraction_free(matrix, right, likely) or by_flint(matrix, right)
-
-
 def by_flint(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
     try:
         return IntegerPoint.from_rationals(fmpq_mat(matrix).solve(fmpq_mat(right)).entries())
     except ZeroDivisionError:
         return None
-
-
-LONG_PRIME = fmpz(2**127 - 1)
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -43,59 +32,23 @@ def test_a_singular_system_has_no_solution_even_if_it_is_consistent(n, consisten
     for rank in range(1, n):
         matrix = random_integers(n, rank, rng, 50) * random_integers(rank, n, rng, 50)
         right = matrix * random_integers(n, 1, rng, 50) if consistent else random_integers(n, 1, rng, 50)
-        assert divide(matrix, right, LONG_PRIME) is None
-
-
-@pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
-def test_minors_that_share_a_factor_by_chance_are_eliminated_as_well(n):
-    """A diagonal block W I makes the first pivot W^2, which does not divide the later minors: gcds find what does."""
-    rng = random.Random(n)
-    W = fmpz(rng.getrandbits(400) | 1)
-    for _ in range(10):
-        matrix, right = random_integers(n, n, rng, 400), random_integers(n, 1, rng, 400)
-        for i, j in ((i, j) for i in range(3) for j in range(3)):
-            matrix[i, j] = W if i == j else fmpz(0)
-        solution = solve_fraction_free(matrix, right, W)
-        assert solution is not None
-        assert solution == by_flint(matrix, right)
-
-
-CONTENTS = {
-    "a long prime": (LONG_PRIME, LONG_PRIME),
-    "its square": (LONG_PRIME**2, LONG_PRIME**2),
-    "a product with small primes": (LONG_PRIME * 2**40 * 3**20, LONG_PRIME * 2**40 * 3**20),
-    "powers of two": (fmpz(2) ** 300, fmpz(2) ** 300),
-    "a part of the number offered": (LONG_PRIME, LONG_PRIME * (2**521 - 1)),
-    "more than the number offered": (LONG_PRIME * (2**89 - 1), LONG_PRIME),
-    "a number too short to matter": (fmpz(2**31 - 1), fmpz(2**31 - 1)),
-    "nothing": (fmpz(1), LONG_PRIME),
-}
+        assert solve_fraction_free(matrix, right) is None
 
 
 @pytest.mark.parametrize("n", range(1, 9))
-@pytest.mark.parametrize(("W", "offered"), CONTENTS.values(), ids=CONTENTS.keys())
-def test_minors_with_common_content_are_solved_correctly(n, W, offered):
-    """A matrix and a right side, congruent modulo W to a matrix of rank 2 and a column of its image."""
+@pytest.mark.parametrize("prime", [1, 2**40, 2**127 - 1])
+def test_a_regular_system_is_solved_in_lowest_terms_even_if_its_minors_share_factors(n, prime):
+    """A matrix and a right side, congruent to a matrix of rank 2 and a column of its image modulo a number."""
     rng = random.Random(n)
-    for _ in range(5):
+    for _ in range(10):
         plane = random_integers(n, 2, rng, 6)
-        matrix = plane * random_integers(2, n, rng, 6) + random_integers(n, n, rng, 6) * W
-        right = plane * random_integers(2, 1, rng, 6) + random_integers(n, 1, rng, 6) * W
-        assert divide(matrix, right, offered) == by_flint(matrix, right)
+        matrix = plane * random_integers(2, n, rng, 6) + random_integers(n, n, rng, 6) * prime
+        right = plane * random_integers(2, 1, rng, 6) + random_integers(n, 1, rng, 6) * prime
+        assert solve_fraction_free(matrix, right) == by_flint(matrix, right) is not None
 
 
-# Of the six minors of order 3 the elimination looks at every second one and finds d in all of them; the others do not
-# contain it, so that the divisions by d are not exact.
-D = LONG_PRIME
-DECEPTIVE_BLOCKS = {"regular": [[D, 1], [D**2, 2 * D]], "singular": [[D, 1], [D**2, D]]}
-
-
-@pytest.mark.parametrize("block", DECEPTIVE_BLOCKS.values(), ids=DECEPTIVE_BLOCKS.keys())
-@pytest.mark.parametrize("right", [(1, 1, 0, 0), (1, 2, int(D), 5), (0, 0, int(D), int(D) ** 2)], ids=len)
-def test_divisions_that_are_not_exact_do_no_harm(block, right):
-    matrix = fmpz_mat([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, *block[0]], [0, 0, *block[1]]])
-    column = fmpz_mat(4, 1, list(right))
-    assert divide(matrix, column, D) == by_flint(matrix, column)
+def test_a_pivot_that_is_0_is_left_to_flint():
+    assert solve_fraction_free(fmpz_mat([[0, 1, 1], [0, 2, 1], [1, 0, 0]]), fmpz_mat([[1], [2], [3]])) is None
 
 
 def made(variables, *image):

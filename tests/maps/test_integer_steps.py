@@ -17,7 +17,7 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.maps.orbits import integer_point, integer_steps
+from kahanmaps.maps.orbits import integer_point, integer_steps, short_solution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -44,6 +44,7 @@ def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, thre
     monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", threshold)
     monkeypatch.setattr(integer_steps, "_CRAMER_BITS", threshold)
     monkeypatch.setattr(integer_point, "_LONG_BITS", threshold // 10**7)
+    monkeypatch.setattr(short_solution, "_LEAST_BITS", threshold)
     phi, x = KahanMap(system, eps), tuple(fmpq(1, i + 2) for i in range(system.dim))
     point = IntegerPoint.from_rationals(x)
     for _ in range(steps):

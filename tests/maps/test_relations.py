@@ -20,8 +20,7 @@ import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.integer_steps import lowest
+from kahanmaps.maps.orbits.integer_point import IntegerPoint, lowest
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.sections import _sections_of_multiples, forms
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms

@@ -26,6 +26,7 @@ class IntegerPoint:
 
     has_long_factors = False  # whether the integers of some step of the orbit so far had a long common factor
     keeps_factors = False  # whether the integers for the next step may have a common factor
+    preceding_denominator: fmpz | None = None  # the denominator of the point whose image this point is, if known
 
     def __init__(self, numerators: tuple[fmpz, ...], denominator: fmpz) -> None:
         self.numerators, self.denominator = numerators, denominator
@@ -100,6 +101,16 @@ def _gcd_with_product(numerators: Sequence[fmpz], W: fmpz) -> fmpz:
 
 def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common_factors: fmpz) -> list[Fraction]:
     return [(entry // g, W // g) for entry in numerators for g in [common_factors.gcd(entry % common_factors)]]
+
+
+def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
+    """Return the point in lowest terms; None if the denominator is 0."""
+    if denominator == 0:
+        return None
+    gcd = content((denominator, *numerators))
+    if denominator < 0:
+        gcd = -gcd
+    return IntegerPoint(tuple(numerator // gcd for numerator in numerators), denominator // gcd)
 
 
 class UnreducedPoint(IntegerPoint):

@@ -12,10 +12,11 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
-from kahanmaps.algebra.integers import content, over_common_denominator
-from kahanmaps.maps.orbits.elimination import is_unique_solution, solve_fraction_free
+from kahanmaps.algebra.integers import over_common_denominator
+from kahanmaps.maps.orbits.elimination import solve_fraction_free
 from kahanmaps.maps.orbits.forward_substitution import forward_substitution
-from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint, lowest
+from kahanmaps.maps.orbits.short_solution import expected_bits, short_solution
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
@@ -26,7 +27,8 @@ _ELIMINATION_DIMENSION = 16  # above this dimension FLINT's solver is faster as 
 _SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes longer than it saves
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
 _CRAMER_BITS = 500  # a point counts as long if the first entry of the matrix has at least this number of bits
-_MAX_TRIALS = 2  # after this number of failures, the elimination is no longer tried
+_PRIME = 2**61 - 1  # the prime modulo which a determinant is shown not to be 0
+_MAX_TRIALS = 2  # after this number of failures, a method is no longer tried
 
 
 class IntegerSteps:
@@ -53,7 +55,7 @@ class IntegerSteps:
                     )
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._forms_modulo_prime: nmod_mat | None = None  # the forms modulo the last prime used
-        self._remaining_trials = _MAX_TRIALS
+        self._remaining_trials = self._remaining_short_trials = _MAX_TRIALS
         self._substitution = forward_substitution(exponents, self._forms, n)
         self._constant_rows: ConstantRows | None = None
         if not self._substitution and n > _SMALL_DIMENSION:
@@ -75,6 +77,18 @@ class IntegerSteps:
         if self._substitution:
             return self._substitution.step(point)
         matrix, rhs = self._equation(point)
+        image = None
+        if self.dim > _CRAMER_DIMENSION and self._remaining_short_trials and (bits := expected_bits(point)):
+            image = short_solution(matrix, rhs, point, bits)
+            self._remaining_short_trials -= image is None
+        if image is None:
+            image = self._solution(matrix, rhs, point)
+        if image is not None:
+            image.preceding_denominator = point.integers[1]
+        return image
+
+    def _solution(self, matrix: fmpz_mat, rhs: fmpz_mat, point: IntegerPoint) -> IntegerPoint | None:
+        """Return the solution of the equation of a step from `point`; None if it is singular."""
         _, W = point.integers
         scale = W**self._degree
         if self._constant_rows is not None:
@@ -90,7 +104,7 @@ class IntegerSteps:
         solution = None if matrix.nrows() else IntegerPoint((), fmpz(1))
         is_long = solution is None and matrix[0, 0].bit_length() >= _ELIMINATION_BITS
         if self._remaining_trials and is_long and matrix.nrows() <= _ELIMINATION_DIMENSION:
-            solution = solve_fraction_free(matrix, rhs, W)
+            solution = solve_fraction_free(matrix, rhs)
             self._remaining_trials -= solution is None
         if solution is None:
             try:
@@ -115,8 +129,14 @@ class IntegerSteps:
         return fmpq(matrix.det(), self._scale * W ** (self._degree * self.dim))
 
     def is_image(self, point: IntegerPoint, image: IntegerPoint) -> bool:
-        """Return whether `image` is proved to be the image of the point (the answer False may be wrong)."""
-        return is_unique_solution(image, *self._equation(point))
+        """Return whether `image` is proved to be the image of the point (the answer False may be wrong).
+
+        False is also returned if the determinant is 0 modulo 2^61 - 1.
+        """
+        matrix, rhs = self._equation(point)
+        if not int(nmod_mat(matrix, _PRIME).det()):
+            return False
+        return bool(matrix * fmpz_mat(self.dim, 1, image.numerators) == rhs * image.denominator)
 
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
         """Return `length` points of the orbit modulo a prime < 2^63, each followed by 1; None if one is not defined."""
@@ -178,16 +198,6 @@ def by_determinants(matrix: fmpz_mat, rhs: fmpz_mat) -> tuple[list[fmpz], fmpz]:
         a * s_t + d * r_t + g * r_s,
         r * C + s * F + t * K,
     ], a * A + d * D + g * G
-
-
-def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
-    """Return the point in lowest terms; None if the denominator is 0."""
-    if denominator == 0:
-        return None
-    gcd = content((denominator, *numerators))
-    if denominator < 0:
-        gcd = -gcd
-    return IntegerPoint(tuple(numerator // gcd for numerator in numerators), denominator // gcd)
 
 
 class ConstantRows:

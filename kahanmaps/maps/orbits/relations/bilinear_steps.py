@@ -24,8 +24,8 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, pivots
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.implicit import Map
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
+from kahanmaps.maps.orbits.integer_point import IntegerPoint, lowest
+from kahanmaps.maps.orbits.integer_steps import IntegerSteps
 
 Pairs = Sequence[tuple[int, int]]  # indices i, j of products X_i Y_j of coordinates
 

@@ -15,7 +15,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 # bit length of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: for faster growth
 # there are no relations. Their coefficients are about as long as the initial point, so points must be longer than that.
 # If the coefficients are longer than expected, the search is repeated when points are _RETRY_FACTOR times as long.
-_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second is multiplied by the square of (dimension + 1)
+_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 500  # the second is multiplied by the square of (dimension + 1)
 _RETRY_FACTOR = 4
 _LONGER_THAN_START = 8  # the search starts when points are this many times as long as the initial point
 _SLOW_GROWTH = 1.5

@@ -1,0 +1,116 @@
+"""Solutions recognized from real approximations, against FLINT's; what is not proved is not returned."""
+
+import random
+
+import pytest
+from flint import fmpq_mat, fmpz, fmpz_mat
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.family.random_members import random_member_with_eigenvalues
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import integer_steps, short_solution
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+
+BITS = 600
+POINT = IntegerPoint((fmpz(1),), fmpz(2) ** BITS)
+
+
+def system_with(X: list[fmpz], V: fmpz, rng: random.Random, zeros: int = 0) -> tuple[fmpz_mat, fmpz_mat]:
+    """A matrix and a right side as long as V, whose solution X/V is n times shorter than its determinant."""
+    n, inverse = len(X), fmpz(pow(int(X[-1]), -1, int(V)))
+    rows = []
+    for i in range(n):
+        row = [fmpz(0) if (j - i) % n < zeros else fmpz(rng.getrandbits(BITS)) for j in range(n - 1)]
+        last = -sum((a * x for a, x in zip(row, X[:-1], strict=True)), fmpz(0)) * inverse % V
+        rows.append([*row, last])
+    matrix = fmpz_mat(rows)
+    return matrix, fmpz_mat([[entry // V] for entry in (matrix * fmpz_mat(n, 1, X)).entries()])
+
+
+def random_fractions(n: int, rng: random.Random, factor: int = 1) -> tuple[list[fmpz], fmpz]:
+    """Numerators and a denominator; all numerators but the last two share a factor with the denominator."""
+    X = [fmpz(rng.getrandbits(BITS - 80) | 1) * factor for _ in range(n - 2)]
+    return [*X, fmpz(3), fmpz(2)], fmpz(rng.getrandbits(BITS - 80) | 1) * factor
+
+
+def by_flint(matrix: fmpz_mat, rhs: fmpz_mat) -> IntegerPoint:
+    return IntegerPoint.from_rationals(fmpq_mat(matrix).solve(fmpq_mat(rhs)).entries())
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 9])
+@pytest.mark.parametrize("zeros", [0, 1, 2])
+@pytest.mark.parametrize("factor", [1, 5**9, 2**61 - 1], ids=["no factor", "a small prime", "a long prime"])
+def test_a_short_solution_is_found_and_not_with_fewer_bits(n, zeros, factor):
+    rng = random.Random(n)
+    for _ in range(5):
+        X, V = random_fractions(n, rng, factor)
+        matrix, rhs = system_with(X, V, rng, zeros)
+        found = short_solution.short_solution(matrix, rhs, POINT, BITS)
+        assert found == by_flint(matrix, rhs)
+        assert short_solution.short_solution(matrix, rhs, POINT, BITS // 2) is None
+
+
+@pytest.mark.parametrize("n", [4, 6])
+def test_a_long_solution_is_not_found_and_a_singular_system_has_none(n):
+    rng = random.Random(n)
+    matrix = fmpz_mat(n, n, [rng.getrandbits(BITS) for _ in range(n * n)])
+    rhs = fmpz_mat(n, 1, [rng.getrandbits(BITS) for _ in range(n)])
+    assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
+    singular = fmpz_mat([*matrix.tolist()[1:], [a + b for a, b in zip(*matrix.tolist()[1:3], strict=True)]])
+    assert short_solution.short_solution(singular, rhs, POINT, BITS) is None
+
+
+def test_a_wrong_denominator_is_refused(monkeypatch):
+    rng = random.Random(1)
+    X, V = random_fractions(6, rng)
+    matrix, rhs = system_with(X, V, rng)
+    for wrong in (V + 2, V - 2, fmpz(1)):
+        monkeypatch.setattr(short_solution, "simple_denominator", lambda *_, wrong=wrong: wrong)
+        assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
+    monkeypatch.setattr(short_solution, "simple_denominator", lambda *_: V)
+    assert short_solution.short_solution(matrix, rhs, POINT, BITS) == IntegerPoint(tuple(X), V)
+
+
+def test_what_differs_from_the_solution_by_less_than_the_approximation_shows_is_refused():
+    """A change of the right side by 1 changes the solution in its last digits only."""
+    rng = random.Random(2)
+    X, V = random_fractions(6, rng)
+    matrix, rhs = system_with(X, V, rng)
+    rhs[3, 0] += 1
+    assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
+
+
+MEMBER = random_member_with_eigenvalues([1, -2, 3], 2).chosen.system
+WAYS = {"by determinants": (KahanMap(MEMBER, "1/10"), "_by_digits"), "by digits": (None, "_by_determinant")}
+
+
+@pytest.mark.parametrize(("map_over", "other_way"), WAYS.values(), ids=WAYS)
+def test_both_ways_give_the_points_of_an_orbit(map_over, other_way, monkeypatch):
+    """Members of the family have the relation between denominators; the Clebsch system does not."""
+    map_over = map_over or load("clebsch_first_flow").map.at("3/11")
+    monkeypatch.setattr(short_solution, other_way, lambda *_: None)
+    monkeypatch.setattr(integer_steps, "solve_fraction_free", lambda *_: pytest.fail("the solution was not found"))
+    monkeypatch.setattr(short_solution, "_LEAST_BITS", 900)
+    x = tuple(POINT.from_rationals(map_over.point(["1/2", "-1/3", "2/5", 1, "3/4", "-2/7"])).rationals())
+    point, found = IntegerPoint.from_rationals(x), 0
+    while point.bits < 3000:
+        found += short_solution.expected_bits(point) is not None
+        image = map_over.integer_step(point)
+        x = map_over.generic_step(x)
+        assert image == IntegerPoint.from_rationals(x)
+        assert image.preceding_denominator == point.denominator
+        point = image
+    assert found >= 4
+
+
+def test_heights_that_grow_by_a_factor_are_not_expected_to_be_short():
+    def point(bits: int, preceding_bits: int | None) -> IntegerPoint:
+        point = IntegerPoint((fmpz(1),), fmpz(1) << bits)
+        point.preceding_denominator = None if preceding_bits is None else fmpz(1) << preceding_bits
+        return point
+
+    assert short_solution.expected_bits(point(5000, 2500)) is None
+    assert 5000 < short_solution.expected_bits(point(5000, 4990)) < 5100
+    assert 6000 < short_solution.expected_bits(point(5000, 4200)) < 6100
+    assert short_solution.expected_bits(point(5000, None)) > 6000
+    assert short_solution.expected_bits(point(500, 490)) is None
