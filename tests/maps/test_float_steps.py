@@ -30,7 +30,7 @@ from kahanmaps.maps.floats.classical import METHODS, MethodEnsemble, composition
 from kahanmaps.maps.floats.float_conversion import exact
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.floats.planar_blocks import _InsufficientPrecision, _sine_of_angle, planar_blocks
-from kahanmaps.maps.floats.straight_line_program import StepChecks, StraightLineProgram, solve
+from kahanmaps.maps.floats.straight_line_program import EntryBound, StepChecks, StraightLineProgram, solve
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
@@ -352,7 +352,7 @@ def code_of(pattern, careful):
     size = code.arguments[0]
     for x in code.arguments[1:]:
         size = size.code.emit("max", abs(size), abs(x))
-    code.outputs = [*solve(rows, lambda: abs(size), requested), *requested.outputs()]
+    code.outputs = [*solve(rows, EntryBound(64.0, lambda: abs(size) <= 64.0), requested), *requested.outputs()]
     return code
 
 
@@ -387,6 +387,57 @@ def test_equations_of_any_pattern_have_the_exact_solution(pattern, small):
 
 
 SINGULAR = [["..", "**"], [".*", ".*"], ["**.", "**.", "**."], ["***", "*..", "*.."]]
+
+
+STIFF = QuadraticSystem.from_text(  # at eps = 1/50, M has constants near 2000
+    ["x", "y", "z"], ["100000*x + y*z - 90000*y", "70000*y + x*z + 10000*z", "80000*z + x*y - 30000*x"]
+)
+COLUMN = QuadraticSystem.from_text(  # near y = 50 the first column of M is almost 0
+    ["x", "y", "z"], ["x*y + z^2", "x*z/10000000000000000 + y*z", "x*y/10000000000000000 + y^2 - z"]
+)
+LINEAR = QuadraticSystem.from_text(["x", "y", "z"], ["y - 2*z + x", "x + 3*z", "x + y - z"])
+ELIMINATED = {
+    "top": EULER_TOP,
+    "rows exchanged": PIVOTS,
+    "chain": CHAIN,
+    "stiff": STIFF,
+    "column": COLUMN,
+    "linear": LINEAR,
+}
+
+
+@pytest.mark.parametrize("system", ELIMINATED.values(), ids=ELIMINATED)
+def test_a_valid_fast_step_is_the_careful_one_which_has_nothing_to_report(system):
+    """Next to det M = 0 and at numbers of any size; at ordinary points the fast step is valid."""
+    step, rng = steps.map_step(KahanMap(system, "1/50").factors), np.random.default_rng(1)
+    directions = rng.uniform(0.5, 1, (60, system.dim)) * rng.choice([-1, 1], (60, system.dim))
+    points = [size * u for u in directions for size in (1e-3, 1, 10, 100, 1e3, 1e6, 1e100, 1e160, 1e300, 1.7e308)]
+    ordinary = [index for index in range(len(points)) if index % 10 < 2]
+    forms = np.array([[[to_float(entry) for entry in row] for row in form.tolist()] for form in system.Q])
+    linear = np.array([[to_float(entry) for entry in row] for row in system.B.table()])
+    for u in directions if system is not LINEAR else ():
+        roots = np.linalg.eigvals(np.linalg.solve(50 * np.eye(system.dim) - linear, 2 * forms @ u))
+        for root in roots.real[(roots.imag == 0) & (abs(roots) > 1e-6)]:  # det M(u / root) = 0
+            points += [u / root * (1 + error) for error in (0, 1e-15, 1e-14, 1e-13, 1e-12, 1e-10, 1e-8, 1e-4)]
+    with np.errstate(all="ignore"):
+        *image, valid = step.fast(*np.array(points).T)
+        *expected, near, singular, overflow = step.careful(*np.array(points).T)
+    valid = np.broadcast_to(valid, len(points))
+    assert not (valid & (near | singular | overflow)).any()
+    assert np.isfinite(np.array(expected)[:, valid]).all()
+    assert (np.array(image)[:, valid] == np.array(expected)[:, valid]).all()
+    assert system is PIVOTS or np.mean(valid[ordinary]) > 0.9
+    assert system is LINEAR or np.sum(near | singular) > 50
+
+
+def test_large_steps_check_that_their_numbers_are_finite():
+    """In few rows a valid fast elimination cannot overflow; in many this is not proved."""
+    for dim, is_checked in ((3, False), (12, False), (14, True)):
+        names = [f"x{i}" for i in range(dim)]
+        total = " + ".join(names)
+        system = QuadraticSystem.from_text(names, [f"({total})*({total} + {name})" for name in names])
+        operations = steps.map_step(KahanMap(system, "1/50").factors).fast_code.operations
+        assert any(largest == steps.LARGEST_DOUBLE for _, (*_, largest) in operations) == is_checked
 
 
 @pytest.mark.parametrize("pattern", SINGULAR, ids=str)

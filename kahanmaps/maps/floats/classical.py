@@ -23,7 +23,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 from kahanmaps.maps.floats.steps import SINGULAR, FloatStep, Write, map_step
-from kahanmaps.maps.floats.straight_line_program import StepChecks, extreme, is_zero, solve
+from kahanmaps.maps.floats.straight_line_program import EntryBound, StepChecks, extreme, is_zero, solve
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -235,7 +235,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
         n, stages = len(x), range(len(A))
-        nodes = [sum(row) for row in A]
+        nodes, unbounded = [sum(row) for row in A], EntryBound(1.0, lambda: True)
 
         def matrix(factors: list[list[float]], jacobians: Sequence[Any]) -> list[list[Any]]:
             """Return the matrix with the blocks delta_rs I - h factors[r][s] jacobians[s] in row r and column s."""
@@ -249,7 +249,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
 
         euler_step = [h * entry for entry in field(x)]
         rows = [[*row, b] for row, b in zip(matrix([[0.5]], [field.jacobian(x)]), euler_step, strict=True)]
-        kahan_step = solve(rows, lambda: 1.0, StepChecks(False))
+        kahan_step = solve(rows, unbounded, StepChecks(False))
         z = [c * a + c * c * (b - a) for c in nodes for a, b in zip(euler_step, kahan_step, strict=True)]
         # Newton's method. The pivots need no check: an inaccurate elimination only slows down the convergence.
         for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
@@ -257,7 +257,7 @@ def _implicit_writer(field: FieldProgram, h: float, A: list[list[float]], weight
             values, rows = [field(point) for point in points], matrix(A, [field.jacobian(point) for point in points])
             residuals = [a - b for a, b in zip(stage_sums(values), z, strict=True)]
             newton_checks = StepChecks(False)
-            correction = solve([[*row, r] for row, r in zip(rows, residuals, strict=True)], lambda: 1.0, newton_checks)
+            correction = solve([[*row, r] for row, r in zip(rows, residuals, strict=True)], unbounded, newton_checks)
             z = [a + b for a, b in zip(z, correction, strict=True)]
         size = reduce(lambda a, b: extreme("max", a, abs(b)), [*x, *z], 0.0)
         if checks.careful:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache, partial
+from math import log2
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,9 +26,11 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
 from kahanmaps.maps.floats.straight_line_program import (
     LARGEST_DOUBLE,
+    MAX_ENTRY,
     MAX_OPERATIONS,
     MIN_PIVOT_RATIO,
     ComplexPair,
+    EntryBound,
     StepChecks,
     StraightLineProgram,
     TooManyOperations,
@@ -87,8 +90,9 @@ class FloatStep:
         code, checks = StraightLineProgram(self.rows, max_operations), StepChecks(careful)
         try:
             image = self._write(code.arguments, checks)
-            for x in image:
-                checks.number(x)
+            if careful or not checks.is_bounded:
+                for x in image:
+                    checks.number(x)
             code.outputs = [*image, *checks.outputs()]
         except TooManyOperations:
             return None
@@ -121,6 +125,7 @@ def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
     equations = [float_equation(factor) for factor in factors]
 
     def write(x: Sequence[Any], checks: StepChecks) -> Sequence[Any]:
+        checks.is_bounded = True  # until an equation is not
         for equation in equations:
             x = equation.image(x, checks)
         return x
@@ -153,14 +158,30 @@ class FloatEquation(NamedTuple):
         for constants, entries in zip(self.constants, self.terms, strict=True):
             rows.append([sum((c * y[k] for k, c in terms), c0) for c0, terms in zip(constants, entries, strict=True)])
 
-        def entry_bound() -> Any:
-            size: Any = 0.0
-            for k in sorted({k for entries in self.terms for terms in entries[:n] for k, _ in terms}):
-                size = extreme("max", size, abs(y[k]))
-            largest_sum = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
-            return size * largest_sum + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
+        in_matrix, in_rhs = (
+            {k for entries in self.terms for terms in entries[part] for k, _ in terms}
+            for part in (slice(n), slice(n, None))
+        )
+        largest_sum, rhs_sum = (
+            max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[part])
+            for part in (slice(n), slice(n, None))
+        )
+        constant, rhs_constant = (
+            max(abs(x) for constants in self.constants for x in constants[part]) for part in (slice(n), slice(n, None))
+        )
+        bound = max(MAX_ENTRY, 4 * constant)
+        largest = (bound - constant) / largest_sum if largest_sum else 0.0
 
-        return solve(rows, entry_bound, checks)
+        def holds() -> Any:
+            size: Any = 0.0
+            for k in sorted(in_matrix):
+                size = extreme("max", size, abs(y[k]))
+            return size <= largest
+
+        # Each unknown exceeds those before it in the back substitution, or the right side, at most by this factor.
+        exponent = n * (40 + log2(n * 9**n)) + log2(rhs_sum * largest + rhs_constant + 1)
+        checks.is_bounded &= in_rhs <= in_matrix and exponent < 1000
+        return solve(rows, EntryBound(bound, holds), checks)
 
 
 def float_equation(map_over: ElementaryMap) -> FloatEquation:
@@ -315,7 +336,7 @@ class RecordTable(NamedTuple):
 
 
 _MAX_SINGLE_ORBITS = 16  # up to this number of orbits, Python floats are faster than arrays
-_GROUP_SIZE = 4096  # number of orbits processed together, so that the arrays fit into the processor's cache
+_GROUP_SIZE = 8192  # number of orbits processed together, so that the arrays fit into the processor's cache
 
 
 def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:

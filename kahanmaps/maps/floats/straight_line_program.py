@@ -7,24 +7,28 @@ machine code for vectors of orbits (machine_code.py).
 
 `solve` writes a program for the solution of M y = r, where the positions of zeros in M are known. Rows and columns with
 one nonzero entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a
-normal form are such blocks, with complex entries for a complex eigenvalue), larger blocks by Gaussian elimination.
+normal form are such blocks, with complex entries for a complex eigenvalue), larger blocks by Gaussian elimination down
+to two rows.
 
-Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 times the
-numbers from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the
-diagonal, in an order with little fill-in. It is stable as long as no pivot row is multiplied by more than 8 before it
-is subtracted. Each step has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows
-need to be exchanged and all numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports
-the status. If the fast version is valid, both versions give the same numbers.
+Pivots. A step is *near-singular* if a pivot, or the determinant of two rows, is at most 2^-40 times the numbers from
+which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the diagonal, in an
+order with little fill-in. It is stable as long as no pivot row is multiplied by more than 8 before it is subtracted.
+Each step has two versions. The *fast* one reports in which orbits all pivots are far from 0, all entries are far from
+infinity, no rows need to be exchanged and all numbers are finite. The *careful* one, for all other orbits, exchanges
+rows and reports the status. If the fast version is valid, both versions give the same numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 MIN_PIVOT_RATIO = 2.0**-40  # a step is near-singular if a pivot is at most this fraction of the numbers it comes from
+# A fast elimination is valid only for entries up to this bound, or four times the largest constant. Its pivots are then
+# compared with constants, which takes less time than with the entries of each orbit.
+MAX_ENTRY = 1024.0
 MAX_FACTOR = 8.0  # maximal factor by which a pivot row is multiplied when it is subtracted from another row
 LARGEST_DOUBLE = float(np.finfo(np.float64).max)
 MAX_OPERATIONS = 4000  # maximal number of operations of a fast step; longer programs take too long to compile
@@ -268,10 +272,12 @@ class StepChecks:
         self.is_near_singular: Any = False
         self.is_singular: Any = False
         self.is_finite: Any = True
+        self.is_bounded = False  # whether all numbers of a valid fast step are certainly finite
         self._sum: Any = 0.0
 
     def pivot(self, pivot: Any, threshold: Any) -> None:
         """Check a divisor, which counts as small if its absolute value is at most `threshold`."""
+        self.is_bounded = False  # the threshold may depend on numbers of any size
         if isinstance(pivot, float):  # a constant, which is 0 if the matrix is singular at all points
             self.is_singular, self.is_valid = self.is_singular | (pivot == 0.0), self.is_valid & (pivot != 0.0)
             return
@@ -304,10 +310,17 @@ def _negation(x: Any) -> Any:
     return not x if isinstance(x, bool) else ~x
 
 
-def solve(rows: Sequence[Sequence[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
+class EntryBound(NamedTuple):
+    """A bound of the |entries| of a matrix, and a function that writes the test whether they are below it."""
+
+    bound: float
+    holds: Callable[[], Any]
+
+
+def solve(rows: Sequence[Sequence[Any]], entry_bound: EntryBound, checks: StepChecks) -> list[Any]:
     """Write the operations that solve M y = r, given the rows of (M | r); y is meaningless if M is singular.
 
-    `entry_bound` returns an upper bound of the |entries| of M; only fast eliminations need it.
+    Only fast eliminations need a bound of the entries of M.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
@@ -375,11 +388,8 @@ def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
 
-def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
-    """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small.
-
-    `entry_bound` returns an upper bound of the |entries| of the matrix; only the fast version needs it.
-    """
+def _eliminate(rows: list[list[Any]], entry_bound: EntryBound, checks: StepChecks) -> list[Any]:
+    """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small."""
     n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the size of each row of the matrix
     pivots = _choose_pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(pivots) < n:  # the matrix is singular at all points
@@ -390,7 +400,8 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
             row[-1] = extreme("max", row[-1], abs(x))
     inverses: list[Any] = []
     smallest_pivot, largest_factor = np.inf, 0.0
-    for step, (i, j) in enumerate(pivots):
+    *first_pivots, (i1, j1), (i2, j2) = pivots
+    for step, (i, j) in enumerate(first_pivots):
         columns = [*(c for _, c in pivots[step + 1 :]), n]
         later_rows = [k for k, _ in pivots[step + 1 :]]
         for k in later_rows if checks.careful else ():
@@ -402,7 +413,6 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
         if checks.careful:
             checks.pivot(M[i][j], MIN_PIVOT_RATIO * M[i][n + 1])
         else:
-            checks.number(M[i][j])
             smallest_pivot = extreme("min", smallest_pivot, abs(M[i][j]))
         for k in later_rows:
             if not is_zero(M[k][j]):
@@ -410,16 +420,22 @@ def _eliminate(rows: list[list[Any]], entry_bound: Callable[[], Any], checks: St
                 largest_factor = extreme("max", largest_factor, abs(factor))
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
-    if not checks.careful:
-        checks.is_valid &= smallest_pivot > MIN_PIVOT_RATIO * entry_bound()
+    (a, b, r), (c, d, s) = ([M[i][j1], M[i][j2], M[i][n]] for i in (i1, i2))
+    det = a * d - b * c
+    if checks.careful:
+        checks.pivot(det, MIN_PIVOT_RATIO * (M[i1][n + 1] * M[i2][n + 1]))
+    else:
+        checks.is_valid &= smallest_pivot > MIN_PIVOT_RATIO * entry_bound.bound
+        checks.is_valid &= abs(det) > MIN_PIVOT_RATIO * entry_bound.bound**2
         checks.is_valid &= largest_factor <= MAX_FACTOR
-    solution: list[Any] = [0.0] * n
-    for (i, j), inverse in zip(reversed(pivots), reversed(inverses), strict=True):
-        solution[j] = M[i][n] * inverse
-        for k, _ in pivots:
-            if k == i:
-                break
-            M[k][n] = M[k][n] - M[k][j] * solution[j]
+        checks.is_valid &= entry_bound.holds()
+    inverse, solution = _inverse(det), [0.0] * n
+    solution[j1], solution[j2] = (d * r - b * s) * inverse, (a * s - c * r) * inverse
+    for step, (i, j) in reversed(list(enumerate(first_pivots))):
+        total = M[i][n]
+        for _, k in pivots[step + 1 :]:
+            total = total - M[i][k] * solution[k]
+        solution[j] = total * inverses[step]
     return solution
 
 
