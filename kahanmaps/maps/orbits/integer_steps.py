@@ -28,7 +28,7 @@ _SMALL_DIMENSION = 3  # up to this dimension, eliminating constant rows takes lo
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is computed by determinants
 _CRAMER_BITS = 500  # a point counts as long if the first entry of the matrix has at least this number of bits
 _PRIME = 2**61 - 1  # the prime modulo which a determinant is shown not to be 0
-_MAX_TRIALS = 2  # after this number of failures, a method is no longer tried
+_MAX_TRIALS = 2  # after this number of failures (of short solutions: one after the other), a method is no longer tried
 
 
 class IntegerSteps:
@@ -80,7 +80,7 @@ class IntegerSteps:
         image = None
         if self.dim > _CRAMER_DIMENSION and self._remaining_short_trials and (bits := expected_bits(point)):
             image = short_solution(matrix, rhs, point, bits)
-            self._remaining_short_trials -= image is None
+            self._remaining_short_trials = self._remaining_short_trials - 1 if image is None else _MAX_TRIALS
         if image is None:
             image = self._solution(matrix, rhs, point)
         if image is not None:
