@@ -235,7 +235,8 @@ class Map(LatexDisplay):
         coordinates_text = ",".join(self.field.format(entry) for entry in point)
         if len(coordinates_text) > 200:
             coordinates_text = f"{coordinates_text[:100]}...{coordinates_text[-80:]}"
-        eps_text = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
+        has_one_eps = self.has_eps and self.eps is not None  # factors of a composition may differ in eps
+        eps_text = f" for eps = {self.field.format(self.eps)}" if has_one_eps else ""
         return SingularStep(
             f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates_text}{eps_text}: "
             "the map is not defined there",

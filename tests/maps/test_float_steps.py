@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
@@ -31,6 +32,7 @@ from kahanmaps.maps.floats.float_conversion import exact
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.floats.planar_blocks import _InsufficientPrecision, _sine_of_angle, planar_blocks
 from kahanmaps.maps.floats.straight_line_program import EntryBound, StepChecks, StraightLineProgram, solve
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
@@ -428,6 +430,102 @@ def test_a_valid_fast_step_is_the_careful_one_which_has_nothing_to_report(system
     assert (np.array(image)[:, valid] == np.array(expected)[:, valid]).all()
     assert system is PIVOTS or np.mean(valid[ordinary]) > 0.9
     assert system is LINEAR or np.sum(near | singular) > 50
+
+
+T = "1/1" + "0" * 100
+EXTREME = {
+    "products beyond the doubles": (
+        QuadraticSystem.from_text(
+            ["x", "y", "z"], [f"x + 2*y - z + {T}*y*z", f"y - x + 3*z + {T}*x*z", f"z + x + y + {T}*x*y"]
+        ),
+        fmpq(10**140),
+        [1e98, 2e98, -1e98],
+    ),
+    "long constants": (
+        QuadraticSystem.from_text(["x", "y", "z"], ["x + y*z - y", "y + x*z + z", "z + x*y - x"]),
+        fmpq(10**160),
+        [1.0, 0.5, 0.25],
+    ),
+    "tiny eps": (EULER_TOP, fmpq(1, 10**306), [1.0, 2.0, 3.0]),
+    "tinier eps": (EULER_TOP, fmpq(1, 10**310), [1.0, 2.0, 3.0]),
+    "large numbers": (EULER_TOP, fmpq(1, 10), [1e155, 2e155, 3e155]),
+}
+
+
+@over_kernels
+@pytest.mark.parametrize("copies", [1, 20])
+@pytest.mark.parametrize(("system", "eps", "start"), EXTREME.values(), ids=EXTREME)
+def test_numbers_of_any_size_are_right_or_an_overflow(system, eps, start, copies, kernel):
+    ensemble = FloatEnsemble(system, eps, np.array([start] * copies), kernel=kernel)
+    ensemble.advance(1)
+    expected = KahanMap(system, eps).step([fmpq(*x.as_integer_ratio()) for x in start])
+    for image, status in zip(ensemble.x, ensemble.status, strict=True):
+        assert status == "overflow" or image == pytest.approx([to_float(x) for x in expected], rel=1e-6)
+        assert status == "completed" or eps > fmpq(1, 100)
+
+
+x, y, z, _, _ = ring(["x", "y", "z", "w", "eps"]).gens()
+ONE = x.context().constant(1)
+HIDDEN = [  # at x = 1e200, y = 0: entries that are inf * 0, in a row that no later pivot sees; rows of (M | -r)
+    ((2 * ONE, ONE, z, 0 * ONE, -z), (ONE, 3 * ONE, 0 * ONE, x**2 * y, -ONE)),
+    ((2 * ONE, ONE, x**2 * y, 0 * ONE, -z), (ONE, 3 * ONE, 0 * ONE, z, -ONE)),
+]
+LOWER = ((0 * ONE, 0 * ONE, 2 * ONE, ONE, -ONE), (0 * ONE, 0 * ONE, ONE, 2 * ONE, -2 * ONE))
+
+
+@over_kernels
+@pytest.mark.parametrize("copies", [1, 20])
+@pytest.mark.parametrize("upper", HIDDEN, ids=["second row", "first row"])
+def test_no_orbit_is_completed_with_a_number_that_is_none(upper, copies, kernel):
+    map_ = ImplicitMap(("x", "y", "z", "w"), (*upper, *LOWER), "t")
+    ensemble = FloatEnsemble(map_, "1/2", np.array([[1e200, 0, 1.5, 1]] * copies), kernel=kernel)
+    ensemble.advance(1)
+    for image, status in zip(ensemble.x, ensemble.status, strict=True):
+        assert status != "completed" or np.isfinite(image).all()
+
+
+@over_kernels
+@pytest.mark.parametrize("copies", [1, 20])
+def test_an_infinite_pivot_is_an_overflow(copies, kernel):
+    """Its inverse is 0, and the image would look like a point."""
+    names = ["x", "y", "z"]
+    x, *_ = ring([*names, "eps"]).gens()
+    c = x.context().constant
+    rows = (
+        (x**2 * fmpq(1, 10**306) + 1, c(1), c(2), c(-1)),
+        (c(1), c(3), c(1), c(-2)),
+        (c(2), c(1), c(5), c(-3)),
+    )
+    ensemble = FloatEnsemble(
+        ImplicitMap(tuple(names), rows, "t"), "1/2", np.array([[1e200, 1, 1]] * copies), kernel=kernel
+    )
+    ensemble.advance(1)
+    assert set(ensemble.status) == {"overflow"}
+
+
+@over_kernels
+@pytest.mark.parametrize("copies", [1, 20])
+@pytest.mark.parametrize("column", ["x and y", "x"])
+def test_a_pivot_0_is_seen_though_later_pivots_do_not_depend_on_it(column, copies, kernel):
+    """At x = 0 the fast step divides by 0, the second pivot is NaN, the others are ordinary."""
+    names = ["x", "y", "z", "v", "w"]
+    x, y, *_ = ring([*names, "eps"]).gens()
+    c = x.context().constant
+    rows = (
+        (x, y, c(0), c(0), c(0), c(-1)),
+        (y if column == "x and y" else x, 3 * y, y, c(0), c(0), c(-2)),
+        (c(0), c(0), 5 * y, y, y, c(-3)),
+        (c(0), c(0), y, 4 * y, y, c(-1)),
+        (c(0), c(0), y, y, 6 * y, c(-2)),
+    )
+    map_ = ImplicitMap(tuple(names), rows, "t")
+    ensemble = FloatEnsemble(map_, "1/2", np.array([[0, 1, 1, 1, 1.0]] * copies), kernel=kernel)
+    ensemble.advance(1)
+    assert set(ensemble.status) == {"completed" if column == "x and y" else "singular"}
+    if column == "x":
+        return
+    expected = [to_float(entry) for entry in map_.at("1/2").step([0, 1, 1, 1, 1])]
+    assert ensemble.x == pytest.approx(np.array([expected] * copies), rel=1e-12)
 
 
 def test_large_steps_check_that_their_numbers_are_finite():

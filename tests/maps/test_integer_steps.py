@@ -15,6 +15,7 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.orbits import integer_point, integer_steps, short_solution
@@ -102,6 +103,13 @@ def test_a_factor_that_was_left_in_is_found_when_the_point_is_read(power, is_lon
     assert point.lowest_terms() == [(a, W), (-b, W)]
     assert point.has_long_factors == is_long
     assert not is_long or not UnreducedPoint([a, b], W, point).keeps_factors
+
+
+def test_a_composition_with_two_eps_says_where_it_is_not_defined():
+    phi, psi = (KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), eps) for eps in ("1/2", "1/3"))
+    for step in (Map((phi, psi), None, ("x",)).step, Map((phi, psi), None, ("x",)).generic_step):
+        with pytest.raises(SingularStep, match="at the point 1: the map is not defined there"):
+            step([fmpq(1)])
 
 
 NAMES = ["x", "y", "z", "w"]

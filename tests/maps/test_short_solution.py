@@ -1,15 +1,19 @@
 """Solutions recognized from real approximations, against FLINT's; what is not proved is not returned."""
 
 import random
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
+import flint
 import pytest
-from flint import fmpq_mat, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps, short_solution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.iteration import Orbit
 
 BITS = 600
 POINT = IntegerPoint((fmpz(1),), fmpz(2) ** BITS)
@@ -78,6 +82,59 @@ def test_what_differs_from_the_solution_by_less_than_the_approximation_shows_is_
     matrix, rhs = system_with(X, V, rng)
     rhs[3, 0] += 1
     assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
+
+
+def test_a_factor_that_a_later_coordinate_brings_is_checked_in_the_earlier_ones():
+    """x_1 = p/d + 1/(g d f) is so near to p/d that it lacks the factors f and g, and f multiplies its distance."""
+    rng = random.Random(1)
+
+    def bits(count: int) -> fmpz:
+        return fmpz(rng.getrandbits(count) | 1)
+
+    f, d, g, p = fmpz(2**89 - 1), fmpz(10**9 + 7) ** 13, bits(580), bits(350)
+    D = d * f
+    P2, P3 = bits(480), bits(480)
+    P4 = -(3 * P2 + 5 * P3) * fmpz(pow(7, -1, int(f))) % f + f * bits(380)  # f | 3 P_2 + 5 P_3 + 7 P_4
+    rows = []
+    for _ in range(4):
+        m, a, b = bits(18), bits(600), bits(600)
+        c = -(a * P2 + b * P3 + m * (g * p * f + 1)) * fmpz(pow(int(P4), -1, int(D))) % D + D * bits(110)
+        rows.append([g * m, a, b, c])
+    matrix = fmpz_mat(rows)
+    x = [fmpq(p, d) + fmpq(1, g * D), fmpq(P2, D), fmpq(P3, D), fmpq(P4, D)]
+    rhs = fmpz_mat([[entry.p] for entry in (fmpq_mat(matrix) * fmpq_mat(4, 1, x)).entries()])
+    assert fmpq_mat(matrix).solve(fmpq_mat(rhs)).entries() == x
+    assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
+
+
+@pytest.mark.parametrize("exponent", [-1500, -250, -1, 250])
+@pytest.mark.parametrize("name", ["volterra_periodic_4", "paper_m2", "clebsch_first_flow"])
+def test_long_initial_points_and_any_eps_give_the_points_of_fractions(name, exponent):
+    phi = load(name).map.at(fmpq(10) ** exponent)
+    for x in ([fmpq(1, 3**1300)] + [fmpq(0)] * (phi.dim - 1), [fmpq(7**900, 3**1300 + k) for k in range(phi.dim)]):
+        point, x = IntegerPoint.from_rationals(x), tuple(x)
+        for _ in range(2):
+            point, x = phi.integer_step(point), phi.generic_step(x)
+            assert point.rationals() == x
+
+
+def test_threads_leave_the_precision_of_flint_as_it_was(monkeypatch):
+    precision, interval = flint.ctx.prec, sys.getswitchinterval()
+    monkeypatch.setattr(short_solution, "_LEAST_BITS", 300)
+    phi, start = KahanMap(MEMBER, "1/10"), ["1/2", "-1/3", "2/5", 1, "3/4", "-2/7"]
+
+    def last(_: int) -> IntegerPoint:
+        *_, point = Orbit(phi, start, 22)
+        return point.value
+
+    sys.setswitchinterval(1e-5)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            points = list(pool.map(last, range(8)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert all(point == points[0] for point in points)
+    assert flint.ctx.prec == precision
 
 
 MEMBER = random_member_with_eigenvalues([1, -2, 3], 2).chosen.system

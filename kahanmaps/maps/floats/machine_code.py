@@ -166,7 +166,7 @@ class MachineCode:
             for k, (operation, operands) in enumerate(code.operations, code.inputs):
                 x = [name(operand) for operand in operands]
                 if operation in ("max", "min"):
-                    lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} $v {x[0]}, {x[1]}")
+                    lines.append(f"%{prefix}{k}.c = fcmp {'ugt' if operation == 'max' else 'ult'} $v {x[0]}, {x[1]}")
                     x, operation = [f"%{prefix}{k}.c", *x], "select"
                 lines.append(f"%{prefix}{k} = {_INSTRUCTIONS[operation].format(*x)}")
             return "\n".join(lines), [name(x) for x in code.outputs]

@@ -25,6 +25,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
 from kahanmaps.maps.floats.straight_line_program import (
+    LARGE,
     LARGEST_DOUBLE,
     MAX_ENTRY,
     MAX_OPERATIONS,
@@ -34,7 +35,6 @@ from kahanmaps.maps.floats.straight_line_program import (
     StepChecks,
     StraightLineProgram,
     TooManyOperations,
-    extreme,
     solve,
     solve_two,
 )
@@ -169,18 +169,18 @@ class FloatEquation(NamedTuple):
         constant, rhs_constant = (
             max(abs(x) for constants in self.constants for x in constants[part]) for part in (slice(n), slice(n, None))
         )
-        bound = max(MAX_ENTRY, 4 * constant)
-        largest = (bound - constant) / largest_sum if largest_sum else 0.0
+        bound = max(MAX_ENTRY, min(4 * constant, LARGE))
+        largest = min((bound - constant) / largest_sum, LARGE) if largest_sum and constant < bound else 0.0
 
         def holds() -> Any:
-            size: Any = 0.0
-            for k in sorted(in_matrix):
-                size = extreme("max", size, abs(y[k]))
-            return size <= largest
+            # A sum, not the maximum: if a product of coordinates is NaN, so is the sum.
+            size: Any = sum((abs(y[k]) for k in sorted(in_matrix)), 0.0)
+            return (size <= largest) if constant < bound else False
 
-        # Each unknown exceeds those before it in the back substitution, or the right side, at most by this factor.
+        # No number can overflow: each unknown exceeds those solved before it, or the right side, at most by the factor
+        # n 9^n 2^40, the first two of them by its square.
         exponent = n * (40 + log2(n * 9**n)) + log2(rhs_sum * largest + rhs_constant + 1)
-        checks.is_bounded &= in_rhs <= in_matrix and exponent < 1000
+        checks.is_bounded &= in_rhs <= in_matrix and bound == MAX_ENTRY and exponent < 1000
         return solve(rows, EntryBound(bound, holds), checks)
 
 

@@ -29,6 +29,9 @@ MIN_PIVOT_RATIO = 2.0**-40  # a step is near-singular if a pivot is at most this
 # A fast elimination is valid only for entries up to this bound, or four times the largest constant. Its pivots are then
 # compared with constants, which takes less time than with the entries of each orbit.
 MAX_ENTRY = 1024.0
+LARGE = (
+    2.0**300
+)  # no fast elimination with larger numbers is valid: the determinant of its last two rows might overflow
 MAX_FACTOR = 8.0  # maximal factor by which a pivot row is multiplied when it is subtracted from another row
 LARGEST_DOUBLE = float(np.finfo(np.float64).max)
 MAX_OPERATIONS = 4000  # maximal number of operations of a fast step; longer programs take too long to compile
@@ -252,7 +255,10 @@ def select(condition: Any, if_true: Any, if_false: Any) -> Any:
 
 
 def extreme(name: str, x: Any, y: Any) -> Any:
-    """Return the larger ("max") or smaller ("min") of two numbers >= 0; if one is NaN, either of them."""
+    """Return the larger ("max") or smaller ("min") of two numbers >= 0; if one is NaN, the first, or NaN in arrays.
+
+    In a fast elimination every NaN comes after a pivot 0 or a factor that is too large, which are then kept.
+    """
     values = [v for v in (x, y) if isinstance(v, Value)]
     if len(values) == 1 and (0.0 if name == "max" else np.inf) in (x, y):
         return values[0]

@@ -14,8 +14,10 @@ The solution is the only one, since no pivot of the elimination contains 0.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import flint
 from flint import arb, fmpz, fmpz_mat
@@ -26,8 +28,14 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint, lowest
 
 _LEAST_BITS = 1800  # shorter systems are solved exactly in less time
 _SPARE_BITS = 64  # beyond the expected length of the solution, for cancellation
-_PIVOT_RATIO = 16
+_PIVOT_RATIO = 16  # rows are exchanged for a pivot that is so many times as large
+# The common denominator of the coordinates is that of a combination of them, but for factors that are usually among:
 _SMALL_FACTORS = 2**6 * 3**4 * 5**2 * 7**2 * 11 * 13 * 17 * 19 * 23
+# FLINT's precision is global to the process. A thread restores it before another one changes it; a process that was
+# forked meanwhile has a lock of its own.
+_LOCKS = [Lock()]
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=lambda: _LOCKS.append(Lock()))
 _DIGITS = 256  # from this number of binary digits, denominators below 2^112 are recognized
 
 
@@ -50,20 +58,21 @@ def short_solution(matrix: fmpz_mat, rhs: fmpz_mat, point: IntegerPoint, bits: i
     The result is None if the solution has more than the expected number of `bits`, or is not recognized.
     """
     power = bits + _DIGITS
-    with flint.ctx.workprec(power + _SPARE_BITS):
-        factors = _factors(matrix)
-        if factors is None:
-            return None
-        leading = [_rounded(x, power) for x in factors.solve(rhs)]
-        divisor = arb(point.denominator) ** (matrix.nrows() - 2) * (point.preceding_denominator or 1)
-        quotient = _rounded(factors.determinant / divisor, _DIGITS)
-        solution = _by_determinant(matrix, rhs, [_Real(entry, arb(0), power) for entry in leading], quotient)
-    if solution is not None:
-        return solution
-    with flint.ctx.workprec(bits + _SPARE_BITS):
-        residual = rhs * (fmpz(1) << power) - matrix * fmpz_mat(len(leading), 1, leading)
-        numbers = [_Real(*parts, power) for parts in zip(leading, factors.solve(residual), strict=True)]
-        return _by_digits(matrix, numbers, 2 * (bits + _SPARE_BITS))
+    with _LOCKS[-1]:
+        with flint.ctx.workprec(power + _SPARE_BITS):
+            factors = _factors(matrix)
+            if factors is None:
+                return None
+            leading = [_rounded(x, power) for x in factors.solve(rhs)]
+            divisor = arb(point.denominator) ** (matrix.nrows() - 2) * (point.preceding_denominator or 1)
+            quotient = _rounded(factors.determinant / divisor, _DIGITS)
+            solution = _by_determinant(matrix, rhs, [_Real(entry, arb(0), power) for entry in leading], quotient)
+        if solution is not None:
+            return solution
+        with flint.ctx.workprec(bits + _SPARE_BITS):
+            residual = rhs * (fmpz(1) << power) - matrix * fmpz_mat(len(leading), 1, leading)
+            numbers = [_Real(*parts, power) for parts in zip(leading, factors.solve(residual), strict=True)]
+            return _by_digits(matrix, numbers, 2 * (bits + _SPARE_BITS))
 
 
 def _by_determinant(matrix: fmpz_mat, rhs: fmpz_mat, numbers: Sequence[_Real], quotient: fmpz) -> IntegerPoint | None:
@@ -83,12 +92,14 @@ def _by_digits(matrix: fmpz_mat, numbers: Sequence[_Real], length: int) -> Integ
     power, weights = numbers[0].power, range(1, 2 * len(numbers), 2)
     leading = sum((weight * number.leading for weight, number in zip(weights, numbers, strict=True)), fmpz(0))
     rest = sum((weight * number.rest for weight, number in zip(weights, numbers, strict=True)), arb(0))
-    digits = length - power
-    if (denominator := simple_denominator((leading << digits) + _rounded(rest, digits), length)) is None:
+    digits = max(length - power, 0)
+    if (denominator := simple_denominator((leading << digits) + _rounded(rest, digits), power + digits)) is None:
         return None
-    longest_entry = max(entry.bit_length() for entry in matrix.entries())
-    tolerance = fmpz(1) << (power - longest_entry - len(numbers).bit_length())
-    V, numerators = _fractions(numbers, _SMALL_FACTORS * denominator, tolerance)
+    # M X - V r has entries below 1 if all distances are below this bound.
+    tolerance_bits = power - max(entry.bit_length() for entry in matrix.entries()) - len(numbers).bit_length()
+    if tolerance_bits < 0:
+        return None
+    V, numerators = _fractions(numbers, _SMALL_FACTORS * denominator, fmpz(1) << tolerance_bits)
     if V == 0:
         return None
     common_factor = content((V // denominator, *numerators))
@@ -115,19 +126,17 @@ def _fractions(numbers: Sequence[_Real], V: fmpz, tolerance: fmpz) -> tuple[fmpz
 
     Factors below 2^112 that V lacks are recognized.
     """
-    numerators = list[fmpz]()
-    for number in numbers:
-        X, distance = number.nearest_integer(V)
-        if not distance < tolerance:
-            factor = simple_denominator((V * number.leading) >> (number.power - _DIGITS), _DIGITS)
-            if factor is None:
-                return fmpz(0), []
-            V, numerators = factor * V, [factor * entry for entry in numerators]
-            X, distance = number.nearest_integer(V)
-            if not distance < tolerance:
-                return fmpz(0), []
-        numerators.append(X)
-    return V, numerators
+    for _ in range(len(numbers) + 1):
+        approximations = [number.nearest_integer(V) for number in numbers]
+        far = [k for k, (_, distance) in enumerate(approximations) if not distance < tolerance]
+        if not far:
+            return V, [integer for integer, _ in approximations]
+        number = numbers[far[0]]
+        factor = simple_denominator((V * number.leading) >> (number.power - _DIGITS), _DIGITS)
+        if factor is None:
+            break
+        V = factor * V  # so all distances change
+    return fmpz(0), []
 
 
 @dataclass(frozen=True)
