@@ -84,6 +84,17 @@ def test_what_differs_from_the_solution_by_less_than_the_approximation_shows_is_
     assert short_solution.short_solution(matrix, rhs, POINT, BITS) is None
 
 
+def test_factors_that_are_not_needed_are_removed(monkeypatch):
+    rng = random.Random(4)
+    X, V = random_fractions(6, rng, 3**20)
+    matrix, rhs = system_with(X, V, rng)
+    for factors in (1, 3**20, 3**100):  # with the last of them the multiple of V is longer than half of the digits
+        monkeypatch.setattr(short_solution, "_SMALL_FACTORS", factors)
+        found = short_solution.short_solution(matrix, rhs, POINT, BITS)
+        expected = by_flint(matrix, rhs)
+        assert (found.numerators, found.denominator) == (expected.numerators, expected.denominator)
+
+
 def test_a_factor_that_a_later_coordinate_brings_is_checked_in_the_earlier_ones():
     """x_1 = p/d + 1/(g d f) is so near to p/d that it lacks the factors f and g, and f multiplies its distance."""
     rng = random.Random(1)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from threading import Lock
+from threading import RLock
 
 import flint
 from flint import arb, fmpz, fmpz_mat
@@ -33,9 +33,9 @@ _PIVOT_RATIO = 16  # rows are exchanged for a pivot that is so many times as lar
 _SMALL_FACTORS = 2**6 * 3**4 * 5**2 * 7**2 * 11 * 13 * 17 * 19 * 23
 # FLINT's precision is global to the process. A thread restores it before another one changes it; a process that was
 # forked meanwhile has a lock of its own.
-_LOCKS = [Lock()]
+_LOCKS = [RLock()]
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=lambda: _LOCKS.append(Lock()))
+    os.register_at_fork(after_in_child=lambda: _LOCKS.append(RLock()))
 _DIGITS = 256  # from this number of binary digits, denominators below 2^112 are recognized
 
 
@@ -102,7 +102,9 @@ def _by_digits(matrix: fmpz_mat, numbers: Sequence[_Real], length: int) -> Integ
     V, numerators = _fractions(numbers, _SMALL_FACTORS * denominator, fmpz(1) << tolerance_bits)
     if V == 0:
         return None
-    common_factor = content((V // denominator, *numerators))
+    # If V has less than half of the digits, `denominator` is certainly that of the combination, and no factor too large.
+    multiple = V // denominator if V.bit_length() < length // 2 else V
+    common_factor = content((multiple, *numerators))
     return IntegerPoint(tuple(entry // common_factor for entry in numerators), V // common_factor)
 
 

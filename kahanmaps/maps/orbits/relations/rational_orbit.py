@@ -15,7 +15,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 # bit length of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: for faster growth
 # there are no relations. Their coefficients are about as long as the initial point, so points must be longer than that.
 # If the coefficients are longer than expected, the search is repeated when points are _RETRY_FACTOR times as long.
-_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 500  # the second is multiplied by the square of (dimension + 1)
+_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 70  # the second is multiplied by the cube of (dimension + 1)
 _RETRY_FACTOR = 4
 _LONGER_THAN_START = 8  # the search starts when points are this many times as long as the initial point
 _SLOW_GROWTH = 1.5
@@ -57,7 +57,7 @@ class RationalOrbit:
 
     def __iter__(self) -> Iterator[IntegerPoint | None]:
         last_points, last_number = deque([self.start], maxlen=3), 0
-        min_bits_by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
+        min_bits_by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 3
         search_bits: float = max(_MIN_BITS, min_bits_by_coordinates, _LONGER_THAN_START * self.start.bits)
         # When points are longer than this, few steps remain, since the bit length grows like n^2.
         max_search_bits = inf if self.max_bits is None else self.max_bits / 2
