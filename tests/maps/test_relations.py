@@ -59,7 +59,7 @@ def walked(map_over, start, steps):
 def early(monkeypatch):
     """Sequences are searched for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
-    monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
+    monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 3)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: None)
     monkeypatch.setattr(elliptic, "_BITS_PER_PRIME", 1)

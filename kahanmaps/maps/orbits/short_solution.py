@@ -102,7 +102,7 @@ def _by_digits(matrix: fmpz_mat, numbers: Sequence[_Real], length: int) -> Integ
     V, numerators = _fractions(numbers, _SMALL_FACTORS * denominator, fmpz(1) << tolerance_bits)
     if V == 0:
         return None
-    # If V has less than half of the digits, `denominator` is certainly that of the combination, and no factor too large.
+    # If V has less than half of the digits, `denominator` is certainly that of the combination, and divides V.
     multiple = V // denominator if V.bit_length() < length // 2 else V
     common_factor = content((multiple, *numerators))
     return IntegerPoint(tuple(entry // common_factor for entry in numerators), V // common_factor)
